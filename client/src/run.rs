@@ -6,12 +6,10 @@ use crate::cli::{
     TapeEncodeArgs, TapeShowArgs, ViewArgs,
 };
 use crate::error::Error;
+use crate::files;
 use crate::fit::fit_obj;
-use crate::formats::{ReadError, SourceFile};
 use crate::interrupt::MovingPlotter;
-use crate::job::{Job, Settings};
 use crate::keyboard::KEYS;
-use crate::lines::Lines;
 use crate::link::Link;
 use crate::machine_settings::simulated;
 use crate::machines;
@@ -19,19 +17,23 @@ use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
 use crate::output;
-use crate::page::Page;
-use crate::picture::{self, Picture};
+use crate::png::png;
 use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress, duration};
-use crate::results::JobReport;
-use crate::room::Room;
 use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
 use penup::index::Index;
 use penup::machine::Setting;
 use penup::step::tape::BadCode;
+use penup_job::picture::Picture;
+use penup_job::results::JobReport;
+use penup_job::room::Room;
+use penup_job::{Job, Settings};
+use penup_readers::lines::Lines;
+use penup_readers::page::Page;
+use penup_readers::{Arrangement, SourceFile};
 use serde_json::{Value, json};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -200,7 +202,7 @@ fn fit(args: &FitArgs, quiet: bool) -> Result<Outcome, Error> {
     let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
     let output = args.output.clone().unwrap_or_else(beside);
     output::check(&args.file, &[&output])?;
-    let source = SourceFile::read(&args.file)?;
+    let source = files::read(&args.file, &Arrangement::default())?;
     if !quiet {
         note(&args.file, source.notes());
     }
@@ -250,8 +252,8 @@ fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
 }
 
 fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
-    let unreadable = |source| ReadError::File { file: file.display().to_string(), source };
-    Ok(std::fs::read(file).map_err(unreadable)?)
+    let unreadable = |source| Error::File { file: file.display().to_string(), source };
+    std::fs::read(file).map_err(unreadable)
 }
 
 fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
@@ -287,8 +289,8 @@ fn draw_by(
 
 /// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.
 fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(SourceFile, Settings), Error> {
-    let source = SourceFile::read(file)?;
-    let settings = view.settings_on(source.page());
+    let source = files::read(file, view.arrangement())?;
+    let settings = view.settings_for(&source);
     if !quiet {
         note(file, source.notes());
         let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
@@ -337,7 +339,7 @@ impl Outputs {
 fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a Path>, Error> {
     let svg = picture.svg();
     let png = match outputs.png.as_deref() {
-        Some(path) => Some((path, picture::png(&svg)?)),
+        Some(path) => Some((path, png(&svg)?)),
         None => None,
     };
     let mut files = Vec::new();

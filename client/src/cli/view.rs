@@ -1,18 +1,21 @@
 //! The arguments that say what is drawn and how. They are made from the library's table of options,
 //! which also checks their values, so a new option needs nothing here.
 //!
-//! Two things are the client's own: names of pages, and `--landscape`.
+//! The options of plans come from the readers' table in the same way. Two things are the client's
+//! own: names of pages, and `--landscape`.
 
 use super::number;
-use crate::job::Settings;
-use crate::page::{NAMED_PAGES, Page};
-use crate::protocol::acts_at_once;
-use crate::words::for_client;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use penup::plotter::{Flag, OPTIONS, PlotOption, PlotOptions};
 use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
+use penup_job::Settings;
+use penup_readers::lines::acts_at_once;
+use penup_readers::page::{NAMED_PAGES, Page};
+use penup_readers::words::for_client;
+use penup_readers::{Arrangement, PLAN_OPTIONS, PlanOption, SourceFile, Turn};
 
 /// The name of the option whose value may also be the name of a page.
 const PAGE: &str = "page";
@@ -24,50 +27,46 @@ const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
 const MARGIN: &str = "margin";
 /// The name of the option that scales a plan to the page.
 const FIT: &str = "fit";
-/// The argument that turns the page.
+/// The argument that turns the page, and its values.
 const LANDSCAPE: &str = "landscape";
+const ALWAYS: &str = "always";
+const AUTOMATIC: &str = "auto";
+/// The heading of the options of plans.
+const PLAN: &str = "Plan: a drawing of straight lines at one height, in this order";
 
 /// The arguments of camera, page and order.
 #[derive(Debug, Clone)]
 pub struct ViewArgs {
     settings: Settings,
-    landscape: bool,
-    is_page_given: bool,
-    is_margin_given: bool,
+    arrangement: Arrangement,
 }
 
 impl ViewArgs {
-    /// The settings that these arguments select.
-    pub fn settings(&self) -> Settings {
-        self.settings.clone()
+    /// What is done with a plan before it is drawn.
+    pub fn arrangement(&self) -> &Arrangement {
+        &self.arrangement
     }
 
-    /// The settings for a file that lays its plan on `page`, if it has one. Where the arguments do
-    /// not say otherwise, that is the page, and at true size no margin is kept free: so the plan
-    /// keeps its place.
-    pub fn settings_on(&self, page: Option<Page>) -> Settings {
-        let mut settings = self.settings();
-        let Some(page) = page else { return settings };
-        if !self.is_page_given {
-            settings.page = turned(page, self.landscape);
-        }
+    /// The settings for a file that was arranged by [`ViewArgs::arrangement`]. Where the arguments do
+    /// not say otherwise, a file that has a page is drawn on that, and at true size no margin is kept
+    /// free: so its plan keeps its place.
+    pub fn settings_for(&self, file: &SourceFile) -> Settings {
+        let mut settings = self.settings.clone();
+        settings.page = file.sheet();
+        let is_own = file.page().is_some();
         let is_true_size = settings.value(FIT) == Some("off");
-        let own = page_value(settings.page);
+        let page = page_value(settings.page);
         for (name, value) in &mut settings.values {
             match *name {
-                PAGE => value.clone_from(&own),
-                MARGIN if is_true_size && !self.is_margin_given => "0".clone_into(value),
+                PAGE => value.clone_from(&page),
+                MARGIN if is_own && is_true_size && !self.arrangement.has_margin() => {
+                    "0".clone_into(value);
+                }
                 _ => {}
             }
         }
         settings
     }
-}
-
-/// The page, on its long side if `landscape` is set.
-fn turned(page: Page, landscape: bool) -> Page {
-    let Page { width, height } = page;
-    if landscape { Page { width: width.max(height), height: width.min(height) } } else { page }
 }
 
 /// A page as the value of its option.
@@ -77,7 +76,7 @@ fn page_value(page: Page) -> String {
 
 impl Args for ViewArgs {
     fn augment_args(command: Command) -> Command {
-        flags().fold(command, |command, (option, flag)| {
+        let command = flags().fold(command, |command, (option, flag)| {
             let command = command.arg(argument(option, flag));
             if option.name != PAGE {
                 return command;
@@ -85,11 +84,19 @@ impl Args for ViewArgs {
             command.arg(
                 Arg::new(LANDSCAPE)
                     .long(LANDSCAPE)
-                    .help("Lay the page on its long side")
+                    .help(
+                        "Lay the page on its long side; --landscape=auto does so if a plan is wider \
+                         than high",
+                    )
                     .help_heading(flag.heading)
-                    .action(ArgAction::SetTrue),
+                    .value_name("WHEN")
+                    .num_args(0..=1)
+                    .require_equals(true)
+                    .default_missing_value(ALWAYS)
+                    .value_parser([ALWAYS, AUTOMATIC]),
             )
-        })
+        });
+        PLAN_OPTIONS.iter().fold(command, |command, option| command.arg(plan_argument(option)))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -99,9 +106,13 @@ impl Args for ViewArgs {
 
 impl FromArgMatches for ViewArgs {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let landscape = matches.get_flag(LANDSCAPE);
+        let is_given = |name: &str| matches.value_source(name) == Some(ValueSource::CommandLine);
         let page = matches.get_one::<Page>(PAGE).copied().unwrap_or(NAMED_PAGES[0].1);
-        let page = turned(page, landscape);
+        let turn = match matches.get_one::<String>(LANDSCAPE).map(String::as_str) {
+            None => Turn::AsItIs,
+            Some(AUTOMATIC) => Turn::Automatic,
+            Some(_) => Turn::Landscape,
+        };
         let value = |(option, flag): (&'static PlotOption, Flag)| {
             let value = match option.name {
                 PAGE => Some(page_value(page)),
@@ -112,13 +123,26 @@ impl FromArgMatches for ViewArgs {
             };
             Some((option.name, value?))
         };
-        let is_given = |name| matches.value_source(name) == Some(ValueSource::CommandLine);
-        Ok(Self {
-            settings: Settings { page, values: flags().filter_map(value).collect() },
-            landscape,
-            is_page_given: is_given(PAGE),
-            is_margin_given: is_given(MARGIN),
-        })
+        let settings = Settings { page, values: flags().filter_map(value).collect() };
+        let margin = settings.value(MARGIN).and_then(|margin| margin.parse().ok());
+        let mut arrangement = Arrangement::on(
+            is_given(PAGE).then_some(page),
+            turn,
+            margin.filter(|_| is_given(MARGIN)),
+        );
+        for option in PLAN_OPTIONS {
+            let text = match matches.try_get_one::<String>(option.name) {
+                _ if option.value.is_empty() => matches.get_flag(option.name).then(String::new),
+                Ok(text) => text.cloned(),
+                Err(_) => None,
+            };
+            if let Some(text) = text {
+                arrangement
+                    .set(option.name, &text)
+                    .map_err(|reason| Error::raw(ErrorKind::ValueValidation, reason))?;
+            }
+        }
+        Ok(Self { settings, arrangement })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
@@ -130,6 +154,20 @@ impl FromArgMatches for ViewArgs {
 /// The options that have a flag, in the order of the table.
 fn flags() -> impl Iterator<Item = (&'static PlotOption, Flag)> {
     OPTIONS.iter().filter_map(|option| Some((option, option.flag.get()?)))
+}
+
+/// The argument for an option of plans.
+fn plan_argument(option: &'static PlanOption) -> Arg {
+    let argument = Arg::new(option.name).long(option.name).help(option.help).help_heading(PLAN);
+    if option.value.is_empty() {
+        let argument = argument.action(ArgAction::SetTrue);
+        return if option.changes_size { argument.conflicts_with(FIT) } else { argument };
+    }
+    let argument = argument.value_name(option.value).allow_hyphen_values(true);
+    let argument = if option.changes_size { argument.conflicts_with(FIT) } else { argument };
+    argument.value_parser(move |text: &str| {
+        Arrangement::default().set(option.name, text).map(|()| text.to_owned())
+    })
 }
 
 /// The argument for an option. Its value is what is sent to the plotter, except for the page.

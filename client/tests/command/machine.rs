@@ -3,7 +3,7 @@
 use super::*;
 use penup_client::link::Link as _;
 use penup_client::preview::InMemory;
-use penup_client::room::Room;
+use penup_job::room::Room;
 use serialport::{SerialPort as _, TTYPort};
 use std::io::{Read as _, Write as _};
 use std::sync::Arc;

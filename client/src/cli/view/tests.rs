@@ -6,7 +6,14 @@ fn settings(options: &[&str]) -> Result<Settings, String> {
     let line = ["penup", "preview", "f.obj"].iter().chain(options);
     let cli = Cli::try_parse_from(line).map_err(|error| error.to_string())?;
     match cli.command {
-        crate::cli::Command::Preview(args) => Ok(args.view.settings()),
+        crate::cli::Command::Preview(args) => {
+            let file = SourceFile::arranged(
+                "a.obj".into(),
+                b"v 0 0 0\n".to_vec(),
+                args.view.arrangement(),
+            );
+            Ok(args.view.settings_for(&file.expect("a file")))
+        }
         _ => Err("the wrong command".to_owned()),
     }
 }
