@@ -2,7 +2,8 @@
 //! plotter, what the plotter answers, and what it then draws.
 //!
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`] has the
-//! words of the serial line, and reads the replies. [`twin`] computes what the plotter must then
+//! words of the serial line, and reads the replies. [`view`] says from where a model is
+//! seen. [`twin`] computes what the plotter must then
 //! contain, and [`room`] the memory that takes. [`pins`] and [`watch`] follow the pen to its
 //! [`path`], [`strokes`] and [`results`] tell what was drawn, and [`picture`] shows it.
 //!
@@ -17,6 +18,7 @@ pub mod results;
 pub mod room;
 pub mod strokes;
 pub mod twin;
+pub mod view;
 pub mod watch;
 
 pub use job::{Job, Settings};

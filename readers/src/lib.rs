@@ -34,7 +34,8 @@ pub use error::ReadError;
 pub use format::SIZE_LIMIT;
 
 use crate::lines::{JobLine, Lines};
-use crate::page::Page;
+use crate::page::{A4, Page};
+use crate::plan::Plan;
 use format::{Body, Contents, Format};
 use penup::board_table::BOARDS;
 use std::path::Path;
@@ -69,10 +70,21 @@ pub struct SourceFile {
 impl SourceFile {
     /// Checks `bytes`, the contents of a file called `name`, which is drawn as it is.
     ///
+    /// A nested file may take much stack: see [`takes_deep_stack`].
+    ///
     /// # Errors
-    /// See [`SourceFile::arranged`].
+    /// The format is unknown, or the file contains something that no plotter accepts.
     pub fn new(name: String, bytes: Vec<u8>) -> Result<Self, ReadError> {
-        Self::arranged(name, bytes, &Arrangement::default())
+        // What arranges plans is left out of a program that only calls this.
+        let (size, contents) = read(name, bytes, &Arrangement::default())?;
+        let Contents { body, page, bounds, notes } = contents;
+        Ok(match body {
+            Body::Plan(plan) => Self::of_plan(size, plan, page, page.unwrap_or(A4), notes),
+            Body::Lines(lines) => {
+                let sheet = page.unwrap_or(A4);
+                Self { size, lines, own_page: page, sheet, bounds, notes }
+            }
+        })
     }
 
     /// Checks `bytes`, the contents of a file called `name`, and arranges its plan.
@@ -87,14 +99,9 @@ impl SourceFile {
         bytes: Vec<u8>,
         arrangement: &Arrangement,
     ) -> Result<Self, ReadError> {
-        let format = find(&name, &bytes)?;
-        let size = bytes.len();
-        if size as u64 >= SIZE_LIMIT {
-            return Err(ReadError::TooLarge { file: name });
-        }
         let refused = |reason| ReadError::Content { file: name.clone(), reason };
-        let Contents { body, page, bounds, mut notes } =
-            format.read(name.clone(), bytes, arrangement)?;
+        let (size, contents) = read(name.clone(), bytes, arrangement)?;
+        let Contents { body, page, bounds, mut notes } = contents;
         let mut plan = match (body, arrangement.first_given()) {
             (Body::Plan(plan), _) => plan,
             (Body::Lines(lines), None) => {
@@ -111,10 +118,20 @@ impl SourceFile {
             }
         };
         let sheet = arrangement.arrange(&mut plan, page, &mut notes).map_err(refused)?;
+        Ok(Self::of_plan(size, plan, page, sheet, notes))
+    }
+
+    fn of_plan(
+        size: usize,
+        plan: Plan,
+        own_page: Option<Page>,
+        sheet: Page,
+        mut notes: Vec<String>,
+    ) -> Self {
         let bounds = plan.bounds();
         let (lines, more) = plan.into_lines();
         notes.extend(more);
-        Ok(Self { size, lines: Box::new(lines), own_page: page, sheet, bounds, notes })
+        Self { size, lines: Box::new(lines), own_page, sheet, bounds, notes }
     }
 
     /// The size of the file in bytes.
@@ -136,6 +153,23 @@ impl SourceFile {
     /// The least and the greatest x and y of the plan, in mm; `None` if that is not known.
     pub fn bounds(&self) -> Option<[[f64; 2]; 2]> {
         self.bounds
+    }
+
+    /// The least and the greatest x, y and z of the vertices; `None` if there are none.
+    pub fn extent(&self) -> Option<[[f64; 3]; 2]> {
+        let points = self.in_order().filter_map(|line| {
+            let mut words = line.sent.strip_prefix("v ")?.split(' ');
+            let mut number = || words.next()?.parse::<f64>().ok();
+            Some([number()?, number()?, number()?])
+        });
+        points.fold(None, |extent, point| {
+            let [low, high] = extent.unwrap_or([point; 2]);
+            let axes = [0, 1, 2];
+            Some([
+                axes.map(|axis: usize| low[axis].min(point[axis])),
+                axes.map(|axis: usize| high[axis].max(point[axis])),
+            ])
+        })
     }
 
     /// What the user should know about the file: sentences without a full stop, each about
@@ -166,6 +200,20 @@ impl Lines for SourceFile {
 /// The format is unknown.
 pub fn check_beginning(name: &str, beginning: &[u8]) -> Result<(), ReadError> {
     find(name, beginning).map(drop)
+}
+
+/// Reads `bytes`, the contents of a file called `name`. Returns their number, too.
+fn read(
+    name: String,
+    bytes: Vec<u8>,
+    arrangement: &Arrangement,
+) -> Result<(usize, Contents), ReadError> {
+    let format = find(&name, &bytes)?;
+    let size = bytes.len();
+    if size as u64 >= SIZE_LIMIT {
+        return Err(ReadError::TooLarge { file: name });
+    }
+    Ok((size, format.read(name, bytes, arrangement)?))
 }
 
 /// Whether reading a file called `name` with these `bytes` may take up to 256 MiB of stack, because

@@ -36,6 +36,7 @@ impl Coordinate {
     }
 
     /// Whether it is a finite number.
+    #[cfg(feature = "ply")]
     pub(super) fn is_finite(self) -> bool {
         self.value().is_finite()
     }
@@ -134,6 +135,40 @@ impl Mesh {
         Some((line, number))
     }
 
+    /// The faces of OBJ lines whose corners are absolute numbers or count back; `None` if a line is of
+    /// another form.
+    pub(super) fn of_lines(lines: &dyn Lines) -> Option<Self> {
+        let mut mesh = Self::default();
+        let mut numbers = Vec::new();
+        for line in lines.in_order() {
+            let mut words = line.sent.split(' ');
+            match words.next() {
+                Some("v") => {
+                    let mut number = || words.next()?.parse().ok().map(Coordinate::Double);
+                    numbers.push(mesh.vertex([number()?, number()?, number()?]));
+                }
+                Some("f") => {
+                    let corner = |word: &str| {
+                        let number: i64 = word.split('/').next()?.parse().ok()?;
+                        let back = if number < 0 { numbers.len() as i64 } else { -1 };
+                        numbers.get(usize::try_from(number + back).ok()?).copied()
+                    };
+                    let corners = words.map(corner).collect::<Option<Vec<u32>>>()?;
+                    mesh.face(0, &corners);
+                }
+                _ => {}
+            }
+        }
+        Some(mesh)
+    }
+
+    /// Says that most edges are nearly flat, if they are.
+    pub(super) fn crease_note(&self) -> Option<String> {
+        self.flat_part().is_some_and(|part| part >= MOST).then(|| {
+            "most edges are nearly flat: --crease 30 leaves them out, and outlines stay".to_owned()
+        })
+    }
+
     /// The part of the inner edges that bend by less than [`NEARLY_FLAT`]; `None` if there are few.
     fn flat_part(&self) -> Option<f64> {
         let mut normals: HashMap<[u32; 2], [f64; 3]> = HashMap::new();
@@ -193,12 +228,7 @@ impl Mesh {
             let count = super::counted(self.degenerate, ["face is", "faces are"]);
             notes.push(format!("{count} not drawn, for want of three different corners"));
         }
-        if self.flat_part().is_some_and(|part| part >= MOST) {
-            notes.push(
-                "most edges are nearly flat: --crease 30 leaves them out, and outlines stay"
-                    .to_owned(),
-            );
-        }
+        notes.extend(self.crease_note());
         notes.extend(super::capacity(self.vertices.len()));
         Ok(Contents { notes, ..Contents::of(self) })
     }

@@ -19,6 +19,7 @@ mod irregular;
 use super::arrange::Arrangement;
 use super::error::ReadError;
 use super::format::{Contents, Format};
+use super::mesh::Mesh;
 use crate::lines::acts_at_once;
 use crate::lines::{JobLine, Lines, Origin};
 use crate::words::explained;
@@ -59,11 +60,24 @@ impl Format for Obj {
         match ObjLines::checked(file, bytes, true)? {
             Checked::Regular(lines) => {
                 let bounds = lines.flat.bounds();
-                Ok(Contents { bounds, ..Contents::of(lines) })
+                let notes = crease_note(&lines).into_iter().collect();
+                Ok(Contents { bounds, notes, ..Contents::of(lines) })
             }
             Checked::Irregular(file, bytes) => irregular::read(file, &bytes),
         }
     }
+}
+
+/// The most lines of a file that is searched for nearly flat edges. More of them would take time and
+/// memory out of proportion to a hint.
+const MOST_SEARCHED: usize = 300_000;
+
+/// Says that most edges are nearly flat, if they are.
+fn crease_note(lines: &dyn Lines) -> Option<String> {
+    if lines.count() > MOST_SEARCHED {
+        return None;
+    }
+    Mesh::of_lines(lines)?.crease_note()
 }
 
 /// The distance, in lines, between stored positions from which lines can be generated. A smaller

@@ -9,9 +9,12 @@ pub struct Page {
     pub height: f64,
 }
 
+/// The page that is taken where nobody names one.
+pub const A4: Page = Page { width: 210.0, height: 297.0 };
+
 /// The pages that have names, in lower case.
 pub const NAMED_PAGES: [(&str, Page); 10] = [
-    ("A4", Page { width: 210.0, height: 297.0 }),
+    ("A4", A4),
     ("A0", Page { width: 841.0, height: 1189.0 }),
     ("A1", Page { width: 594.0, height: 841.0 }),
     ("A2", Page { width: 420.0, height: 594.0 }),

@@ -19,11 +19,8 @@ mod table;
 pub(crate) use crop::clip_outline;
 pub use table::{PLAN_OPTIONS, PlanOption};
 
-use crate::page::Page;
+use crate::page::{A4, Page};
 use crate::plan::{Plan, Point};
-
-/// The page that is taken where neither the user nor the file names one: A4.
-const DEFAULT_PAGE: Page = Page { width: 210.0, height: 297.0 };
 
 /// Whether the page is turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -107,7 +104,7 @@ impl Arrangement {
 
     /// The page on which a drawing with these bounds is laid, if the file has this page.
     pub(crate) fn sheet(&self, own: Option<Page>, bounds: Option<[Point; 2]>) -> Page {
-        let page = self.page.or(own).unwrap_or(DEFAULT_PAGE);
+        let page = self.page.or(own).unwrap_or(A4);
         let (long, short) = (page.width.max(page.height), page.width.min(page.height));
         let landscape = Page { width: long, height: short };
         match (self.turn, bounds) {

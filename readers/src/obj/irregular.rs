@@ -266,6 +266,7 @@ pub(super) fn read(name: String, bytes: &[u8]) -> Result<Contents, ReadError> {
             materials.len()
         ));
     }
+    notes.extend(super::crease_note(&file));
     Ok(Contents { notes, ..Contents::of(file) })
 }
 
