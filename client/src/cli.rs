@@ -13,14 +13,14 @@ pub use view::ViewArgs;
 
 use crate::board;
 use crate::error::{EXIT_CODES, ExitCode};
+use crate::files::STANDARD_INPUT;
 use crate::fit::{FitError, TOLERANCES};
-use crate::formats::{self, STANDARD_INPUT};
 use crate::machine_settings::AssignedSetting;
-use crate::page::Page;
 use crate::table::BoardRow;
 use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 use penup::machine::Setting;
+use penup_readers::page::Page;
 use std::path::PathBuf;
 use view::page as page_size;
 
@@ -201,7 +201,7 @@ pub struct TapeShowArgs {
 
 /// The help for a file that is read, with the formats that it may have.
 fn file_help(what: &str) -> String {
-    format!("{what}: {}; {STANDARD_INPUT} is the standard input", formats::list())
+    format!("{what}: {}; {STANDARD_INPUT} is the standard input", penup_readers::list())
 }
 
 /// Options of `penup plot`.

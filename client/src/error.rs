@@ -1,14 +1,14 @@
 //! The errors of the `penup` command. Each message also tells the user what to do about it.
 
 use crate::fit::FitError;
-use crate::formats::ReadError;
 use crate::interrupt::EXIT_CODE;
-use crate::lines::{JobLine, Origin};
 use crate::machine_settings::NoSuchMachine;
 use crate::operate::SettingsFileError;
-use crate::protocol::RECEIVE_WINDOW;
-use crate::words::{as_option, explained, for_client};
 use penup::protocol::{CommandError, alarm_entries};
+use penup_job::protocol::RECEIVE_WINDOW;
+use penup_readers::ReadError;
+use penup_readers::lines::{JobLine, Origin};
+use penup_readers::words::{as_option, explained, for_client};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -19,6 +19,14 @@ pub enum Error {
     /// The file to draw cannot be read.
     #[error(transparent)]
     Read(#[from] ReadError),
+    /// A file cannot be read from the disk.
+    #[error("cannot read {file}: {source}")]
+    File {
+        /// The path as the user wrote it.
+        file: String,
+        /// The operating system's error.
+        source: io::Error,
+    },
     /// The file's polylines cannot be fitted.
     #[error("{}", not_fitted(file, source))]
     Fit {
@@ -346,6 +354,7 @@ impl Error {
             | Self::Unconfirmed { .. }
             | Self::Link(_) => BROKEN_OFF,
             Self::Read(_)
+            | Self::File { .. }
             | Self::Fit { .. }
             | Self::Tape { .. }
             | Self::SettingsFile { .. }

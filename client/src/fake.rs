@@ -4,15 +4,15 @@
 //! reported, it executes at most one line for each read of the client, and it acts on real-time
 //! bytes even inside a line. Time passes only while the client waits for bytes.
 
-use crate::lines::JobLine;
 use crate::link::{Answer, Link, Order};
-use crate::protocol::{
-    ABORT, AGAIN, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SETTINGS, SLOWER,
-};
-use crate::twin;
 use penup::checksum::CRC_16;
 use penup::machine::Settings;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
+use penup_job::protocol::{
+    ABORT, AGAIN, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SETTINGS, SLOWER,
+};
+use penup_job::twin;
+use penup_readers::lines::JobLine;
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};

@@ -3,9 +3,9 @@
 use crate::emulator::{self, EmulatedBoard, EmulatorError};
 use crate::error::Error;
 use crate::link::Link;
-use crate::page::PenRuns;
 use crate::table::BoardRow;
-use crate::watch::PenWatch;
+use penup_job::path::PenRuns;
+use penup_job::watch::PenWatch;
 use std::fs;
 use std::io;
 use std::time::Duration;

@@ -75,7 +75,6 @@ pub(crate) fn plan(
 ///
 /// # Errors
 /// The machine refuses the job.
-#[cfg(feature = "native")]
 pub(crate) fn measure(settings: Settings, path: &mut dyn Path) -> Result<(), MachineError> {
     let (pins, mut blocks) = (PulserState::new(), vec![Block::EMPTY; BLOCKS]);
     Machine::new(settings, &mut blocks, &pins, u32::MAX).start(path).map(drop)

@@ -5,7 +5,7 @@
 
 use crate::error::Error;
 use crate::link::{Link as _, SerialLink};
-use crate::protocol::{Reply, ReplyReader, STATUS_QUERY, Status, is_penup};
+use penup_job::protocol::{Reply, ReplyReader, STATUS_QUERY, Status, is_penup};
 use serde::Serialize;
 use serialport::SerialPortType;
 use std::io;

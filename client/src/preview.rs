@@ -5,15 +5,8 @@
 //! on a [`HostBoard`]. A preview therefore shows what a plotter would do, including its refusals.
 
 use crate::error::Error;
-use crate::lines::Lines;
 use crate::link::Link;
 use crate::motion_plot::{self, Motion};
-use crate::page::{PagePoint, PenRuns, Run};
-use crate::protocol::PLOT;
-use crate::results::{JobResult, Lengths, Timings};
-use crate::room::Room;
-use crate::strokes::strokes_of;
-use crate::watch::PenWatch;
 use penup::boards::host::{Change, CutFlash, HostBoard};
 use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
@@ -24,6 +17,13 @@ use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
 use penup::view::View;
 use penup::visibility::{EdgeParameter, Stretch};
+use penup_job::path::{PagePoint, PenRuns, Run};
+use penup_job::protocol::PLOT;
+use penup_job::results::{JobResult, Lengths, Timings};
+use penup_job::room::Room;
+use penup_job::strokes::strokes_of;
+use penup_job::watch::PenWatch;
+use penup_readers::lines::Lines;
 use std::io;
 use std::time::{Duration, Instant};
 

@@ -1,8 +1,8 @@
 //! Reports the progress of a job to the user: lines sent, then ink drawn and time left.
 
-use crate::protocol::Status;
-use crate::words::for_client;
 use indicatif::{ProgressBar, ProgressStyle};
+use penup_job::protocol::Status;
+use penup_readers::words::for_client;
 use std::io::{self, Write as _};
 
 /// A receiver of progress reports.
@@ -77,7 +77,7 @@ impl Bar {
 ///
 /// ```
 /// use penup_client::progress::how_far;
-/// use penup_client::protocol::Status;
+/// use penup_job::protocol::Status;
 /// let status = Status {
 ///     strokes: Some((12, 60)),
 ///     ink: Some((1234, 3400)),

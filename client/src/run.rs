@@ -6,12 +6,10 @@ use crate::cli::{
     TapeEncodeArgs, TapeShowArgs, ViewArgs,
 };
 use crate::error::Error;
+use crate::files;
 use crate::fit::fit_obj;
-use crate::formats::{ReadError, SourceFile};
 use crate::interrupt::MovingPlotter;
-use crate::job::{Job, Settings};
 use crate::keyboard::KEYS;
-use crate::lines::Lines;
 use crate::link::Link;
 use crate::machine_settings::simulated;
 use crate::machines;
@@ -19,19 +17,23 @@ use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
 use crate::output;
-use crate::page::Page;
-use crate::picture::{self, Picture};
+use crate::png::png;
 use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress, duration};
-use crate::results::JobReport;
-use crate::room::Room;
 use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
 use penup::index::Index;
 use penup::machine::Setting;
 use penup::step::tape::BadCode;
+use penup_job::picture::Picture;
+use penup_job::results::JobReport;
+use penup_job::room::Room;
+use penup_job::{Job, Settings};
+use penup_readers::lines::Lines;
+use penup_readers::page::Page;
+use penup_readers::{Arrangement, ReadError, SourceFile};
 use serde_json::{Value, json};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -89,8 +91,8 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     if args.port.is_none() {
         output::check(&file, &outputs.files())?;
     }
-    let (source, settings) = read(&file, &args.view, quiet)?;
-    let job = Job::new(source, &settings);
+    let source = read(&file, &args.view, quiet)?;
+    let (job, settings) = (&source.job, &source.settings);
     let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
         let mut link = ports::open(device)?;
@@ -99,14 +101,15 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
             note_keys();
         }
         let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
-        let drawn = operate::rehearse(&mut sender, &job)
-            .and_then(|()| draw_by(&mut sender, &job, &mut bar));
+        let drawn =
+            operate::rehearse(&mut sender, job).and_then(|()| draw_by(&mut sender, job, &mut bar));
         sender.end();
         let report = drawn?;
         drop(bar);
         let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
         let json = json!({ "file": file.display().to_string(), "drawn": report });
-        return Ok(Outcome::done(format!("{} is drawn{text}", file.display()), json));
+        let drawn = Outcome::done(format!("{} is drawn{text}", file.display()), json);
+        return Ok(source.bounded(drawn));
     }
     // On Linux the kernel ends the emulator together with this program. On other systems this
     // program must end it, so Ctrl-C must not exit at once.
@@ -114,7 +117,7 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    let drawn = draw(board.as_mut(), &job, interrupt, &mut bar);
+    let drawn = draw(board.as_mut(), job, interrupt, &mut bar);
     let report = drawn.map_err(|error| board.explain(error))?;
     let pen = board.pen_runs()?;
     drop(board);
@@ -122,13 +125,13 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
     drop(bar);
     let files = write_pictures(&picture, &outputs)?;
-    Ok(summary(&files, report))
+    Ok(source.bounded(summary(&files, report)))
 }
 
 fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
     output::check(&args.file, &outputs.files())?;
-    let (source, settings) = read(&args.file, &args.view, quiet)?;
+    let source = read(&args.file, &args.view, quiet)?;
     let mut machine = match &args.machine {
         Some(file) => SavedSettings::read(file)?.settings,
         None => Vec::new(),
@@ -138,16 +141,15 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
     if args.motion.is_some() && machine.get(Setting::Kinematics) != 0 {
         return Err(Error::MotionOfOtherMachine);
     }
-    let job = Job::new(source, &settings);
     let bar = Bar::new(quiet);
     match args.board {
         None => {
-            let plotter = InMemory::<u32>::new(Room::for_job(&job), machine);
-            show(plotter, &job, settings.page, args, &outputs, bar, interrupt)
+            let plotter = InMemory::<u32>::new(Room::for_job(&source.job), machine);
+            show(plotter, &source, args, &outputs, bar, interrupt)
         }
         Some(board) => {
             let plotter = InMemory::<u16>::new(Room::of_board(board), machine);
-            show(plotter, &job, settings.page, args, &outputs, bar, interrupt)
+            show(plotter, &source, args, &outputs, bar, interrupt)
         }
     }
 }
@@ -155,19 +157,19 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
 /// Draws the job by `plotter` and writes the pictures and reports that the arguments name.
 fn show<I: Index>(
     mut plotter: InMemory<I>,
-    job: &dyn Lines,
-    page: Page,
+    source: &Source,
     args: &PreviewArgs,
     outputs: &Outputs,
     mut bar: Bar,
     interrupt: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let report = draw(&mut plotter, job, interrupt, &mut bar)?;
+    let report = draw(&mut plotter, &source.job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
     for _ in 1..args.repeat {
         result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
     }
     drop(bar);
+    let page = source.settings.page;
     let picture = Picture { page, runs: result.pen.runs.clone(), step: result.pen.step };
     let mut files = write_pictures(&picture, outputs)?;
     if let Some(path) = &outputs.json {
@@ -182,7 +184,7 @@ fn show<I: Index>(
         output::write(path, plotter.motion()?.svg().as_bytes())?;
         files.push(path);
     }
-    let mut outcome = summary(&files, report);
+    let mut outcome = source.bounded(summary(&files, report));
     let time = duration(result.duration_s.round() as u64);
     outcome.text += &format!(", {time} to draw");
     Ok(outcome)
@@ -200,7 +202,7 @@ fn fit(args: &FitArgs, quiet: bool) -> Result<Outcome, Error> {
     let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
     let output = args.output.clone().unwrap_or_else(beside);
     output::check(&args.file, &[&output])?;
-    let source = SourceFile::read(&args.file)?;
+    let source = files::read(&args.file, &Arrangement::default())?;
     if !quiet {
         note(&args.file, source.notes());
     }
@@ -221,8 +223,7 @@ fn encode_tape(
 ) -> Result<Outcome, Error> {
     let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
     output::check(&args.file, &[&output])?;
-    let (source, settings) = read(&args.file, &args.view, quiet)?;
-    let job = Job::new(source, &settings);
+    let job = read(&args.file, &args.view, quiet)?.job;
     let mut plotter =
         InMemory::<u32>::new(Room::for_job(&job), penup::machine::Settings::default());
     {
@@ -250,8 +251,8 @@ fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
 }
 
 fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
-    let unreadable = |source| ReadError::File { file: file.display().to_string(), source };
-    Ok(std::fs::read(file).map_err(unreadable)?)
+    let unreadable = |source| Error::File { file: file.display().to_string(), source };
+    std::fs::read(file).map_err(unreadable)
 }
 
 fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
@@ -286,15 +287,45 @@ fn draw_by(
 }
 
 /// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.
-fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(SourceFile, Settings), Error> {
-    let source = SourceFile::read(file)?;
-    let settings = view.settings_on(source.page());
+fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> {
+    let source = files::read(file, view.arrangement())?;
+    let settings = view
+        .settings_for(&source)
+        .map_err(|reason| ReadError::Content { file: file.display().to_string(), reason })?;
     if !quiet {
         note(file, source.notes());
         let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
         note(file, moved.as_slice());
     }
-    Ok((source, settings))
+    let (extent, is_plan) = (source.extent(), source.bounds().is_some());
+    Ok(Source { job: Job::new(source, &settings), settings, extent, is_plan })
+}
+
+/// A file that was read, with its settings.
+struct Source {
+    job: Job<SourceFile>,
+    settings: Settings,
+    /// The least and the greatest coordinates.
+    extent: Option<[[f64; 3]; 2]>,
+    is_plan: bool,
+}
+
+impl Source {
+    /// Adds the bounding box to what is said about the job.
+    fn bounded(&self, mut outcome: Outcome) -> Outcome {
+        let Some(corners) = self.extent else { return outcome };
+        let axes = if self.is_plan { 2 } else { 3 };
+        let [low, high] = corners.map(|corner| {
+            let part = |part: &f64| ((part * 1e6).round() / 1e6 + 0.0).to_string();
+            corner.iter().take(axes).map(part).collect::<Vec<_>>().join(", ")
+        });
+        let (what, unit) = if self.is_plan { ("drawing", " mm") } else { ("model", "") };
+        outcome.text += &format!("; the {what} reaches from {low} to {high}{unit}");
+        if let Value::Object(fields) = &mut outcome.json {
+            fields.insert("bounds".to_owned(), json!(corners));
+        }
+        outcome
+    }
 }
 
 /// Prints notes on `file` to the standard error.
@@ -337,7 +368,7 @@ impl Outputs {
 fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a Path>, Error> {
     let svg = picture.svg();
     let png = match outputs.png.as_deref() {
-        Some(path) => Some((path, picture::png(&svg)?)),
+        Some(path) => Some((path, png(&svg)?)),
         None => None,
     };
     let mut files = Vec::new();

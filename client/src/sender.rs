@@ -21,13 +21,13 @@ mod patience;
 pub use patience::Patience;
 
 use crate::error::Error;
-use crate::lines::{JobLine, Lines};
 use crate::link::{Link, Order};
 use crate::progress::{Progress, Quiet};
-use crate::protocol::{
+use penup_job::protocol::{
     ABORT, END, LAST_NUMBER, MODEL, Reply, ReplyReader, STATUS_QUERY, Status, is_penup, numbered,
 };
-use crate::twin;
+use penup_job::twin;
+use penup_readers::lines::{JobLine, Lines};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};

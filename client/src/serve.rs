@@ -56,10 +56,7 @@ impl PageServer {
         let given = match given {
             None => None,
             Some(path) => {
-                let unreadable = |source| crate::formats::ReadError::File {
-                    file: path.display().to_string(),
-                    source,
-                };
+                let unreadable = |source| Error::File { file: path.display().to_string(), source };
                 let bytes = std::fs::read(path).map_err(unreadable)?;
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 files.insert("given".to_owned(), bytes);

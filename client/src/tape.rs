@@ -1,12 +1,13 @@
 //! Harrison's tape: a job encoded as instructions of four bits, two to a byte.
 
 use crate::motion_plot::plan;
-use crate::page::{Page, Run};
-use crate::picture::Picture;
 use penup::drawing::PagePoint;
 use penup::machine::{MachineError, Path, Settings};
 use penup::motion::{EventQueue, StepEvent};
 use penup::step::tape::{BadCode, Decoder, Instruction, TapeLines, encode};
+use penup_job::path::Run;
+use penup_job::picture::Picture;
+use penup_readers::page::Page;
 use std::fmt::Write as _;
 
 /// An event queue that records the instructions of a tape.

@@ -4,11 +4,11 @@
 
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
-use penup_client::lines::{JobLine, Origin};
 use penup_client::link::{Answer, Order};
 use penup_client::progress::{Progress, Quiet};
-use penup_client::protocol::Status;
 use penup_client::sender::{Patience, Sender};
+use penup_job::protocol::Status;
+use penup_readers::lines::{JobLine, Origin};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;

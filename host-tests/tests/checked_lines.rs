@@ -2,10 +2,10 @@
 //! do.
 
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
-use penup_client::lines::JobLine;
-use penup_client::protocol::numbered;
-use penup_client::twin;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_job::protocol::numbered;
+use penup_job::twin;
+use penup_readers::lines::JobLine;
 
 /// Starts a plotter and reads its greeting.
 fn bench() -> Bench {

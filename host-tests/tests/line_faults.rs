@@ -6,12 +6,12 @@
 
 use penup::drawing::PagePoint;
 use penup_client::error::Error;
-use penup_client::lines::JobLine;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
 use penup_host_tests::noisy_line::{Damage, Fault, NoisyLine};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_readers::lines::JobLine;
 use std::collections::BTreeSet;
 use std::sync::atomic::AtomicBool;
 

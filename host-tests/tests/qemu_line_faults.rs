@@ -4,14 +4,14 @@
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
 use penup::board_table::LM3S6965;
-use penup_client::lines::JobLine;
 use penup_client::link::Link;
 use penup_client::machines::{WatchedPlotter, emulate};
-use penup_client::page::Run;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
+use penup_job::path::Run;
+use penup_readers::lines::JobLine;
 use std::error::Error;
 use std::io;
 use std::sync::atomic::AtomicBool;

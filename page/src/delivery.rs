@@ -4,8 +4,8 @@
 //! The same protocol as that of `penup plot`, but nothing here waits: replies and times come in,
 //! bytes go out.
 
-use penup_client::lines::{JobLine, Lines};
-use penup_client::protocol::{LAST_NUMBER, RECEIVE_WINDOW, Reply, numbered};
+use penup_job::protocol::{LAST_NUMBER, RECEIVE_WINDOW, Reply, numbered};
+use penup_readers::lines::{JobLine, Lines};
 use std::collections::VecDeque;
 use std::rc::Rc;
 

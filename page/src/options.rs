@@ -2,8 +2,8 @@
 
 use penup::plotter::{OPTIONS, PlotOptions};
 use penup::protocol::Escape;
-use penup_client::job::Settings;
-use penup_client::page::{NAMED_PAGES, Page};
+use penup_job::Settings;
+use penup_readers::page::{NAMED_PAGES, Page};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
 

@@ -11,14 +11,14 @@ use crate::phase::Phase;
 use crate::sheet::Shared;
 use crate::source;
 use crate::words::{alarm, refusal};
-use penup_client::job::Job;
-use penup_client::lines::{JobLine, Lines};
-use penup_client::protocol::{
+use penup_job::Job;
+use penup_job::protocol::{
     ABORT, LAST_NUMBER, MODEL, PLOT, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
     numbered,
 };
-use penup_client::results::JobReport;
-use penup_client::twin;
+use penup_job::results::JobReport;
+use penup_job::twin;
+use penup_readers::lines::{JobLine, Lines};
 use std::rc::Rc;
 use wasm_bindgen::prelude::wasm_bindgen;
 

@@ -1,8 +1,8 @@
-//! Reads files by the client's readers. A format that the client's table gains is read here, too,
-//! if it is among those that build for a browser.
+//! Reads files by the readers that the client uses, too, with the formats that are small enough
+//! to be loaded with the page.
 
-use penup_client::formats::{self, SourceFile};
-use penup_client::lines::Lines;
+use penup_readers::SourceFile;
+use penup_readers::lines::Lines;
 use std::rc::Rc;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -21,11 +21,14 @@ pub fn read(name: &str, bytes: Vec<u8>) -> Result<Rc<dyn Lines>, String> {
 /// The formats that are read, with their extensions, for people.
 #[wasm_bindgen]
 pub fn file_names() -> String {
-    formats::list()
+    penup_readers::list()
 }
 
 /// The extensions of the files that are read, each with its dot, with commas between them.
 #[wasm_bindgen]
 pub fn file_extensions() -> String {
-    formats::extensions().map(|extension| format!(".{extension}")).collect::<Vec<_>>().join(",")
+    penup_readers::extensions()
+        .map(|extension| format!(".{extension}"))
+        .collect::<Vec<_>>()
+        .join(",")
 }

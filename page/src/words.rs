@@ -2,8 +2,8 @@
 
 use penup::plotter::OPTIONS;
 use penup::protocol::{AlarmEntry, alarm_entries};
-use penup_client::lines::JobLine;
-use penup_client::words;
+use penup_readers::lines::JobLine;
+use penup_readers::words;
 
 /// Names the controls of the page where the client's messages name its flags.
 pub fn for_page(text: &str) -> String {

@@ -1,18 +1,22 @@
 //! The arguments that say what is drawn and how. They are made from the library's table of options,
 //! which also checks their values, so a new option needs nothing here.
 //!
-//! Two things are the client's own: names of pages, and `--landscape`.
+//! The options of plans come from the readers' table in the same way. Two things are the client's
+//! own: names of pages, and `--landscape`.
 
 use super::number;
-use crate::job::Settings;
-use crate::page::{NAMED_PAGES, Page};
-use crate::protocol::acts_at_once;
-use crate::words::for_client;
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::error::ErrorKind;
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use penup::plotter::{Flag, OPTIONS, PlotOption, PlotOptions};
 use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
+use penup_job::Settings;
+use penup_job::view::{self, NAMED_VIEWS, THREE_QUARTER, Viewpoint, turned_upright};
+use penup_readers::lines::acts_at_once;
+use penup_readers::page::{NAMED_PAGES, Page};
+use penup_readers::words::for_client;
+use penup_readers::{Arrangement, PLAN_OPTIONS, PlanOption, SourceFile, Turn};
 
 /// The name of the option whose value may also be the name of a page.
 const PAGE: &str = "page";
@@ -24,50 +28,123 @@ const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
 const MARGIN: &str = "margin";
 /// The name of the option that scales a plan to the page.
 const FIT: &str = "fit";
-/// The argument that turns the page.
+/// The argument that turns the page, and its values.
 const LANDSCAPE: &str = "landscape";
+const ALWAYS: &str = "always";
+const AUTOMATIC: &str = "auto";
+/// The arguments that choose the eye by its direction.
+const VIEW: &str = "view";
+const AZIMUTH: &str = "azimuth";
+const ELEVATION: &str = "elevation";
+const Y_UP: &str = "y-up";
+/// The names of the options that they change.
+const UP: &str = "up";
+const PROJECTION: &str = "projection";
+/// What is up where nobody says so.
+const UPRIGHT: [f64; 3] = [0.0, 0.0, 1.0];
+/// The heading of the options of plans.
+const PLAN: &str = "Plan: a drawing of straight lines at one height, in this order";
 
 /// The arguments of camera, page and order.
 #[derive(Debug, Clone)]
 pub struct ViewArgs {
     settings: Settings,
-    landscape: bool,
-    is_page_given: bool,
-    is_margin_given: bool,
+    arrangement: Arrangement,
+    viewpoint: Option<Viewpoint>,
 }
 
 impl ViewArgs {
-    /// The settings that these arguments select.
-    pub fn settings(&self) -> Settings {
-        self.settings.clone()
+    /// What is done with a plan before it is drawn.
+    pub fn arrangement(&self) -> &Arrangement {
+        &self.arrangement
     }
 
-    /// The settings for a file that lays its plan on `page`, if it has one. Where the arguments do
-    /// not say otherwise, that is the page, and at true size no margin is kept free: so the plan
-    /// keeps its place.
-    pub fn settings_on(&self, page: Option<Page>) -> Settings {
-        let mut settings = self.settings();
-        let Some(page) = page else { return settings };
-        if !self.is_page_given {
-            settings.page = turned(page, self.landscape);
-        }
+    /// The settings for a file that was arranged by [`ViewArgs::arrangement`]. Where the arguments do
+    /// not say otherwise, a file that has a page is drawn on that, and at true size no margin is kept
+    /// free: so its plan keeps its place.
+    ///
+    /// # Errors
+    /// The direction of the view contradicts the projection, or the file is a plan, which has no up.
+    pub fn settings_for(&self, file: &SourceFile) -> Result<Settings, String> {
+        let mut settings = self.settings.clone();
+        settings.page = file.sheet();
+        let is_own = file.page().is_some();
         let is_true_size = settings.value(FIT) == Some("off");
-        let own = page_value(settings.page);
+        let page = page_value(settings.page);
         for (name, value) in &mut settings.values {
             match *name {
-                PAGE => value.clone_from(&own),
-                MARGIN if is_true_size && !self.is_margin_given => "0".clone_into(value),
+                PAGE => value.clone_from(&page),
+                MARGIN if is_own && is_true_size && !self.arrangement.has_margin() => {
+                    "0".clone_into(value);
+                }
                 _ => {}
             }
         }
-        settings
+        self.look(file, &mut settings)?;
+        Ok(settings)
+    }
+
+    /// Chooses the eye if the arguments give a direction, or say what is up: the plotter's own choice
+    /// is made for models with z up.
+    fn look(&self, file: &SourceFile, settings: &mut Settings) -> Result<(), String> {
+        let position = |name: &str| -> Option<[f64; 3]> {
+            let parts = settings.value(name)?.split(',').map(|part| part.trim().parse());
+            parts.collect::<Result<Vec<f64>, _>>().ok()?.try_into().ok()
+        };
+        let (up, at) = (position(UP), position("at"));
+        let is_chosen = settings.value("eye").or(settings.value("angles")).is_some();
+        if is_chosen || self.viewpoint.is_none() && up.is_none() {
+            return Ok(());
+        }
+        if self.viewpoint.is_none() && file.bounds().is_some() {
+            return Err(format!(
+                "--{UP} and --{Y_UP} are for models in space, and this drawing lies flat"
+            ));
+        }
+        let Some(extent) = file.extent() else { return Ok(()) };
+        let projection = settings.value(PROJECTION).unwrap_or_default();
+        let fixed = axonometric(projection);
+        let (direction, own_up) = match (self.viewpoint, fixed) {
+            (Some(_), Some(_)) => {
+                return Err(format!(
+                    "--{PROJECTION} {projection} has a direction of its own: choose orthographic, or \
+                     leave --{VIEW}, --{AZIMUTH} and --{ELEVATION} out"
+                ));
+            }
+            (Some(view), None) | (None, Some(view)) => (view.direction(), view.up()),
+            (None, None) if is_oblique(projection) => ([0.0, -1.0, 0.0], UPRIGHT),
+            (None, None) => (THREE_QUARTER, UPRIGHT),
+        };
+        let stands = up.unwrap_or(UPRIGHT);
+        let turned = [direction, own_up].map(|vector| turned_upright(vector, stands));
+        let [Some(direction), Some(own_up)] = turned else { return Ok(()) };
+        let size = (0..3).map(|axis| extent[1][axis] - extent[0][axis]).fold(0.0, f64::max);
+        let mut set = |name: &'static str, value: String| {
+            settings.values.retain(|(own, _)| *own != name);
+            settings.values.push((name, value));
+        };
+        set("eye", view::text(view::eye(extent, direction, at), size));
+        set(UP, view::text(own_up, 1.0));
+        if fixed.is_some() {
+            set(PROJECTION, "orthographic".to_owned());
+        }
+        Ok(())
     }
 }
 
-/// The page, on its long side if `landscape` is set.
-fn turned(page: Page, landscape: bool) -> Page {
-    let Page { width, height } = page;
-    if landscape { Page { width: width.max(height), height: width.min(height) } } else { page }
+/// The direction of an axonometric projection; `None` for any other.
+fn axonometric(projection: &str) -> Option<Viewpoint> {
+    let mut options = PlotOptions::default();
+    options.set(PROJECTION, projection).ok()?;
+    // The plotter lists these projections by their angles.
+    let lines = options.lines().map(|line| line.to_string());
+    let line = lines.into_iter().find(|line| line.starts_with("$projection=axonometric,"))?;
+    let mut angles = line.split(',').skip(1).map(|angle| angle.parse::<f64>());
+    Some(Viewpoint { azimuth: angles.next()?.ok()?, elevation: angles.next()?.ok()? })
+}
+
+fn is_oblique(projection: &str) -> bool {
+    projection.starts_with("oblique") || matches!(projection, "cavalier" | "cabinet")
 }
 
 /// A page as the value of its option.
@@ -77,7 +154,7 @@ fn page_value(page: Page) -> String {
 
 impl Args for ViewArgs {
     fn augment_args(command: Command) -> Command {
-        flags().fold(command, |command, (option, flag)| {
+        let command = flags().fold(command, |command, (option, flag)| {
             let command = command.arg(argument(option, flag));
             if option.name != PAGE {
                 return command;
@@ -85,11 +162,20 @@ impl Args for ViewArgs {
             command.arg(
                 Arg::new(LANDSCAPE)
                     .long(LANDSCAPE)
-                    .help("Lay the page on its long side")
+                    .help(
+                        "Lay the page on its long side; --landscape=auto does so if a plan is wider \
+                         than high",
+                    )
                     .help_heading(flag.heading)
-                    .action(ArgAction::SetTrue),
+                    .value_name("WHEN")
+                    .num_args(0..=1)
+                    .require_equals(true)
+                    .default_missing_value(ALWAYS)
+                    .value_parser([ALWAYS, AUTOMATIC]),
             )
-        })
+        });
+        let command = command.args(view_arguments());
+        PLAN_OPTIONS.iter().fold(command, |command, option| command.arg(plan_argument(option)))
     }
 
     fn augment_args_for_update(command: Command) -> Command {
@@ -99,9 +185,13 @@ impl Args for ViewArgs {
 
 impl FromArgMatches for ViewArgs {
     fn from_arg_matches(matches: &ArgMatches) -> Result<Self, Error> {
-        let landscape = matches.get_flag(LANDSCAPE);
+        let is_given = |name: &str| matches.value_source(name) == Some(ValueSource::CommandLine);
         let page = matches.get_one::<Page>(PAGE).copied().unwrap_or(NAMED_PAGES[0].1);
-        let page = turned(page, landscape);
+        let turn = match matches.get_one::<String>(LANDSCAPE).map(String::as_str) {
+            None => Turn::AsItIs,
+            Some(AUTOMATIC) => Turn::Automatic,
+            Some(_) => Turn::Landscape,
+        };
         let value = |(option, flag): (&'static PlotOption, Flag)| {
             let value = match option.name {
                 PAGE => Some(page_value(page)),
@@ -112,13 +202,45 @@ impl FromArgMatches for ViewArgs {
             };
             Some((option.name, value?))
         };
-        let is_given = |name| matches.value_source(name) == Some(ValueSource::CommandLine);
-        Ok(Self {
-            settings: Settings { page, values: flags().filter_map(value).collect() },
-            landscape,
-            is_page_given: is_given(PAGE),
-            is_margin_given: is_given(MARGIN),
-        })
+        let settings = Settings { page, values: flags().filter_map(value).collect() };
+        let margin = settings.value(MARGIN).and_then(|margin| margin.parse().ok());
+        let mut arrangement = Arrangement::on(
+            is_given(PAGE).then_some(page),
+            turn,
+            margin.filter(|_| is_given(MARGIN)),
+        );
+        for option in PLAN_OPTIONS {
+            let text = match matches.try_get_one::<String>(option.name) {
+                _ if option.value.is_empty() => matches.get_flag(option.name).then(String::new),
+                Ok(text) => text.cloned(),
+                Err(_) => None,
+            };
+            if let Some(text) = text {
+                arrangement
+                    .set(option.name, &text)
+                    .map_err(|reason| Error::raw(ErrorKind::ValueValidation, reason))?;
+            }
+        }
+        let named = matches.get_one::<String>(VIEW).and_then(|name| {
+            NAMED_VIEWS.iter().find(|(own, _)| own == name).map(|(_, view)| *view)
+        });
+        let angle = |name| matches.get_one::<f64>(name).copied();
+        let viewpoint = match (named, angle(AZIMUTH), angle(ELEVATION)) {
+            (None, None, None) => None,
+            (Some(view), _, _) => Some(view),
+            (None, azimuth, elevation) => {
+                let usual = Viewpoint::three_quarter();
+                Some(Viewpoint {
+                    azimuth: azimuth.unwrap_or(usual.azimuth),
+                    elevation: elevation.unwrap_or(usual.elevation),
+                })
+            }
+        };
+        let mut settings = settings;
+        if matches.get_flag(Y_UP) {
+            settings.values.push((UP, "0,1,0".to_owned()));
+        }
+        Ok(Self { settings, arrangement, viewpoint })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
@@ -130,6 +252,53 @@ impl FromArgMatches for ViewArgs {
 /// The options that have a flag, in the order of the table.
 fn flags() -> impl Iterator<Item = (&'static PlotOption, Flag)> {
     OPTIONS.iter().filter_map(|option| Some((option, option.flag.get()?)))
+}
+
+/// The arguments that choose the eye by its direction.
+fn view_arguments() -> [Arg; 4] {
+    let argument = |name| Arg::new(name).long(name).help_heading("Camera");
+    let names = NAMED_VIEWS.map(|(name, _)| name);
+    let angle = |name, most: f64| {
+        let argument = argument(name).value_name("DEGREES").allow_hyphen_values(true);
+        argument.conflicts_with_all(["eye", "angles", VIEW]).value_parser(move |text: &str| {
+            match number(text)? {
+                angle if angle.abs() <= most => Ok(angle),
+                _ => Err(format!("the angle is -{most} to {most} degrees")),
+            }
+        })
+    };
+    [
+        argument(VIEW)
+            .help("See the model from this side")
+            .value_name("SIDE")
+            .conflicts_with_all(["eye", "angles"])
+            .value_parser(PossibleValuesParser::new(names)),
+        angle(AZIMUTH, 360.0).help(
+            "See the model from this angle about the vertical, with any projection: -90 is in \
+             front, 0 on the right [default: -59]",
+        ),
+        angle(ELEVATION, 90.0).help(
+            "See the model from this angle above the horizontal, with any projection [default: 30]",
+        ),
+        argument(Y_UP)
+            .help("The file has y up: the model stands upright, and its front is at positive z")
+            .conflicts_with_all([UP, "angles"])
+            .action(ArgAction::SetTrue),
+    ]
+}
+
+/// The argument for an option of plans.
+fn plan_argument(option: &'static PlanOption) -> Arg {
+    let argument = Arg::new(option.name).long(option.name).help(option.help).help_heading(PLAN);
+    if option.value.is_empty() {
+        let argument = argument.action(ArgAction::SetTrue);
+        return if option.changes_size { argument.conflicts_with(FIT) } else { argument };
+    }
+    let argument = argument.value_name(option.value).allow_hyphen_values(true);
+    let argument = if option.changes_size { argument.conflicts_with(FIT) } else { argument };
+    argument.value_parser(move |text: &str| {
+        Arrangement::default().set(option.name, text).map(|()| text.to_owned())
+    })
 }
 
 /// The argument for an option. Its value is what is sent to the plotter, except for the page.

@@ -33,8 +33,8 @@ use std::time::Duration;
 pub use pico::{Pico, PicoByUsb, UartError};
 pub use stack::Stack;
 
-pub use crate::pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 use crate::table::{self, BoardRow};
+pub use penup_job::pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 use process::Process;
 use trace::{Trace, TraceError};
 

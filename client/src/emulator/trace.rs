@@ -20,7 +20,7 @@ use std::collections::VecDeque;
 use std::time::Duration;
 
 use super::BOARD;
-use crate::pins::{Pin, PinChange};
+use penup_job::pins::{Pin, PinChange};
 
 /// The trace events that QEMU is asked for.
 pub const EVENTS: [&str; 5] =

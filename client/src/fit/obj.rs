@@ -1,8 +1,8 @@
 //! Finds the polylines of a plan and writes the fitted curves as OBJ.
 
 use super::{FittedCurve, PlanPoint, fit_each};
-use crate::lines::Lines;
 use penup::protocol::Command;
+use penup_readers::lines::Lines;
 use std::fmt::{self, Write};
 use std::rc::Rc;
 

@@ -1,8 +1,8 @@
 use super::*;
-use crate::formats::{ReadError, SourceFile};
 use penup::curve::{FRACTION_BITS, Point};
 use penup::model::{Corner, Model, Position, no_undo};
 use penup::protocol::Command;
+use penup_readers::{ReadError, SourceFile};
 
 /// Fits the polylines of an OBJ text.
 fn fit_text(text: &str, tolerance: f64) -> Result<Fitted, FitError> {

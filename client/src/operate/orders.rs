@@ -7,8 +7,8 @@ use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::outcome::Outcome;
 use crate::progress::{Bar, Progress};
-use crate::protocol::{HOME, PEN_DOWN, PEN_UP, Status, UNLOCK};
 use crate::sender::{Patience, Sender};
+use penup_job::protocol::{HOME, PEN_DOWN, PEN_UP, Status, UNLOCK};
 use std::io::{self, Write as _};
 use std::sync::atomic::AtomicBool;
 

@@ -4,12 +4,12 @@
 
 use super::settings::{agreed, read};
 use crate::error::Error;
-use crate::lines::Lines;
 use crate::machine_settings::simulated;
 use crate::preview::InMemory;
-use crate::protocol::{MODEL, Reply};
-use crate::room::Room;
 use crate::sender::Sender;
+use penup_job::protocol::{MODEL, Reply};
+use penup_job::room::Room;
+use penup_readers::lines::Lines;
 
 /// How much a plotter holds, and how much a model takes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

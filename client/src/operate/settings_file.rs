@@ -2,7 +2,6 @@
 //! numbers and values.
 
 use crate::error::Error;
-use crate::formats::ReadError;
 use crate::machine_settings::AssignedSetting;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -67,7 +66,7 @@ impl SavedSettings {
     /// The file cannot be read, or holds no settings.
     pub fn read(file: &Path) -> Result<Self, Error> {
         let name = file.display().to_string();
-        let unreadable = |source| ReadError::File { file: name.clone(), source };
+        let unreadable = |source| Error::File { file: name.clone(), source };
         let text = std::fs::read_to_string(file).map_err(unreadable)?;
         Self::parse(&text).map_err(|source| Error::SettingsFile { file: name.clone(), source })
     }

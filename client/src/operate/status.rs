@@ -6,8 +6,8 @@ use crate::error::Error;
 use crate::outcome::Outcome;
 use crate::ports as serial_ports;
 use crate::progress::duration;
-use crate::protocol::Status;
 use crate::sender::{Patience, Sender};
+use penup_job::protocol::Status;
 use serde_json::{Value, json};
 use std::sync::atomic::AtomicBool;
 

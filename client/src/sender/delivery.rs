@@ -2,9 +2,9 @@
 
 use super::Sender;
 use crate::error::Error;
-use crate::lines::{JobLine, Lines};
 use crate::progress::Progress;
-use crate::protocol::{LAST_NUMBER, RECEIVE_WINDOW, RESUME, Reply, Status, numbered};
+use penup_job::protocol::{LAST_NUMBER, RECEIVE_WINDOW, RESUME, Reply, Status, numbered};
+use penup_readers::lines::{JobLine, Lines};
 use std::collections::VecDeque;
 use std::time::Instant;
 

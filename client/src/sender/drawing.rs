@@ -3,13 +3,13 @@
 
 use super::{MOST_RESTARTS, Sender};
 use crate::error::Error;
-use crate::lines::{JobLine, Lines};
 use crate::link::{Answer, Order};
 use crate::progress::{Progress, Quiet};
-use crate::protocol::{
+use penup_job::protocol::{
     AGAIN, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, MODEL, PLOT, RESUME, Reply, SLOWER, Status,
 };
-use crate::results::JobReport;
+use penup_job::results::JobReport;
+use penup_readers::lines::{JobLine, Lines};
 use std::time::Instant;
 
 /// The maximum number of queries for the report of a job while it does not arrive.

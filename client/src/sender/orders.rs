@@ -3,10 +3,10 @@
 use super::drawing::Standstill;
 use super::{Patience, Sender};
 use crate::error::Error;
-use crate::lines::JobLine;
 use crate::link::Link;
 use crate::progress::Quiet;
-use crate::protocol::{HOLD, PAUSE_AFTER_STROKE, RESUME, Reply, Status};
+use penup_job::protocol::{HOLD, PAUSE_AFTER_STROKE, RESUME, Reply, Status};
+use penup_readers::lines::JobLine;
 use std::sync::atomic::AtomicBool;
 
 impl<'a> Sender<'a> {

@@ -4,7 +4,7 @@ use super::*;
 use penup::boards::host::{CutFlash, LAYOUT};
 use penup_client::link::Link as _;
 use penup_client::preview::InMemory;
-use penup_client::room::Room;
+use penup_job::room::Room;
 use serialport::{SerialPort as _, TTYPort};
 use std::io::{Read as _, Write as _};
 use std::sync::Arc;

@@ -142,6 +142,35 @@ fn only_a_board_limits_a_preview() {
     assert!(refused.contains("4096"), "{refused}");
 }
 
+/// What the options of plans do is drawn: the plotter itself measures the ink.
+#[test]
+fn a_plan_is_arranged_before_it_is_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let square = "G21 G90\nM5\nG0 X20 Y20\nM3\nG1 X60\nG1 Y60\nG1 X20\nG1 Y20\nM5\nG0 X0 Y0\n";
+    fs::write(folder.path().join("square.gcode"), square).expect("written");
+    let drawn = |options: &[&str]| {
+        let fixed = ["preview", "square.gcode", "--json", "square.json"];
+        let (code, said, noted) = penup(folder.path(), &[&fixed[..], options].concat());
+        assert_eq!(code, Some(0), "{said}{noted}");
+        let json = fs::read_to_string(folder.path().join("square.json")).expect("written");
+        let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        (result["pen_down_mm"].as_f64().expect("a length"), said)
+    };
+    let near = |options: &[&str], expected: f64| {
+        let (length, said) = drawn(options);
+        assert!((length - expected).abs() < 0.05, "{options:?}: {length} {said}");
+    };
+    near(&[], 160.0);
+    near(&["--scale", "2"], 320.0);
+    near(&["--crop", "10,10,30,100"], 80.0);
+    // 40 mm of 10 lines, less than one at the border.
+    near(&["--hatch", "4,0"], 160.0 + 400.0);
+    let (_, said) = drawn(&["--center"]);
+    assert!(said.contains("reaches from 85, 128.5 to 125, 168.5 mm"), "{said}");
+    let (code, _, noted) = penup(folder.path(), &["preview", "square.gcode", "--layer", "7"]);
+    assert_eq!((code, noted.contains("there is no layer \"7\"")), (Some(1), true), "{noted}");
+}
+
 #[test]
 fn an_svg_is_drawn_at_its_place_with_two_pens() {
     let folder = tempfile::tempdir().expect("a folder");

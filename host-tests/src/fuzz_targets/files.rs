@@ -1,7 +1,8 @@
 //! Files that a user gives to the client.
 
-use penup_client::formats::SourceFile;
+use penup_client::files::parse;
 use penup_client::lines::Lines as _;
+use penup_readers::Arrangement;
 
 /// The names under which an input is read. The extension decides the format; of an unknown one,
 /// the content does.
@@ -11,7 +12,7 @@ const NAMES: [&str; 3] = ["fuzz.obj", "fuzz.svg", "fuzz"];
 /// a line that is sent to the plotter is one line without control characters.
 pub fn fuzz(input: &[u8]) {
     for name in NAMES {
-        match SourceFile::new(name.to_owned(), input.to_vec()) {
+        match parse(name.to_owned(), input.to_vec(), &Arrangement::default()) {
             Err(error) => assert!(!error.to_string().is_empty()),
             Ok(file) => {
                 for line in file.in_order() {

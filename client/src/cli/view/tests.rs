@@ -2,11 +2,20 @@ use super::*;
 use crate::cli::Cli;
 use clap::Parser as _;
 
+/// The settings for a model of one vertex.
 fn settings(options: &[&str]) -> Result<Settings, String> {
+    settings_of("v 0 0 0\n", options)
+}
+
+/// The settings for an OBJ file with this text.
+fn settings_of(text: &str, options: &[&str]) -> Result<Settings, String> {
     let line = ["penup", "preview", "f.obj"].iter().chain(options);
     let cli = Cli::try_parse_from(line).map_err(|error| error.to_string())?;
     match cli.command {
-        crate::cli::Command::Preview(args) => Ok(args.view.settings()),
+        crate::cli::Command::Preview(args) => {
+            let file = SourceFile::arranged("a.obj".into(), text.into(), args.view.arrangement());
+            args.view.settings_for(&file.map_err(|error| error.to_string())?)
+        }
         _ => Err("the wrong command".to_owned()),
     }
 }
@@ -107,5 +116,90 @@ fn nonsense_is_refused_with_the_reason() {
         let error = settings(&options).expect_err("refused");
         assert!(error.contains(reason), "{options:?}: {error}");
         assert!(error.contains(&format!("'{} ", options[0])), "{options:?}: {error}");
+    }
+}
+
+/// A tetrahedron, 2 wide, 4 deep and 4 high.
+const SOLID: &str = "v 0 0 0\nv 2 0 0\nv 0 4 0\nv 0 0 4\nf 1 2 3\nf 1 2 4\nf 1 3 4\nf 2 3 4\n";
+
+#[test]
+fn a_direction_places_the_eye_around_the_middle_and_says_what_is_up() {
+    let placed = |options: &[&str]| {
+        let settings = settings_of(SOLID, options).expect("settings");
+        let value = |name| -> Vec<f64> {
+            let value = settings.value(name).expect("a value");
+            value.split(',').map(|part| part.parse::<f64>().expect("a number")).collect()
+        };
+        let eye: Vec<f64> = value("eye").iter().zip([1.0, 2.0, 2.0]).map(|(a, b)| a - b).collect();
+        (eye.iter().map(|part| part / 10.5).collect::<Vec<_>>(), value("up"))
+    };
+    let near = |options: &[&str], eye: [f64; 3], up: [f64; 3]| {
+        let (own_eye, own_up) = placed(options);
+        for axis in 0..3 {
+            assert!((own_eye[axis] - eye[axis]).abs() < 1e-6, "{options:?} {own_eye:?}");
+            assert!((own_up[axis] - up[axis]).abs() < 1e-6, "{options:?} {own_up:?}");
+        }
+    };
+    let (z, y) = ([0.0, 0.0, 1.0], [0.0, 1.0, 0.0]);
+    near(&["--view", "front"], [0.0, -1.0, 0.0], z);
+    near(&["--view", "left"], [-1.0, 0.0, 0.0], z);
+    near(&["--view", "top"], z, y);
+    near(&["--view", "front", "--y-up"], z, y);
+    near(&["--view", "top", "--y-up"], y, [0.0, 0.0, -1.0]);
+    near(&["--azimuth=0", "--elevation", "90"], z, [-1.0, 0.0, 0.0]);
+    near(&["--azimuth=0", "--elevation", "30"], [0.75_f64.sqrt(), 0.0, 0.5], z);
+    near(
+        &["--azimuth=45", "--elevation=0", "--projection", "orthographic"],
+        [0.5_f64.sqrt(), 0.5_f64.sqrt(), 0.0],
+        z,
+    );
+    // The usual view follows what is up, whatever the projection.
+    near(&["--y-up"], [0.45, 0.5, 0.75], y);
+    near(&["--up", "0,1,0"], [0.45, 0.5, 0.75], y);
+    near(&["--y-up", "--projection", "cabinet"], z, y);
+    let third = (1.0_f64 / 3.0).sqrt();
+    near(&["--y-up", "--projection", "isometric"], [third, third, third], y);
+    let settings = settings_of(SOLID, &["--y-up", "--projection", "isometric"]).expect("settings");
+    assert_eq!(settings.value("projection"), Some("orthographic"));
+    // Nothing is sent that the user did not ask for.
+    assert_eq!(settings_of(SOLID, &[]).expect("settings").value("eye"), None);
+    let own = settings_of(SOLID, &["--eye=9,9,9", "--up=0,1,0"]).expect("settings");
+    assert_eq!(own.value("eye"), Some("9,9,9"));
+}
+
+#[test]
+fn a_direction_that_contradicts_another_choice_is_refused() {
+    for (options, reason) in [
+        (&["--view", "front", "--eye", "1,2,3"][..], "cannot be used with"),
+        (&["--view", "front", "--azimuth", "3"], "cannot be used with"),
+        (&["--y-up", "--up", "0,0,1"], "cannot be used with"),
+        (&["--elevation", "91"], "-90 to 90 degrees"),
+        (&["--view", "inside"], "possible values: front, back, left, right, top, bottom"),
+        (&["--view", "front", "--projection", "isometric"], "has a direction of its own"),
+    ] {
+        let error = settings_of(SOLID, options).expect_err("refused");
+        assert!(error.contains(reason), "{error}");
+    }
+    let plan = "v 0 0 0\nv 9 5 0\nl 1 2\n";
+    let error = settings_of(plan, &["--y-up"]).expect_err("refused");
+    assert!(error.contains("this drawing lies flat"), "{error}");
+}
+
+#[test]
+fn options_of_plans_reach_the_file_and_contradict_a_scale_to_the_page() {
+    let plan = "v 0 0 0\nv 9 5 0\nl 1 2\n";
+    let page = |options: &[&str]| settings_of(plan, options).map(|settings| settings.page.width);
+    assert_eq!(page(&["--landscape=auto"]), Ok(297.0));
+    assert_eq!(page(&["--landscape=auto", "--rotate", "90"]), Ok(210.0));
+    assert_eq!(page(&["--landscape"]), Ok(297.0));
+    for (options, reason) in [
+        (&["--scale", "2", "--fit"][..], "cannot be used with"),
+        (&["--center", "--fit"], "cannot be used with"),
+        (&["--scale", "0"], "a factor is 0.001 to 1000"),
+        (&["--crop", "500,500,5,5"], "nothing left to draw after --crop"),
+        (&["--landscape=sometimes"], "possible values: always, auto"),
+    ] {
+        let error = page(options).expect_err("refused");
+        assert!(error.contains(reason), "{error}");
     }
 }

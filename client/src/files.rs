@@ -1,0 +1,81 @@
+//! Reads the file to draw from the disk, or from the standard input.
+
+use crate::error::Error;
+use penup_readers::{
+    Arrangement, BEGINNING, ReadError, SIZE_LIMIT, SourceFile, check_beginning, takes_deep_stack,
+};
+use std::fs::{File, Metadata};
+use std::io::{self, Read as _};
+use std::path::Path;
+use std::thread;
+
+/// The name that stands for the standard input.
+pub const STANDARD_INPUT: &str = "-";
+
+/// The size in bytes of the stack on which a file that may be nested is read.
+const STACK: usize = 256 << 20;
+
+/// Reads the file at `path`, or the standard input if that is `-`, checks its lines, and arranges
+/// its plan.
+///
+/// # Errors
+/// The file cannot be read, its format is unknown, or it contains something that no plotter
+/// accepts.
+pub fn read(path: &Path, arrangement: &Arrangement) -> Result<SourceFile, Error> {
+    if path.as_os_str() == STANDARD_INPUT {
+        let name = "the standard input".to_owned();
+        let mut bytes = Vec::new();
+        let read = io::stdin().lock().take(SIZE_LIMIT).read_to_end(&mut bytes);
+        read.map_err(|source| Error::File { file: name.clone(), source })?;
+        return Ok(parse(name, bytes, arrangement)?);
+    }
+    let name = path.display().to_string();
+    let unreadable = |source| Error::File { file: name.clone(), source };
+    let (mut file, about) = open(path).map_err(unreadable)?;
+    let mut bytes = Vec::new();
+    file.by_ref().take(BEGINNING as u64).read_to_end(&mut bytes).map_err(unreadable)?;
+    // A file of no known format is refused before the rest of it is read.
+    check_beginning(&name, &bytes)?;
+    if about.len() < SIZE_LIMIT {
+        // One more byte is reserved, so that the buffer does not grow only to detect the end of
+        // the file.
+        bytes.reserve_exact((about.len() as usize + 1).saturating_sub(bytes.len()));
+    }
+    let rest = SIZE_LIMIT - bytes.len() as u64;
+    file.take(rest).read_to_end(&mut bytes).map_err(unreadable)?;
+    Ok(parse(name, bytes, arrangement)?)
+}
+
+/// Checks `bytes`, the contents of a file called `name`, and arranges its plan. A file that may be
+/// nested is read on a stack of its own. A damaged one may make `usvg` panic, which ends that thread
+/// only.
+///
+/// # Errors
+/// The format is unknown, or the file contains something that no plotter accepts.
+pub fn parse(
+    name: String,
+    bytes: Vec<u8>,
+    arrangement: &Arrangement,
+) -> Result<SourceFile, ReadError> {
+    if !takes_deep_stack(&name, &bytes) {
+        return SourceFile::arranged(name, bytes, arrangement);
+    }
+    let broken =
+        |reason: &str| ReadError::Content { file: name.clone(), reason: reason.to_owned() };
+    let reader = thread::Builder::new().stack_size(STACK).spawn({
+        let (name, arrangement) = (name.clone(), arrangement.clone());
+        move || SourceFile::arranged(name, bytes, &arrangement)
+    });
+    let reader = reader.map_err(|error| broken(&error.to_string()))?;
+    let damaged = "this file cannot be read: simplify it, for example with Inkscape";
+    reader.join().map_err(|_| broken(damaged))?
+}
+
+fn open(path: &Path) -> io::Result<(File, Metadata)> {
+    let file = File::open(path)?;
+    let about = file.metadata()?;
+    if about.is_dir() {
+        return Err(io::ErrorKind::IsADirectory.into());
+    }
+    Ok((file, about))
+}

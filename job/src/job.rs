@@ -1,0 +1,131 @@
+//! A job to send to a plotter, and its settings.
+
+use crate::protocol::{CLEAR, PENS, VIEW_AUTO};
+use penup_readers::lines::{JobLine, Lines};
+use penup_readers::page::Page;
+
+/// The options of a job, which say what is drawn and how. What has no value here is chosen by the
+/// plotter.
+///
+/// Values are sent unchanged, so they must be valid for the plotter.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The size of the page, for the picture. The option `page` is among the values, too.
+    pub page: Page,
+    /// The options of the plotter's library and their values, in the order in which they are sent.
+    pub values: Vec<(&'static str, String)>,
+}
+
+impl Settings {
+    /// The value of the option with this name.
+    pub fn value(&self, name: &str) -> Option<&str> {
+        self.values.iter().find(|(own, _)| *own == name).map(|(_, value)| value.as_str())
+    }
+
+    /// Says that the plotter moves a plan with these least and greatest coordinates, in mm, because
+    /// it does not lie within the margins of the page. `None` if the plan keeps its place, is
+    /// scaled, or is too large for the page, which the plotter says by itself.
+    pub fn moves_plan(&self, [low, high]: [[f64; 2]; 2]) -> Option<String> {
+        let margin: f64 = self.value("margin")?.parse().ok()?;
+        let size = [self.page.width, self.page.height];
+        let fits = |axis: usize| high[axis] - low[axis] <= size[axis] - 2.0 * margin;
+        let lies = |axis: usize| low[axis] >= margin && high[axis] <= size[axis] - margin;
+        let is_moved = [0, 1].into_iter().all(fits) && ![0, 1].into_iter().all(lies);
+        (is_moved && self.value("fit") == Some("off")).then(|| {
+            let [width, height] = size;
+            format!(
+                "the drawing is moved onto the page of {width} x {height} mm with its margin of \
+                 {margin} mm: it reaches from {}, {} to {}, {} mm",
+                low[0], low[1], high[0], high[1]
+            )
+        })
+    }
+}
+
+/// Every line of a job before the plot command: clear the old model, choose how pens are assigned,
+/// the lines of the file, the other settings.
+#[derive(Debug)]
+pub struct Job<L> {
+    before: Vec<JobLine>,
+    file: L,
+    after: Vec<JobLine>,
+}
+
+impl<L: Lines> Job<L> {
+    /// Creates the job that draws `file` with `settings`.
+    ///
+    /// Every setting is sent, so that no setting of an earlier job remains in effect.
+    pub fn new(file: L, settings: &Settings) -> Self {
+        // The pen setting must precede the file, which may name more pens than there are.
+        let (pens, others): (Vec<_>, Vec<_>) =
+            settings.values.iter().partition(|(name, _)| *name == PENS);
+        let lines = |values: Vec<&(&str, String)>| {
+            let line = |(name, value): &(&str, String)| format!("${name}={value}");
+            values.into_iter().map(line).collect::<Vec<String>>()
+        };
+        let before = std::iter::once(CLEAR.to_owned()).chain(lines(pens));
+        let after = std::iter::once(VIEW_AUTO.to_owned()).chain(lines(others));
+        Self {
+            before: before.map(JobLine::command).collect(),
+            file,
+            after: after.map(JobLine::command).collect(),
+        }
+    }
+}
+
+impl<L: Lines> Lines for Job<L> {
+    fn count(&self) -> usize {
+        self.before.count() + self.file.count() + self.after.count()
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        let Some(index) = index.checked_sub(self.before.count()) else {
+            return self.before.line(index);
+        };
+        match index.checked_sub(self.file.count()) {
+            None => self.file.line(index),
+            Some(index) => self.after.line(index),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_setting_is_sent_after_the_file() {
+        let values = [
+            ("eye", "-3,-4,2.5"),
+            ("up", "0,0,1"),
+            ("hidden", "dotted"),
+            ("pens", "auto"),
+            ("page", "210x297"),
+            ("title", "F\\xFCr Ada"),
+            ("lift", "2.5"),
+        ];
+        let settings = Settings {
+            page: Page { width: 210.0, height: 297.0 },
+            values: values.map(|(name, value)| (name, value.to_owned())).into(),
+        };
+        let job = Job::new([JobLine::command("v 0 0 0")], &settings);
+        let lines = (0..job.count()).filter_map(|index| job.line(index));
+        let sent: Vec<String> = lines.map(|line| line.sent).collect();
+        assert_eq!(job.line(job.count()), None);
+        assert_eq!(
+            sent,
+            [
+                "$clear",
+                "$pens=auto",
+                "v 0 0 0",
+                "$view=auto",
+                "$eye=-3,-4,2.5",
+                "$up=0,0,1",
+                "$hidden=dotted",
+                "$page=210x297",
+                "$title=F\\xFCr Ada",
+                "$lift=2.5",
+            ]
+        );
+    }
+}

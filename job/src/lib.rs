@@ -1,0 +1,24 @@
+//! What a program on a computer and the page in a browser share about a job: what is sent to a
+//! plotter, what the plotter answers, and what it then draws.
+//!
+//! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`] has the
+//! words of the serial line, and reads the replies. [`view`] says from where a model is
+//! seen. [`twin`] computes what the plotter must then
+//! contain, and [`room`] the memory that takes. [`pins`] and [`watch`] follow the pen to its
+//! [`path`], [`strokes`] and [`results`] tell what was drawn, and [`picture`] shows it.
+//!
+//! Nothing here opens a file or a port, starts a thread, or reads a clock.
+
+mod job;
+pub mod path;
+pub mod picture;
+pub mod pins;
+pub mod protocol;
+pub mod results;
+pub mod room;
+pub mod strokes;
+pub mod twin;
+pub mod view;
+pub mod watch;
+
+pub use job::{Job, Settings};

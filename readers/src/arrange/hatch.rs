@@ -1,0 +1,91 @@
+//! Fills areas with parallel lines.
+
+use super::{Hatch, sine_cosine};
+use crate::plan::{Area, Plan, Point, Stroke};
+use std::collections::BTreeMap;
+
+/// The most lines that hatch a drawing. They take some 100 MB.
+const MOST_LINES: usize = 1_000_000;
+
+/// The length in mm below which a line is left out: it would be a dot.
+const SHORTEST: f64 = 0.002;
+
+/// Hatches the areas that the file fills. In a file that does not say which these are, it hatches
+/// what the closed strokes of a pen surround together.
+///
+/// # Errors
+/// There is no area, or there are too many lines.
+pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
+    let areas = match plan.areas.take() {
+        Some(areas) => areas,
+        None => closed(plan),
+    };
+    if areas.is_empty() {
+        return Err("there is no closed, filled shape to hatch".to_owned());
+    }
+    let mut lines = 0;
+    for area in areas {
+        let Area { outlines, pen, layer, element } = area;
+        let too_many = || format!("--hatch {} makes more than a million lines", hatch.spacing);
+        let hatched = lines_within(&outlines, hatch, MOST_LINES - lines).ok_or_else(too_many)?;
+        lines += hatched.len();
+        let stroke = |ends: [Point; 2]| Stroke { points: ends.to_vec(), pen, layer, element };
+        plan.strokes.extend(hatched.into_iter().map(stroke));
+    }
+    Ok(())
+}
+
+/// What the closed strokes of each pen surround together.
+fn closed(plan: &Plan) -> Vec<Area> {
+    let mut areas: BTreeMap<u32, Area> = BTreeMap::new();
+    for stroke in plan.strokes.iter().filter(|stroke| stroke.is_closed()) {
+        let Stroke { pen, layer, element, .. } = *stroke;
+        let area = || Area { outlines: Vec::new(), pen, layer, element };
+        areas.entry(pen).or_insert_with(area).outlines.push(stroke.points.clone());
+    }
+    areas.into_values().collect()
+}
+
+/// The lines that hatch what an odd number of `outlines` surround; `None` if they are more than
+/// `most`. The lines of all areas of a drawing lie on the same grid.
+fn lines_within(outlines: &[Vec<Point>], hatch: Hatch, most: usize) -> Option<Vec<[Point; 2]>> {
+    let Hatch { spacing, angle } = hatch;
+    let (sine, cosine) = sine_cosine(angle);
+    // In coordinates along the lines and across them, in units of their distance.
+    let turned = |[x, y]: Point| [x * cosine + y * sine, (y * cosine - x * sine) / spacing];
+    let mut crossings: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
+    let mut count = 0usize;
+    for outline in outlines {
+        let mut from = turned(*outline.last()?);
+        for point in outline {
+            let to = turned(*point);
+            let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
+            // A line through a corner belongs to the side above it, so that it counts once.
+            let (first, end) = (low[1].ceil(), high[1].ceil());
+            count = count.saturating_add((end - first) as usize);
+            if count > 2 * most {
+                return None;
+            }
+            for line in first as i64..end as i64 {
+                let part = (line as f64 - low[1]) / (high[1] - low[1]);
+                let along = low[0] + part * (high[0] - low[0]);
+                crossings.entry(line).or_default().push(along);
+            }
+            from = to;
+        }
+    }
+    let back = |along: f64, line: i64| {
+        let across = line as f64 * spacing;
+        [along * cosine - across * sine, along * sine + across * cosine]
+    };
+    let mut lines = Vec::new();
+    for (line, mut along) in crossings {
+        along.sort_by(f64::total_cmp);
+        for pair in along.chunks_exact(2) {
+            if pair[1] - pair[0] >= SHORTEST {
+                lines.push([back(pair[0], line), back(pair[1], line)]);
+            }
+        }
+    }
+    (lines.len() <= most).then_some(lines)
+}

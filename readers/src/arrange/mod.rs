@@ -1,0 +1,206 @@
+//! Arranges a plan before it is drawn: scales, turns, cuts, joins and hatches its strokes.
+//!
+//! [`PLAN_OPTIONS`] has one row for each option, from which the help of the command line is made. An
+//! [`Arrangement`] holds their values. The steps come in a fixed order: layers are chosen; the plan
+//! is scaled and turned, hatched, laid in the middle of the page, and cropped; then strokes are
+//! joined, simplified and begun elsewhere; and last the layers are given their pens.
+//!
+//! A file that is no plan is refused if any of the options is given, and so is a value that leaves
+//! nothing to draw.
+
+mod crop;
+mod hatch;
+mod layers;
+mod linemerge;
+mod reloop;
+mod simplify;
+mod table;
+
+pub(crate) use crop::clip_outline;
+pub use table::{PLAN_OPTIONS, PlanOption};
+
+use crate::page::{A4, Page};
+use crate::plan::{Plan, Point};
+
+/// Whether the page is turned.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Turn {
+    /// The page is as it is named.
+    #[default]
+    AsItIs,
+    /// The page lies on its long side.
+    Landscape,
+    /// The page lies on its long side if the plan is wider than high, and else on its short one.
+    Automatic,
+}
+
+/// What is cut off.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Crop {
+    /// What is beyond the page without its margin.
+    Page,
+    /// What is beyond a rectangle: its least and greatest x and y in mm.
+    Rectangle([Point; 2]),
+}
+
+/// How areas are hatched.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Hatch {
+    /// The distance between two lines, in mm.
+    pub(crate) spacing: f64,
+    /// The angle of the lines to the x axis, counterclockwise, in degrees.
+    pub(crate) angle: f64,
+}
+
+/// What is done with a plan before it is drawn.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Arrangement {
+    /// The page that the user has named.
+    page: Option<Page>,
+    turn: Turn,
+    /// What stays free on each side of the page, in mm, if the user says so.
+    margin: Option<f64>,
+    pub(crate) layers: Vec<String>,
+    pub(crate) scale: Option<[f64; 2]>,
+    pub(crate) rotate: Option<f64>,
+    pub(crate) hatch: Option<Hatch>,
+    pub(crate) center: bool,
+    pub(crate) crop: Option<Crop>,
+    pub(crate) linemerge: Option<f64>,
+    pub(crate) simplify: Option<f64>,
+    pub(crate) reloop: bool,
+    pub(crate) layer_order: Vec<String>,
+}
+
+impl Arrangement {
+    /// Nothing is done with a plan but to lay it on `page`, turned by `turn`, with this `margin` in mm.
+    /// Where there is no page, the file's own serves, or else A4; where there is no margin, nothing
+    /// stays free on the page of the file, and 10 mm on any other.
+    pub fn on(page: Option<Page>, turn: Turn, margin: Option<f64>) -> Self {
+        Self { page, turn, margin, ..Self::default() }
+    }
+
+    /// Whether the user says what stays free on each side of the page.
+    pub fn has_margin(&self) -> bool {
+        self.margin.is_some()
+    }
+
+    /// Sets the option with this name.
+    ///
+    /// # Errors
+    /// The reason why the value is refused, or there is no such option. Nothing is changed then.
+    pub fn set(&mut self, name: &str, text: &str) -> Result<(), String> {
+        let option = PLAN_OPTIONS.iter().find(|option| option.name == name);
+        let option = option.ok_or_else(|| format!("there is no option {name} of a plan"))?;
+        (option.set)(self, text)
+    }
+
+    /// The name of the first option that is given and works on plans only, as it is written.
+    pub(crate) fn first_given(&self) -> Option<String> {
+        let given = PLAN_OPTIONS.iter().find(|option| (option.is_set)(self));
+        let name = given.map(|option| format!("--{}", option.name));
+        name.or_else(|| (self.turn == Turn::Automatic).then(|| "--landscape=auto".to_owned()))
+    }
+
+    /// The page on which a drawing with these bounds is laid, if the file has this page.
+    pub(crate) fn sheet(&self, own: Option<Page>, bounds: Option<[Point; 2]>) -> Page {
+        let page = self.page.or(own).unwrap_or(A4);
+        let (long, short) = (page.width.max(page.height), page.width.min(page.height));
+        let landscape = Page { width: long, height: short };
+        match (self.turn, bounds) {
+            (Turn::AsItIs, _) => page,
+            (Turn::Automatic, Some([low, high])) if high[0] - low[0] <= high[1] - low[1] => {
+                Page { width: short, height: long }
+            }
+            (Turn::Landscape | Turn::Automatic, _) => landscape,
+        }
+    }
+
+    /// Arranges `plan`, which has this page of its own. Returns the page on which it is laid. What
+    /// the user should know is added to `notes`.
+    ///
+    /// # Errors
+    /// The reason why it cannot be arranged so, as a sentence.
+    pub(crate) fn arrange(
+        &self,
+        plan: &mut Plan,
+        own: Option<Page>,
+        notes: &mut Vec<String>,
+    ) -> Result<Page, String> {
+        if !self.layers.is_empty() {
+            layers::choose(plan, &self.layers)?;
+        }
+        if let Some([x, y]) = self.scale {
+            about_middle(plan, |[dx, dy]| [dx * x, dy * y]);
+        }
+        if let Some(degrees) = self.rotate {
+            let (sine, cosine) = sine_cosine(-degrees);
+            about_middle(plan, |[x, y]| [x * cosine - y * sine, x * sine + y * cosine]);
+        }
+        if let Some(hatch) = self.hatch {
+            hatch::hatch(plan, hatch)?;
+        }
+        let sheet = self.sheet(own, plan.bounds());
+        if let (true, Some([low, high])) = (self.center, plan.bounds()) {
+            let middle = [sheet.width / 2.0, sheet.height / 2.0];
+            let by: [f64; 2] =
+                [0, 1].map(|axis| middle[axis] - f64::midpoint(low[axis], high[axis]));
+            transform(plan, |[x, y]| [x + by[0], y + by[1]]);
+        }
+        if let Some(crop) = self.crop {
+            let is_own = self.page.is_none() && own.is_some();
+            let margin = self.margin.unwrap_or(if is_own { 0.0 } else { 10.0 });
+            crop::crop(plan, crop.rectangle(sheet, margin)?);
+        }
+        if let Some(tolerance) = self.linemerge {
+            linemerge::merge(plan, tolerance);
+        }
+        if let Some(tolerance) = self.simplify {
+            simplify::simplify(plan, tolerance);
+        }
+        if self.reloop {
+            reloop::reloop(plan);
+        }
+        if !self.layer_order.is_empty() {
+            notes.push(layers::reorder(plan, &self.layer_order)?);
+        }
+        if plan.is_empty() {
+            let options = PLAN_OPTIONS.iter().filter(|option| (option.is_set)(self));
+            let options: Vec<String> = options.map(|it| format!("--{}", it.name)).collect();
+            return Err(format!("there is nothing left to draw after {}", options.join(", ")));
+        }
+        Ok(sheet)
+    }
+}
+
+/// Applies `map` to the ways from the middle of the plan to each point.
+fn about_middle(plan: &mut Plan, map: impl Fn(Point) -> Point) {
+    let Some([low, high]) = plan.bounds() else { return };
+    let [x, y] = [0, 1].map(|axis| f64::midpoint(low[axis], high[axis]));
+    transform(plan, |point| {
+        let [dx, dy] = map([point[0] - x, point[1] - y]);
+        [x + dx, y + dy]
+    });
+}
+
+/// The sine and the cosine of an angle in degrees; exact for quarter turns.
+fn sine_cosine(degrees: f64) -> (f64, f64) {
+    match degrees.rem_euclid(360.0) {
+        0.0 => (0.0, 1.0),
+        90.0 => (1.0, 0.0),
+        180.0 => (0.0, -1.0),
+        270.0 => (-1.0, 0.0),
+        degrees => degrees.to_radians().sin_cos(),
+    }
+}
+
+/// Applies `map` to every point of the plan.
+fn transform(plan: &mut Plan, map: impl Fn(Point) -> Point) {
+    let strokes = plan.strokes.iter_mut().flat_map(|stroke| &mut stroke.points);
+    let areas = plan.areas.iter_mut().flatten();
+    let outlines = areas.flat_map(|area| area.outlines.iter_mut().flatten());
+    strokes.chain(outlines).for_each(|point| *point = map(*point));
+}
+
+#[cfg(test)]
+mod tests;

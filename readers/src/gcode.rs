@@ -1,0 +1,410 @@
+//! Reads G-code as a plan: what the pen draws, not how the machine of the program moved.
+//!
+//! [`Interpreter`] follows the modes of the program and gives its moves, each with the signals that
+//! may lift a pen. Which of them does is decided on the whole program, in this order: the angle of
+//! a servo (`M280`, `M300`), the height Z, the spindle or laser (`M3`, `M4`, `M5` and its power S),
+//! or, if none of these changes between moves, G1 to G3 draw and G0 does not. Of the two levels
+//! of a signal, that of most moves by G0 is up; without such moves the higher Z is up, and for a
+//! servo the level of the first move. A laser with the power 0 does not draw.
+//!
+//! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
+//! reader refuses arcs that do not exist, and numbers that it cannot read.
+
+use super::arrange::Arrangement;
+use super::error::ReadError;
+use super::format::{Contents, Format};
+use super::plan::Plan;
+use crate::lines::Origin;
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+/// The format itself.
+#[derive(Debug)]
+pub(super) struct GCode;
+
+/// The greatest distance between an arc and its chords, in mm: less than half a usual step.
+const CHORD_ERROR: f64 = 0.005;
+
+/// The most points of a program. They take 160 MB.
+const MOST_POINTS: usize = 10_000_000;
+
+/// The signals that may lift the pen, as they are during a move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Signals {
+    servo: Option<f64>,
+    height: Option<f64>,
+    /// Whether the spindle is on; `None` if the program has not said.
+    spindle: Option<bool>,
+    power: Option<f64>,
+}
+
+/// A move of the program in mm.
+#[derive(Debug)]
+struct Move {
+    line: u32,
+    is_rapid: bool,
+    signals: Signals,
+    points: Vec<[f64; 2]>,
+}
+
+impl Move {
+    fn length(&self) -> f64 {
+        self.points.windows(2).map(|ends| distance(ends[0], ends[1])).sum()
+    }
+}
+
+fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// The modes of a program, and its moves so far.
+#[derive(Debug)]
+struct Interpreter {
+    /// The number of the mode G0 to G3.
+    motion: u8,
+    is_relative: bool,
+    /// Whether I and J are positions (G90.1) rather than distances.
+    has_absolute_centres: bool,
+    /// The length of the unit in mm.
+    unit: f64,
+    at: [f64; 2],
+    /// What is added to coordinates: the origin that G92 has set.
+    origin: [f64; 3],
+    height: f64,
+    signals: Signals,
+    moves: Vec<Move>,
+    points: usize,
+    /// The words that were not obeyed, with their count and the first line.
+    unknown: BTreeMap<String, (usize, usize)>,
+}
+
+/// The reason why a line is refused.
+type Refusal = String;
+
+impl Interpreter {
+    fn new() -> Self {
+        Self {
+            motion: 0,
+            is_relative: false,
+            has_absolute_centres: false,
+            unit: 1.0,
+            at: [0.0; 2],
+            origin: [0.0; 3],
+            height: 0.0,
+            signals: Signals::default(),
+            moves: Vec::new(),
+            points: 0,
+            unknown: BTreeMap::new(),
+        }
+    }
+
+    fn skip(&mut self, word: String, line: usize) {
+        self.unknown.entry(word).or_insert((0, line)).0 += 1;
+    }
+
+    /// Carries out a line. Returns whether the program goes on after it.
+    fn line(&mut self, text: &str, number: usize) -> Result<bool, Refusal> {
+        let text = without_comments(text);
+        let text = text.trim();
+        // A block delete, a mark of the beginning or end, or a setting of the machine.
+        if text.starts_with(['/', '%', '$']) || text.is_empty() {
+            return Ok(true);
+        }
+        let words = words(text)?;
+        let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
+        let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
+        let mut servo = false;
+        for &(letter, value) in &words {
+            // Codes have at most one decimal, as G91.1.
+            let code = (value * 10.0).round() as i64;
+            match (letter, code) {
+                ('G', 0 | 10 | 20 | 30) => self.motion = (code / 10) as u8,
+                ('G', 200) => self.unit = 25.4,
+                ('G', 210) => self.unit = 1.0,
+                ('G', 900) => self.is_relative = false,
+                ('G', 910) => self.is_relative = true,
+                ('G', 901) => self.has_absolute_centres = true,
+                ('G', 911) => self.has_absolute_centres = false,
+                ('G', 920) => (moves, sets_position) = (false, true),
+                ('G', 921) => self.origin = [0.0; 3],
+                ('G', 180 | 190) => return Err("arcs in other planes are not drawn".to_owned()),
+                // A dwell, offsets and the places of the machine.
+                ('G', 40 | 100 | 280 | 281 | 300 | 301) => moves = false,
+                ('G', 170 | 400 | 490 | 540..=590 | 610 | 640 | 800 | 940) => {}
+                ('M', 30 | 40) => self.signals.spindle = Some(true),
+                ('M', 50) => self.signals.spindle = Some(false),
+                ('M', 2800 | 3000) => servo = true,
+                ('M', 20 | 300) => goes_on = false,
+                ('M', 0 | 10 | 60 | 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
+                ('G' | 'M', _) => self.skip(format!("{letter}{value}"), number),
+                ('X' | 'Y' | 'Z' | 'I' | 'J' | 'R' | 'F' | 'N' | 'P' | 'S' | 'T' | 'E', _) => {}
+                (letter, _) => self.skip(letter.to_string(), number),
+            }
+        }
+        if servo {
+            self.signals.servo = value('S').or(self.signals.servo);
+        } else if let Some(power) = value('S') {
+            self.signals.power = Some(power);
+        }
+        if sets_position {
+            for (axis, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
+                let now = if axis < 2 { self.at[axis] } else { self.height };
+                if let Some(value) = value(letter) {
+                    self.origin[axis] = now - value * self.unit;
+                }
+            }
+        }
+        if moves {
+            self.advance(&value, number)?;
+        }
+        Ok(goes_on)
+    }
+
+    /// Moves to the coordinates of a line.
+    fn advance(
+        &mut self,
+        value: &impl Fn(char) -> Option<f64>,
+        number: usize,
+    ) -> Result<(), Refusal> {
+        let (unit, is_relative, origin) = (self.unit, self.is_relative, self.origin);
+        let target = |letter, axis: usize, now: f64| match value(letter) {
+            None => now,
+            Some(value) if is_relative => now + value * unit,
+            Some(value) => origin[axis] + value * unit,
+        };
+        if value('Z').is_some() {
+            self.height = target('Z', 2, self.height);
+            self.signals.height = Some(self.height);
+        }
+        let to = [target('X', 0, self.at[0]), target('Y', 1, self.at[1])];
+        let is_arc = self.motion >= 2 && ['I', 'J', 'R'].into_iter().any(|it| value(it).is_some());
+        if value('X').is_none() && value('Y').is_none() && !is_arc {
+            return Ok(());
+        }
+        let mut points = vec![self.at];
+        if self.motion >= 2 {
+            self.arc(to, value, &mut points)?;
+        }
+        points.push(to);
+        self.points += points.len();
+        if self.points > MOST_POINTS {
+            return Err("the program has too many points: leave a part of it out".to_owned());
+        }
+        self.at = to;
+        let line = u32::try_from(number).unwrap_or(u32::MAX);
+        let is_rapid = self.motion == 0;
+        self.moves.push(Move { line, is_rapid, signals: self.signals, points });
+        Ok(())
+    }
+
+    /// Adds the points within an arc from here to `to`.
+    fn arc(
+        &self,
+        to: [f64; 2],
+        value: &impl Fn(char) -> Option<f64>,
+        points: &mut Vec<[f64; 2]>,
+    ) -> Result<(), Refusal> {
+        let from = self.at;
+        let clockwise = self.motion == 2;
+        let centre = if let Some(radius) = value('R') {
+            let radius = radius * self.unit;
+            let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
+            let chord = dx.hypot(dy);
+            // Rounded ends may lie a little too far apart.
+            if chord == 0.0 || chord > 2.0 * radius.abs() + 0.01 {
+                return Err("there is no such arc: its ends do not fit its radius".to_owned());
+            }
+            let height = (radius * radius - chord * chord / 4.0).max(0.0).sqrt() / chord;
+            let side = if clockwise == (radius > 0.0) { height } else { -height };
+            [from[0] + dx / 2.0 + dy * side, from[1] + dy / 2.0 - dx * side]
+        } else {
+            let offset = |letter, axis: usize| match value(letter) {
+                Some(value) if self.has_absolute_centres => self.origin[axis] + value * self.unit,
+                Some(value) => from[axis] + value * self.unit,
+                None => from[axis],
+            };
+            [offset('I', 0), offset('J', 1)]
+        };
+        let radius = distance(from, centre);
+        if radius == 0.0 || (distance(to, centre) - radius).abs() > 0.005 * radius + 0.5 {
+            return Err("there is no such arc: its ends are not equally far from its centre".into());
+        }
+        let angle = |point: [f64; 2]| (point[1] - centre[1]).atan2(point[0] - centre[0]);
+        let begin = angle(from);
+        let turn = if clockwise { begin - angle(to) } else { angle(to) - begin };
+        // An arc back to its beginning is a whole circle.
+        let turn = match turn.rem_euclid(TAU) {
+            turn if turn < 1e-9 || distance(from, to) < 1e-9 => TAU,
+            turn => turn,
+        };
+        let most = 2.0 * (1.0 - CHORD_ERROR / radius.max(2.0 * CHORD_ERROR)).acos();
+        let chords = (turn / most).ceil().max(1.0);
+        if self.points as f64 + chords > MOST_POINTS as f64 {
+            return Err("the arc is too large".to_owned());
+        }
+        let sign = if clockwise { -1.0 } else { 1.0 };
+        points.extend((1..chords as usize).map(|index| {
+            let angle = begin + sign * turn * index as f64 / chords;
+            [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()]
+        }));
+        Ok(())
+    }
+}
+
+/// The line without comments in parentheses or after a semicolon, and without a checksum.
+fn without_comments(text: &str) -> String {
+    let mut kept = String::new();
+    let mut is_within = false;
+    for letter in text.chars() {
+        match letter {
+            ';' | '*' if !is_within => break,
+            '(' => is_within = true,
+            ')' => is_within = false,
+            letter if !is_within => kept.push(letter),
+            _ => {}
+        }
+    }
+    kept
+}
+
+/// The words of a line: letters in capitals and their numbers.
+fn words(text: &str) -> Result<Vec<(char, f64)>, Refusal> {
+    let letters: Vec<char> = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+    let mut words = Vec::new();
+    let mut rest = letters.as_slice();
+    while let [letter, after @ ..] = rest {
+        let is_number = |letter: &char| letter.is_ascii_digit() || "+-.".contains(*letter);
+        let end = after.iter().position(|it| !is_number(it)).unwrap_or(after.len());
+        let (number, next) = after.split_at(end);
+        let number: String = number.iter().collect();
+        if !letter.is_ascii_alphabetic() {
+            return Err(format!("\"{letter}\" is no word of G-code"));
+        }
+        // Marlin's commands may have letters without a number.
+        let value = if number.is_empty() { Ok(0.0) } else { number.parse() };
+        let value = value.map_err(|_| format!("\"{letter}{number}\" is no number"))?;
+        words.push((letter.to_ascii_uppercase(), value));
+        rest = next;
+    }
+    Ok(words)
+}
+
+/// Decides for each move whether it draws.
+fn inked(moves: &[Move]) -> Vec<bool> {
+    let by_level = |level: &dyn Fn(&Signals) -> Option<f64>, high_is_up: Option<bool>| {
+        let levels: Vec<Option<f64>> = moves.iter().map(|it| level(&it.signals)).collect();
+        let known = || levels.iter().copied().flatten();
+        let least = known().fold(f64::INFINITY, f64::min);
+        let greatest = known().fold(f64::NEG_INFINITY, f64::max);
+        if greatest - least < 1e-6 || known().next().is_none() {
+            return None;
+        }
+        let middle = f64::midpoint(least, greatest);
+        // The way by G0 at either level says which of them is up.
+        let rapid = |high: bool| -> f64 {
+            let at_level = |level: &Option<f64>| level.is_some_and(|it| (it > middle) == high);
+            let pairs = moves.iter().zip(&levels);
+            let rapid = pairs.filter(|(it, level)| it.is_rapid && at_level(level));
+            rapid.map(|(it, _)| it.length()).sum()
+        };
+        let first = || known().next().is_some_and(|level| level > middle);
+        let high_is_up = match (rapid(true), rapid(false)) {
+            (high, low) if high != low => high > low,
+            _ => high_is_up.unwrap_or_else(first),
+        };
+        // Before the first level the pen is up.
+        let draws = |level: &Option<f64>| level.is_some_and(|it| (it > middle) != high_is_up);
+        Some(levels.iter().map(draws).collect::<Vec<bool>>())
+    };
+    let spindle = || {
+        let is_on = |it: &Move| it.signals.spindle == Some(true) && it.signals.power != Some(0.0);
+        let draws: Vec<bool> = moves.iter().map(is_on).collect();
+        // A spindle that only runs before the first move lifts no pen.
+        (draws.contains(&true) && draws.contains(&false)).then_some(draws)
+    };
+    let power = |signals: &Signals| signals.spindle.filter(|on| *on).and(signals.power);
+    by_level(&|signals| signals.servo, None)
+        .or_else(|| by_level(&|signals| signals.height, Some(true)))
+        .or_else(spindle)
+        .or_else(|| by_level(&power, None))
+        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect())
+}
+
+impl Format for GCode {
+    fn name(&self) -> &'static str {
+        "G-code"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["gcode", "nc", "ngc", "gc"]
+    }
+
+    /// The first lines are G-code, and one of them moves.
+    fn recognises(&self, beginning: &[u8]) -> bool {
+        let Ok(text) = std::str::from_utf8(&beginning[..beginning.len().min(4096)]) else {
+            return false;
+        };
+        let mut interpreter = Interpreter::new();
+        // The last line may be cut.
+        let mut lines: Vec<&str> = text.lines().collect();
+        if lines.len() > 1 {
+            lines.pop();
+        }
+        let is_read = |(index, line): (usize, &&str)| interpreter.line(line, index).is_ok();
+        lines.iter().enumerate().all(is_read)
+            && interpreter.unknown.keys().all(|word| word.starts_with(['G', 'M']))
+            && !interpreter.moves.is_empty()
+    }
+
+    fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
+        let text = String::from_utf8_lossy(&bytes);
+        let mut interpreter = Interpreter::new();
+        let lines: Vec<&str> = text.lines().collect();
+        let origin = |number: usize| Origin {
+            file: file.clone(),
+            line: number,
+            text: lines[number - 1].chars().take(Origin::MOST_SHOWN + 1).collect(),
+        };
+        for (index, line) in lines.iter().enumerate() {
+            if line.contains('\0') {
+                return Err(ReadError::NotText { origin: origin(index + 1), kind: "G-code" });
+            }
+            match interpreter.line(line, index + 1) {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(reason) => return Err(ReadError::Line { origin: origin(index + 1), reason }),
+            }
+        }
+        let mut plan = Plan::new(file.clone());
+        let drawn = inked(&interpreter.moves);
+        let mut pairs = interpreter.moves.iter().zip(drawn).filter(|(_, draws)| *draws).peekable();
+        while let Some((first, _)) = pairs.next() {
+            let mut points = first.points.clone();
+            while let Some((next, _)) = pairs.next_if(|(it, _)| points.last() == it.points.first())
+            {
+                points.extend_from_slice(&next.points[1..]);
+            }
+            plan.begin(first.line as usize, origin(first.line as usize).text);
+            plan.draw(points, None, 1);
+        }
+        let notes: Vec<String> = interpreter
+            .unknown
+            .iter()
+            .map(|(word, (count, line))| match count {
+                1 => format!("{word} has no meaning for a drawing (line {line})"),
+                _ => format!(
+                    "{count} words {word} have no meaning for a drawing (the first in line {line})"
+                ),
+            })
+            .collect();
+        if plan.is_empty() {
+            let mut reason = "there is nothing to draw in this G-code".to_owned();
+            notes.iter().for_each(|note| reason += &format!("; {note}"));
+            return Err(ReadError::Content { file, reason });
+        }
+        Ok(plan.contents(None, notes))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,77 @@
+//! Tests of reading HP-GL.
+
+use crate::tests::{notes, sent};
+
+fn lines(text: &str) -> Vec<String> {
+    sent("a.plt", text.as_bytes()).expect("HP-GL")
+}
+
+#[test]
+fn strokes_pens_and_relative_moves_are_read_whatever_ends_an_instruction() {
+    let expected = [
+        "usemtl pen1",
+        "v 1 1 0",
+        "v 2 1 0",
+        "v 2 2 0",
+        "l 1 2 3",
+        "usemtl pen3",
+        "v 0 0 0",
+        "v 1 0 0",
+        "l 4 5",
+    ];
+    for text in [
+        "IN;SP1;PU40,40;PD80,40,80,80;PU;SP3;PU0,0;PD;PR40,0;PU;SP0;",
+        "in\nsp1\npu40 40pd80 40,80 80 pu\nsp3pa0,0pdpr40 0",
+        "\x1B.(\x1B.I81;;17:\x1B.N;19:\x1B%0BINSP1PA40,40PDPA80,40PA80,80PUSP3PU0,0PD40,0",
+    ] {
+        assert_eq!(lines(text), expected, "{text:?}");
+    }
+    assert_eq!(sent("known by its beginning", b"IN;PD40,0;").map(|it| it.len()), Ok(4));
+}
+
+#[test]
+fn scales_turns_arcs_and_outlines_are_drawn() {
+    assert_eq!(lines("IP0,0,4000,4000;SC0,10,0,10;PU1,1;PD2,1;")[1..3], ["v 10 10 0", "v 20 10 0"]);
+    assert_eq!(lines("RO90;PU40,0;PD80,0;")[1..3], ["v 0 1 0", "v 0 2 0"]);
+    assert_eq!(lines("PU40,40;EA80,120;").last().map(String::as_str), Some("l 1 2 3 4 1"));
+    let circle = lines("PU400,400;CI200;");
+    let on_circle = |line: &&String| {
+        let numbers: Vec<f64> = line.split(' ').filter_map(|word| word.parse().ok()).collect();
+        ((numbers[0] - 10.0).hypot(numbers[1] - 10.0) - 5.0).abs() < 0.006
+    };
+    let vertices: Vec<&String> = circle.iter().filter(|line| line.starts_with("v ")).collect();
+    assert!(vertices.len() > 30 && vertices.iter().all(on_circle), "{circle:?}");
+    let arc = lines("PU400,0;PD;AA0,0,90;");
+    assert_eq!(
+        arc.iter().rev().find(|line| line.starts_with("v ")).map(String::as_str),
+        Some("v 0 10 0")
+    );
+}
+
+/// `PE` of the HP-GL/2 reference: pen up by (10, 5), then down by (10, 10) in base 64.
+#[test]
+fn encoded_polylines_are_drawn() {
+    // 2 * 40 = 80 = 16 + 64, so the digits are 16 and 1.
+    let text = [&b"IN;PE<"[..], &[63 + 16, 191 + 1, 63 + 16, 191 + 1, 63 + 16, 191 + 1, 191], b";"]
+        .concat();
+    let lines = sent("a.plt", &text).expect("HP-GL");
+    assert_eq!(lines[1..], ["v 1 1 0", "v 2 1 0", "l 1 2"]);
+}
+
+#[test]
+fn labels_are_counted_and_bad_numbers_refused() {
+    assert_eq!(
+        notes("a.plt", b"IN;PD40,0;LBPD9,9;\x03DT#;LBx#PU;"),
+        ["2 labels are not drawn: convert text to paths"]
+    );
+    for (text, reason) in [
+        ("IN;\nPD1,x", "a.plt:2: a coordinate has no partner"),
+        ("IN;\nPD1,2.3.4;", "a.plt:2: \"2.3.4\" is no number"),
+        ("IN;PD1,2,3;", "a.plt:1: a coordinate has no partner"),
+        ("IN;PU1,1;", "a.plt: there is nothing to draw"),
+        ("IN;PD;SC1,1,0,1;", "a.plt:1: SC needs four numbers"),
+    ] {
+        let error = sent("a.plt", text.as_bytes()).expect_err("refused");
+        assert!(error.starts_with(reason), "{error}");
+    }
+}

@@ -1,0 +1,303 @@
+//! A plan while it is read and arranged: strokes in millimetres, and the areas that may be hatched.
+
+use crate::format::{Body, Contents};
+use crate::lines::{JobLine, Lines, Origin};
+use crate::page::Page;
+use penup::protocol::LINE_LIMIT;
+use std::collections::HashMap;
+use std::fmt::Write as _;
+
+/// A point of a plan in mm: x to the right, y upward.
+pub(crate) type Point = [f64; 2];
+
+/// The number of thousandths of a millimetre in one, in which coordinates are written.
+const PER_MM: f64 = 1000.0;
+
+/// A polyline that the pen draws.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Stroke {
+    /// Its points, two or more. The last is the first if it is closed.
+    pub(crate) points: Vec<Point>,
+    /// The pen that draws it, counted from 1.
+    pub(crate) pen: u32,
+    /// The number of its layer.
+    pub(crate) layer: u32,
+    /// The number of the element of the file that it comes from.
+    pub(crate) element: u32,
+}
+
+impl Stroke {
+    /// Whether it ends where it begins.
+    pub(crate) fn is_closed(&self) -> bool {
+        self.points.len() > 2 && self.points.first() == self.points.last()
+    }
+}
+
+/// An area that may be hatched: what an odd number of its outlines surround.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Area {
+    /// The outlines. The side from the last point to the first belongs to each.
+    pub(crate) outlines: Vec<Vec<Point>>,
+    /// The pen that hatches it, counted from 1.
+    pub(crate) pen: u32,
+    /// The number of its layer.
+    pub(crate) layer: u32,
+    /// The number of the element of the file that it comes from.
+    pub(crate) element: u32,
+}
+
+/// What a file draws at one height.
+#[derive(Debug, Default)]
+pub(crate) struct Plan {
+    pub(crate) file: String,
+    pub(crate) strokes: Vec<Stroke>,
+    /// The areas that the file says are filled; `None` if it does not say which are.
+    pub(crate) areas: Option<Vec<Area>>,
+    /// The names of the layers; empty if the pens are the layers.
+    pub(crate) layers: Vec<String>,
+    /// The line of the file in which each element begins, and its text.
+    elements: Vec<(usize, String)>,
+    /// The number of polylines without a length, which are not drawn.
+    pub(crate) dots: usize,
+}
+
+impl Plan {
+    pub(crate) fn new(file: String) -> Self {
+        Self { file, ..Self::default() }
+    }
+
+    /// Begins an element of the file, to which the strokes that follow belong.
+    pub(crate) fn begin(&mut self, line: usize, text: String) {
+        self.elements.push((line, text));
+    }
+
+    /// The number of the element that began last.
+    pub(crate) fn element(&self) -> u32 {
+        u32::try_from(self.elements.len().saturating_sub(1)).unwrap_or(u32::MAX)
+    }
+
+    /// Whether nothing is drawn.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.strokes.is_empty()
+    }
+
+    /// Draws a polyline with a pen, counted from 1, on a layer of the same number. The points are
+    /// millimetres with y upward. If there is a page, they are within it; what rounding brings
+    /// outside is moved to its border.
+    pub(crate) fn draw(
+        &mut self,
+        points: impl IntoIterator<Item = Point>,
+        page: Option<[f64; 2]>,
+        pen: u32,
+    ) {
+        self.draw_on(points, page, pen, pen);
+    }
+
+    /// Draws a polyline on a layer, see [`Plan::draw`].
+    pub(crate) fn draw_on(
+        &mut self,
+        points: impl IntoIterator<Item = Point>,
+        page: Option<[f64; 2]>,
+        pen: u32,
+        layer: u32,
+    ) {
+        let rounded = |value: f64, axis: usize| {
+            let value = (value * PER_MM).round();
+            let most = page.map(|page| (page[axis] * PER_MM).floor());
+            most.map_or(value, |most| value.clamp(0.0, most)) / PER_MM
+        };
+        let position = |[x, y]: Point| [rounded(x, 0), rounded(y, 1)];
+        let mut points: Vec<Point> = points.into_iter().map(position).collect();
+        points.dedup();
+        if points.len() < 2 {
+            self.dots += 1;
+            return;
+        }
+        let element = self.element();
+        self.strokes.push(Stroke { points, pen, layer, element });
+    }
+
+    /// The name of a layer.
+    pub(crate) fn layer_name(&self, layer: u32) -> String {
+        let name = usize::try_from(layer).ok().and_then(|layer| self.layers.get(layer));
+        name.cloned().unwrap_or_else(|| format!("pen{layer}"))
+    }
+
+    /// The least and the greatest coordinates in mm; `None` if nothing is drawn.
+    pub(crate) fn bounds(&self) -> Option<[Point; 2]> {
+        let mut points = self.strokes.iter().flat_map(|stroke| stroke.points.iter().copied());
+        let first = points.next()?;
+        Some(points.fold([first, first], |[low, high], [x, y]| {
+            [[low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]]
+        }))
+    }
+
+    /// What the user should know about any plan.
+    pub(crate) fn notes(&self) -> Vec<String> {
+        let dots = match self.dots {
+            0 => None,
+            1 => Some("1 line is not drawn, because a dot has no length".to_owned()),
+            dots => Some(format!("{dots} lines are not drawn, because a dot has no length")),
+        };
+        dots.into_iter().collect()
+    }
+
+    /// Ends the reading of the plan.
+    pub(crate) fn contents(self, page: Option<Page>, mut notes: Vec<String>) -> Contents {
+        notes.extend(self.notes());
+        Contents { body: Body::Plan(self), page, bounds: None, notes }
+    }
+
+    /// Writes the lines that are sent, and says what the user should know about their number.
+    pub(crate) fn into_lines(self) -> (PlanLines, Vec<String>) {
+        let mut lines = PlanLines {
+            file: self.file,
+            lines: Vec::new(),
+            elements: self.elements,
+            vertices: HashMap::new(),
+            pen: None,
+        };
+        for stroke in &self.strokes {
+            lines.draw(stroke);
+        }
+        let notes = super::capacity(lines.vertices.len()).into_iter().collect();
+        lines.vertices = HashMap::new();
+        (lines, notes)
+    }
+}
+
+/// Reads the lines of OBJ as a plan.
+///
+/// # Errors
+/// The reason why they are none, as the end of a sentence about the file.
+pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
+    let mut plan = Plan::new(file.to_owned());
+    let mut vertices: Vec<[f64; 3]> = Vec::new();
+    let mut pens: HashMap<String, u32> = HashMap::new();
+    let (mut pen, mut height) = (1, None);
+    let mut has_materials = false;
+    for line in lines.in_order() {
+        let mut words = line.sent.split(' ');
+        let keyword = words.next().unwrap_or_default();
+        match keyword {
+            "v" => {
+                let mut number = || words.next().and_then(|word| word.parse().ok());
+                let (Some(x), Some(y), Some(z)) = (number(), number(), number()) else {
+                    return Err("has a vertex without three coordinates".to_owned());
+                };
+                vertices.push([x, y, z]);
+            }
+            "usemtl" | "g" => {
+                let is_material = keyword == "usemtl";
+                // Groups choose pens in a file without materials only.
+                if is_material && !has_materials {
+                    has_materials = true;
+                    pens.clear();
+                }
+                if is_material || !has_materials {
+                    let name = words.collect::<Vec<_>>().join(" ");
+                    let next = u32::try_from(pens.len() + 1).unwrap_or(u32::MAX);
+                    let named = name.strip_prefix("pen").and_then(|number| number.parse().ok());
+                    pen = named.unwrap_or_else(|| *pens.entry(name).or_insert(next));
+                }
+            }
+            "l" => {
+                let mut points = Vec::new();
+                for word in words {
+                    let number = word.split('/').next().unwrap_or_default();
+                    let number: i64 =
+                        number.parse().map_err(|_| "has a corner that is no number")?;
+                    let at = if number < 0 { number + vertices.len() as i64 } else { number - 1 };
+                    let vertex = usize::try_from(at).ok().and_then(|at| vertices.get(at));
+                    let &[x, y, z] = vertex.ok_or("has a corner that is no vertex")?;
+                    if *height.get_or_insert(z) != z {
+                        return Err("has lines at more than one height".to_owned());
+                    }
+                    points.push([x, y]);
+                }
+                if let Some(origin) = line.origin {
+                    plan.begin(origin.line, origin.text);
+                }
+                plan.draw(points, None, pen);
+            }
+            "f" => return Err("has faces".to_owned()),
+            "curv" => return Err("has curves".to_owned()),
+            _ => {}
+        }
+    }
+    if plan.is_empty() { Err("has no lines".to_owned()) } else { Ok(plan) }
+}
+
+/// The lines of a plan, each with the element of the file that it comes from.
+#[derive(Debug)]
+pub(crate) struct PlanLines {
+    file: String,
+    /// The lines, and for each the number of its element.
+    lines: Vec<(String, u32)>,
+    /// The line of the file in which each element begins, and its text.
+    elements: Vec<(usize, String)>,
+    /// The numbers of the vertices, counted from 1, by their coordinates in thousandths of a
+    /// millimetre.
+    vertices: HashMap<[i64; 2], usize>,
+    pen: Option<u32>,
+}
+
+impl PlanLines {
+    fn draw(&mut self, stroke: &Stroke) {
+        let position = |value: f64| (value * PER_MM).round() as i64;
+        let mut positions: Vec<[i64; 2]> =
+            stroke.points.iter().map(|point| point.map(position)).collect();
+        positions.dedup();
+        if positions.len() < 2 {
+            return;
+        }
+        if self.pen != Some(stroke.pen) {
+            self.pen = Some(stroke.pen);
+            self.lines.push((format!("usemtl pen{}", stroke.pen), stroke.element));
+        }
+        let numbers: Vec<usize> =
+            positions.into_iter().map(|position| self.vertex(position, stroke.element)).collect();
+        let mut line = String::from("l");
+        let mut last = None;
+        for number in numbers {
+            let before = line.len();
+            // Writing to a string cannot fail.
+            let _ = write!(line, " {number}");
+            if line.len() > LINE_LIMIT {
+                line.truncate(before);
+                let whole = std::mem::replace(&mut line, String::from("l"));
+                self.lines.push((whole, stroke.element));
+                let _ = write!(line, " {} {number}", last.unwrap_or(number));
+            }
+            last = Some(number);
+        }
+        self.lines.push((line, stroke.element));
+    }
+
+    /// The number of the vertex at this position, which is made if there is none.
+    fn vertex(&mut self, position: [i64; 2], element: u32) -> usize {
+        let next = self.vertices.len() + 1;
+        let number = *self.vertices.entry(position).or_insert(next);
+        if number == next {
+            let [x, y] = position.map(|value| value as f64 / PER_MM);
+            self.lines.push((format!("v {x} {y} 0"), element));
+        }
+        number
+    }
+}
+
+impl Lines for PlanLines {
+    fn count(&self) -> usize {
+        self.lines.len()
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        let (sent, element) = self.lines.get(index)?;
+        let origin = self.elements.get(*element as usize).map(|(line, text)| Origin {
+            file: self.file.clone(),
+            line: *line,
+            text: text.clone(),
+        });
+        Some(JobLine { sent: sent.clone(), origin })
+    }
+}

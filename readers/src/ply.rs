@@ -1,0 +1,186 @@
+//! Reads PLY files, binary and text, by the crate `ply-rs-bw`.
+//!
+//! Vertices are joined where they are equal, and faces may have any number of corners. What else
+//! the file holds, colours or normals for instance, has no meaning for a plotter. The reader
+//! refuses files without faces, corners that are no vertices, and numbers that are not finite.
+
+use super::arrange::Arrangement;
+use super::error::ReadError;
+use super::format::{Contents, Format};
+use super::mesh::{Coordinate, Mesh};
+use ply_rs_bw::parser::Parser;
+use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+
+/// The format itself.
+#[derive(Debug)]
+pub(super) struct Ply;
+
+/// What is read of an element of the file: a vertex has coordinates, a face has corners.
+#[derive(Debug, Default)]
+struct Element {
+    point: [Option<Coordinate>; 3],
+    corners: Option<Vec<i64>>,
+}
+
+impl PropertyAccess for Element {
+    fn new() -> Self {
+        Self::default()
+    }
+
+    fn set_property(&mut self, name: &str, property: Property) -> PropertyAccessResult {
+        let axis = match name {
+            "x" => 0,
+            "y" => 1,
+            "z" => 2,
+            "vertex_indices" | "vertex_index" => {
+                self.corners = corners(property);
+                return PropertyAccessResult::Set;
+            }
+            _ => return PropertyAccessResult::Ignored,
+        };
+        self.point[axis] = coordinate(&property);
+        PropertyAccessResult::Set
+    }
+}
+
+fn coordinate(property: &Property) -> Option<Coordinate> {
+    Some(match *property {
+        Property::Char(value) => Coordinate::Double(value.into()),
+        Property::UChar(value) => Coordinate::Double(value.into()),
+        Property::Short(value) => Coordinate::Double(value.into()),
+        Property::UShort(value) => Coordinate::Double(value.into()),
+        Property::Int(value) => Coordinate::Double(value.into()),
+        Property::UInt(value) => Coordinate::Double(value.into()),
+        Property::Float(value) => Coordinate::Single(value),
+        Property::Double(value) => Coordinate::Double(value),
+        _ => return None,
+    })
+}
+
+fn corners(property: Property) -> Option<Vec<i64>> {
+    /// Widens the numbers of a list.
+    fn wide<T: Into<i64>>(list: Vec<T>) -> Vec<i64> {
+        list.into_iter().map(Into::into).collect()
+    }
+    Some(match property {
+        Property::ListChar(list) => wide(list),
+        Property::ListUChar(list) => wide(list),
+        Property::ListShort(list) => wide(list),
+        Property::ListUShort(list) => wide(list),
+        Property::ListInt(list) => wide(list),
+        Property::ListUInt(list) => wide(list),
+        _ => return None,
+    })
+}
+
+impl Format for Ply {
+    fn name(&self) -> &'static str {
+        "PLY"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["ply"]
+    }
+
+    fn recognises(&self, beginning: &[u8]) -> bool {
+        beginning.starts_with(b"ply\n") || beginning.starts_with(b"ply\r")
+    }
+
+    fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
+        let refused = |reason| ReadError::Content { file: file.clone(), reason };
+        let ply = Parser::<Element>::new().read_ply(&mut bytes.as_slice());
+        let ply = ply.map_err(|error| {
+            // The crate's messages have several lines, with whole lines of the file.
+            let said = error.to_string();
+            let said: Vec<&str> = said.split_whitespace().take(20).collect();
+            refused(format!("this is no whole PLY file: {}", said.join(" ")))
+        })?;
+        let mut mesh = Mesh::new(file.clone());
+        let mut numbers = Vec::new();
+        for (index, vertex) in ply.payload.get("vertex").into_iter().flatten().enumerate() {
+            let [Some(x), Some(y), Some(z)] = vertex.point else {
+                return Err(refused(format!("vertex {index} does not have x, y and z")));
+            };
+            if ![x, y, z].into_iter().all(Coordinate::is_finite) {
+                return Err(refused(format!("a coordinate of vertex {index} is no finite number")));
+            }
+            numbers.push(mesh.vertex([x, y, z]));
+        }
+        for (index, face) in ply.payload.get("face").into_iter().flatten().enumerate() {
+            let Some(corners) = &face.corners else {
+                return Err(refused(format!("face {index} has no list of vertices")));
+            };
+            let number = |corner: &i64| numbers.get(usize::try_from(*corner).ok()?).copied();
+            let known: Vec<u32> = corners.iter().filter_map(number).collect();
+            if known.len() < corners.len() {
+                return Err(refused(format!("face {index} has a corner that is no vertex")));
+            }
+            mesh.face(index as u32 + 1, &known);
+        }
+        mesh.finish()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tests::sent;
+
+    const HEAD: &str = "comment a square\nelement vertex 4\nproperty float x\nproperty float y\n\
+                        property float z\nproperty uchar red\nelement face 1\n\
+                        property list uchar int vertex_indices\nend_header\n";
+
+    fn expected() -> Result<Vec<String>, String> {
+        let lines = ["v 0 0 0", "v 1.1 0 0", "v 1.1 1 0", "v 0 1 0", "f 1 2 3 4"];
+        Ok(lines.map(str::to_owned).to_vec())
+    }
+
+    #[test]
+    fn text_and_both_binary_forms_are_the_same_mesh() {
+        let text = format!(
+            "ply\nformat ascii 1.0\n{HEAD}0 0 0 255\n1.1 0 0 255\n1.1 1 0 0\n0 1 0 0\n4 0 1 2 3\n"
+        );
+        assert_eq!(sent("a.ply", text.as_bytes()), expected());
+        assert_eq!(sent("a", text.as_bytes()), expected(), "known by its beginning");
+        let vertices: [[f32; 3]; 4] =
+            [[0.0, 0.0, 0.0], [1.1, 0.0, 0.0], [1.1, 1.0, 0.0], [0.0, 1.0, 0.0]];
+        for (name, is_little) in [("binary_little_endian", true), ("binary_big_endian", false)] {
+            let mut bytes = format!("ply\nformat {name} 1.0\n{HEAD}").into_bytes();
+            let four = |bits: u32| if is_little { bits.to_le_bytes() } else { bits.to_be_bytes() };
+            for vertex in vertices {
+                bytes.extend(vertex.iter().flat_map(|number| four(number.to_bits())));
+                bytes.push(7);
+            }
+            bytes.push(4);
+            bytes.extend((0..4).flat_map(four));
+            assert_eq!(sent("a.ply", &bytes), expected(), "{name}");
+        }
+    }
+
+    #[test]
+    fn damaged_files_are_refused_in_a_sentence() {
+        let file =
+            |vertices: &str, face: &str| format!("ply\nformat ascii 1.0\n{HEAD}{vertices}{face}");
+        let vertices = "0 0 0 1\n1 0 0 1\n1 1 0 1\n0 1 0 1\n";
+        for (text, reason) in [
+            (file(vertices, ""), "this is no whole PLY file: "),
+            (file(vertices, "4 0 1 2 9\n"), "face 0 has a corner that is no vertex"),
+            (file(vertices, "4 0 1 2 -1\n"), "face 0 has a corner that is no vertex"),
+            (
+                file(&vertices.replace("1 1 0 1", "1e39 1 0 1"), "3 0 1 2\n"),
+                "vertex 2 is no finite",
+            ),
+            (
+                "ply\nformat ascii 1.0\nelement vertex 99999999999\nproperty float x\nend_header\n"
+                    .into(),
+                "no whole PLY",
+            ),
+            (
+                "ply\nformat ascii 1.0\nelement vertex 0\nproperty float x\nend_header\n".into(),
+                "no face to draw",
+            ),
+        ] {
+            let error = sent("a.ply", text.as_bytes()).expect_err("refused");
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+}

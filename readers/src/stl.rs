@@ -1,0 +1,193 @@
+//! Reads STL files, binary and text.
+//!
+//! A binary file is known by its length, because its head may begin with `solid` as a text does.
+//! Equal points become one vertex. All solids of a text are read. (The crate `stl_io` reads the
+//! first alone, and takes such a binary file for text.)
+//!
+//! The reader refuses files that end too early, and numbers that are not finite.
+
+use super::arrange::Arrangement;
+use super::error::ReadError;
+use super::format::{Contents, Format};
+use super::mesh::{Coordinate, Mesh, Point};
+use crate::lines::Origin;
+
+/// The format itself.
+#[derive(Debug)]
+pub(super) struct Stl;
+
+/// The number of bytes before the first face of a binary file, the last four of which count the
+/// faces.
+const HEAD: usize = 84;
+
+/// The number of bytes of a face in a binary file: the normal, three points, and two bytes more.
+const FACE: usize = 50;
+
+impl Format for Stl {
+    fn name(&self) -> &'static str {
+        "STL"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["stl"]
+    }
+
+    /// The file begins as a text does, because no beginning tells a binary file.
+    fn recognises(&self, beginning: &[u8]) -> bool {
+        let text = String::from_utf8_lossy(beginning);
+        let mut words = text.split_ascii_whitespace();
+        words.next() == Some("solid") && words.any(|word| word == "facet")
+    }
+
+    fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
+        let mut mesh = Mesh::new(file.clone());
+        match binary_faces(&bytes) {
+            Some(faces) => read_binary(&file, faces, &mut mesh)?,
+            None if bytes.trim_ascii_start().starts_with(b"solid") => {
+                read_text(&file, &bytes, &mut mesh)?;
+            }
+            None => {
+                let reason = "this is no whole STL file: its length does not match the number of \
+                              faces that it tells";
+                return Err(ReadError::Content { file, reason: reason.to_owned() });
+            }
+        }
+        mesh.finish()
+    }
+}
+
+/// The faces of a binary file; `None` if it is none.
+fn binary_faces(bytes: &[u8]) -> Option<&[[u8; FACE]]> {
+    let (head, faces) = bytes.split_at_checked(HEAD)?;
+    let count = u32::from_le_bytes(*head.last_chunk()?) as usize;
+    let (faces, rest) = faces.as_chunks();
+    (faces.len() == count && rest.is_empty()).then_some(faces)
+}
+
+fn read_binary(file: &str, faces: &[[u8; FACE]], mesh: &mut Mesh) -> Result<(), ReadError> {
+    for (index, face) in faces.iter().enumerate() {
+        let (numbers, _) = face.as_chunks();
+        let numbers = numbers.iter().map(|bytes| f32::from_le_bytes(*bytes));
+        // The first three are the normal, which follows from the points.
+        let points: Vec<f32> = numbers.skip(3).take(9).collect();
+        let number = index as u32 + 1;
+        if points.iter().any(|number| !number.is_finite()) {
+            let reason = format!("a coordinate of face {number} is no finite number");
+            return Err(ReadError::Content { file: file.to_owned(), reason });
+        }
+        let (points, _) = points.as_chunks();
+        let corners = points.iter().map(|point: &[f32; 3]| point.map(Coordinate::Single));
+        let corners: Vec<u32> = corners.map(|point| mesh.vertex(point)).collect();
+        mesh.face(number, &corners);
+    }
+    Ok(())
+}
+
+fn read_text(file: &str, bytes: &[u8], mesh: &mut Mesh) -> Result<(), ReadError> {
+    let text = String::from_utf8_lossy(bytes);
+    let (mut corners, mut number) = (Vec::new(), 0);
+    for (index, line) in text.lines().enumerate() {
+        let refused = |reason: &str| {
+            let text = line.chars().take(Origin::MOST_SHOWN + 1).collect();
+            let origin = Origin { file: file.to_owned(), line: index + 1, text };
+            Err(ReadError::Line { origin, reason: reason.to_owned() })
+        };
+        let mut words = line.split_ascii_whitespace();
+        let Some(word) = words.next() else { continue };
+        match word.to_ascii_lowercase().as_str() {
+            "vertex" => match point(words) {
+                Some(point) => corners.push(mesh.vertex(point)),
+                None => return refused("a vertex has three finite numbers"),
+            },
+            "endloop" | "endfacet" => {
+                if !corners.is_empty() {
+                    number += 1;
+                    mesh.face(number, &corners);
+                    corners.clear();
+                }
+            }
+            "solid" | "facet" | "outer" | "endsolid" => {}
+            _ => return refused("this is no line of an STL file"),
+        }
+    }
+    if !corners.is_empty() {
+        let reason = "the file ends within a face: is it complete?".to_owned();
+        return Err(ReadError::Content { file: file.to_owned(), reason });
+    }
+    Ok(())
+}
+
+/// The point that the words of a line tell.
+fn point<'a>(mut words: impl Iterator<Item = &'a str>) -> Option<Point> {
+    let mut number = || {
+        let number: f64 = words.next()?.parse().ok()?;
+        number.is_finite().then_some(Coordinate::Double(number))
+    };
+    let point = [number()?, number()?, number()?];
+    words.next().is_none().then_some(point)
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::tests::{notes, sent};
+
+    /// A tetrahedron as text, in two solids.
+    const TEXT: &str = "solid one part\n facet normal 0 0 -1\n  outer loop\n   vertex 0 0 0\n   \
+                        vertex 0 1.5 0\n   vertex 1 0 0\n  endloop\n endfacet\nendsolid one part\n\
+                        solid two\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1e0 0 0\n\
+                        vertex 0 0 1\nendloop\nendfacet\nendsolid\n";
+
+    fn binary(head: &str, faces: &[[[f32; 3]; 3]]) -> Vec<u8> {
+        let mut bytes = format!("{head:80}").into_bytes();
+        bytes.extend((faces.len() as u32).to_le_bytes());
+        for face in faces {
+            bytes.extend([0; 12]);
+            bytes.extend(face.as_flattened().iter().flat_map(|number| number.to_le_bytes()));
+            bytes.extend([0; 2]);
+        }
+        bytes
+    }
+
+    #[test]
+    fn all_solids_of_a_text_are_read_and_equal_points_joined() {
+        let expected =
+            ["v 0 0 0", "v 0 1.5 0", "v 1 0 0", "v 0 0 1", "f 1 2 3", "f 1 3 4"].map(str::to_owned);
+        assert_eq!(sent("a.stl", TEXT.as_bytes()), Ok(expected.to_vec()));
+        assert_eq!(sent("a", TEXT.as_bytes()), Ok(expected.to_vec()), "known by its beginning");
+    }
+
+    #[test]
+    fn a_binary_file_may_begin_as_a_text_does() {
+        let face = [[0.1, 0.0, -0.0], [1.0, 2.5, 0.0], [0.0, 0.0, 1e-7]];
+        let expected = ["v 0.1 0 0", "v 1 2.5 0", "v 0 0 0.0000001", "f 1 2 3"].map(str::to_owned);
+        for head in ["made by a program", "solid made by another"] {
+            assert_eq!(sent("a.stl", &binary(head, &[face])), Ok(expected.to_vec()), "{head}");
+        }
+    }
+
+    #[test]
+    fn a_face_without_three_corners_is_counted() {
+        let (a, b, c) = ([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
+        let bytes = binary("", &[[a, b, c], [a, a, b], [a, b, a]]);
+        let said = notes("a.stl", &bytes);
+        assert_eq!(said, ["2 faces are not drawn, for want of three different corners"]);
+    }
+
+    #[test]
+    fn damaged_files_are_refused_with_the_place() {
+        let short = binary("", &[[[0.0; 3], [1.0; 3], [2.0; 3]]]);
+        for (bytes, reason) in [
+            (&short[..short.len() - 1], "a.stl: this is no whole STL file"),
+            (b"", "a.stl: this is no whole STL file"),
+            (&binary("", &[[[f32::NAN; 3], [1.0; 3], [2.0; 3]]]), "face 1 is no finite number"),
+            (&binary("", &[]), "a.stl: there is no face to draw"),
+            (b"solid\nfacet normal 0 0 1\nouter loop\nvertex 1 2\n", "a.stl:4: a vertex has three"),
+            (b"solid\nfacet\nvertex 1 2 inf\n", "a.stl:3: a vertex has three finite numbers"),
+            (b"solid\nvertex 1 2 3\n", "a.stl: the file ends within a face"),
+            (b"solid\nbanana\n", "a.stl:2: this is no line of an STL file"),
+        ] {
+            let error = sent("a.stl", bytes).expect_err("refused");
+            assert!(error.contains(reason), "{error}");
+        }
+    }
+}

@@ -1,0 +1,161 @@
+//! Reads SVG files as plans: what they show is drawn at true size, at its place on the page.
+//!
+//! `usvg` resolves styles, units (96 pixels in an inch), the viewBox, references and transforms.
+//! [`flatten`] makes polylines of the paths, [`clip`] cuts them at the page and at clip paths,
+//! [`pens`] chooses pens by layers or colours, and [`Plan`] writes the lines that are sent.
+//!
+//! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
+//! a shape that is only filled is drawn as its outline. What has neither is not drawn. Text,
+//! images, masks, filters and clip paths that are not convex are counted, and the user is told.
+//!
+//! The reader refuses files that are no SVG, have nothing to draw, or have more points than fit in
+//! memory.
+
+mod clip;
+mod drawing;
+mod flatten;
+mod markup;
+mod pens;
+
+use super::arrange::Arrangement;
+use super::counted;
+use super::error::ReadError;
+use super::format::{Contents, Format};
+use super::plan::{Area, Plan};
+use crate::page::Page;
+use drawing::{Drawing, PIXEL};
+use markup::Markup;
+use usvg::roxmltree::Error as XmlError;
+use usvg::{Error, ImageHrefResolver, Options, Tree};
+
+/// The format itself.
+#[derive(Debug)]
+pub(super) struct Svg;
+
+impl Format for Svg {
+    fn name(&self) -> &'static str {
+        "SVG"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["svg"]
+    }
+
+    /// `usvg` takes 1024 nested elements, for each of which it calls itself several times.
+    fn nests(&self) -> bool {
+        true
+    }
+
+    /// The file begins with a tag, and one of its first is `svg`.
+    fn recognises(&self, beginning: &[u8]) -> bool {
+        let text = beginning.strip_prefix(b"\xEF\xBB\xBF").unwrap_or(beginning).trim_ascii_start();
+        text.starts_with(b"<") && beginning.windows(4).any(|letters| letters == b"<svg")
+    }
+
+    fn read(
+        &self,
+        file: String,
+        bytes: Vec<u8>,
+        arrangement: &Arrangement,
+    ) -> Result<Contents, ReadError> {
+        if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
+            return Err(ReadError::Utf16 { file });
+        }
+        let refused = |reason: String| ReadError::Content { file: file.clone(), reason };
+        if bytes.starts_with(b"\x1F\x8B") {
+            return Err(refused("this SVG is compressed: unpack it with gunzip first".to_owned()));
+        }
+        let text = String::from_utf8(bytes);
+        let text = text.map_err(|_| refused("this is not UTF-8 text: save it as UTF-8".into()))?;
+        let text = text.strip_prefix('\u{FEFF}').unwrap_or(&text);
+        contents(&file, text, arrangement).map_err(refused)
+    }
+}
+
+/// Reads `text`, the contents of `file`.
+///
+/// # Errors
+/// The reason why it is not drawn, as a sentence.
+fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Contents, String> {
+    let not_xml = |error| format!("this is not a well-formed SVG: {error}");
+    let text = markup::with_ids(text, &markup::parsed(text).map_err(not_xml)?);
+    let document = markup::parsed(&text).map_err(not_xml)?;
+    let options = Options {
+        // Neither is an image drawn, nor any other file read.
+        image_href_resolver: ImageHrefResolver {
+            resolve_data: Box::new(|_, _, _| None),
+            resolve_string: Box::new(|_, _| None),
+        },
+        ..Options::default()
+    };
+    let tree = Tree::from_xmltree(&document, &options).map_err(|error| match error {
+        Error::InvalidSize => "the SVG has no size: width and height must be above 0".to_owned(),
+        Error::ElementsLimitReached | Error::ParsingFailed(XmlError::NodesLimitReached) => {
+            "the SVG has too many elements, or they are nested too deeply".to_owned()
+        }
+        error => format!("this is not a well-formed SVG: {error}"),
+    })?;
+    let size = [tree.size().width(), tree.size().height()];
+    // What single precision adds to a length in mm is rounded away.
+    let size = size.map(|size| (f64::from(size) * PIXEL * 1000.0).round() / 1000.0);
+    let page = Page { width: size[0], height: size[1] };
+    let markup = Markup::new(&document);
+    let with_areas = arrangement.hatch.is_some();
+    let drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
+        "the SVG has too many points, or a curve of kilometres: leave it out".to_owned()
+    })?;
+    let mut plan = Plan::new(file.to_owned());
+    let mut areas = Vec::new();
+    let marks: Vec<_> = drawing.shapes.iter().map(|shape| shape.marks.clone()).collect();
+    let chosen = pens::pens(&marks);
+    for (shape, &(pen, layer)) in drawing.shapes.iter().zip(&chosen.of_paths) {
+        let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
+        plan.begin(line, text);
+        for polyline in &shape.polylines {
+            plan.draw_on(polyline.points.iter().map(|it| [it.x, it.y]), Some(size), pen, layer);
+        }
+        if !shape.outlines.is_empty() {
+            let (outlines, element) = (shape.outlines.clone(), plan.element());
+            areas.push(Area { outlines, pen, layer, element });
+        }
+    }
+    plan.layers = chosen.layers;
+    plan.areas = Some(areas);
+    let mut notes = markup.left_out(&drawing.seen);
+    notes.extend(not_as_it_is(&drawing));
+    if plan.is_empty() {
+        let mut reasons = vec!["there is nothing to draw in this SVG".to_owned()];
+        if drawing.invisible > 0 {
+            let counted = counted(drawing.invisible, ["path has", "paths have"]);
+            reasons.push(format!("{counted} neither a stroke nor a fill that is seen"));
+        }
+        reasons.extend(notes);
+        return Err(reasons.join("; "));
+    }
+    Ok(plan.contents(Some(page), notes))
+}
+
+/// What is drawn otherwise than the file says, in sentences for the user.
+fn not_as_it_is(drawing: &Drawing<'_, '_>) -> impl Iterator<Item = String> {
+    [
+        (
+            drawing.cut,
+            ["path reaches", "paths reach"],
+            "beyond the page of the SVG: the rest is cut off",
+        ),
+        (
+            drawing.clips,
+            ["clip path is", "clip paths are"],
+            "not applied, because only one convex shape can clip: what it hides is drawn",
+        ),
+        (drawing.masks, ["mask is", "masks are"], "not applied: what it hides is drawn"),
+        (drawing.filters, ["filter is", "filters are"], "not applied"),
+        (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
+    ]
+    .into_iter()
+    .filter(|(number, _, _)| *number > 0)
+    .map(|(number, noun, what)| format!("{} {what}", counted(number, noun)))
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,254 @@
+//! What the XML of an SVG says and `usvg` does not tell: layers, and what is not drawn.
+//!
+//! `usvg` keeps nothing of an element but its `id`. So every group and shape without one is given
+//! an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
+
+use super::flatten::Arcs;
+use super::pens::Layer;
+use std::collections::{HashMap, HashSet};
+use usvg::roxmltree::{Document, Error, Node, NodeId, ParsingOptions};
+
+/// The elements that are drawn as paths.
+const SHAPES: [&str; 7] = ["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"];
+
+/// The elements whose contents are drawn only where something refers to them, or never.
+const NOT_DRAWN: [&str; 11] = [
+    "defs",
+    "symbol",
+    "clipPath",
+    "mask",
+    "pattern",
+    "marker",
+    "linearGradient",
+    "radialGradient",
+    "filter",
+    "switch",
+    "metadata",
+];
+
+const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
+
+/// Parses the text of an SVG.
+///
+/// # Errors
+/// The text is not well-formed XML.
+pub(super) fn parsed(text: &str) -> Result<Document<'_>, Error> {
+    Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..Default::default() })
+}
+
+/// Whether `node` is an element of SVG with one of these names.
+fn is_one_of(node: Node<'_, '_>, names: &[&str]) -> bool {
+    let namespace = node.tag_name().namespace();
+    node.is_element()
+        && matches!(namespace, None | Some("http://www.w3.org/2000/svg"))
+        && names.contains(&node.tag_name().name())
+}
+
+/// A copy of `text` in which every group, reference and shape has an `id`.
+pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
+    let own: HashSet<&str> =
+        document.descendants().filter_map(|node| node.attribute("id")).collect();
+    let mut copy = String::with_capacity(text.len() + text.len() / 4);
+    let (mut copied, mut number) = (0, 0_u32);
+    for node in document.descendants() {
+        let is_traced = is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg"]);
+        if !is_traced || node.attribute("id").is_some() || node.parent_element().is_none() {
+            continue;
+        }
+        // The name of an element ends at a space, a slash or an angle bracket. The contents of an
+        // entity lie elsewhere in the text, and perhaps not in order.
+        let start = node.range().start;
+        let Some(rest) = text.get(start + 1..).filter(|_| start >= copied) else { continue };
+        let is_end = |letter: char| letter.is_whitespace() || matches!(letter, '/' | '>');
+        let Some(name) = rest.find(is_end) else { continue };
+        let end = start + 1 + name;
+        let id = loop {
+            number += 1;
+            let id = format!("penup-{number}");
+            if !own.contains(id.as_str()) {
+                break id;
+            }
+        };
+        copy.push_str(text.get(copied..end).unwrap_or_default());
+        copy.push_str(&format!(" id=\"{id}\""));
+        copied = end;
+    }
+    copy.push_str(text.get(copied..).unwrap_or_default());
+    copy
+}
+
+/// The elements of an SVG in which every group and shape has an `id`.
+#[derive(Debug)]
+pub(super) struct Markup<'a, 'input> {
+    document: &'a Document<'input>,
+    /// The elements by their `id`; `None` for an `id` that several have.
+    by_id: HashMap<&'a str, Option<NodeId>>,
+    /// The positions of the line ends in the text.
+    line_ends: Vec<usize>,
+}
+
+impl<'a, 'input> Markup<'a, 'input> {
+    pub(super) fn new(document: &'a Document<'input>) -> Self {
+        let mut by_id = HashMap::new();
+        for node in document.descendants() {
+            if let Some(id) = node.attribute("id") {
+                by_id.entry(id).and_modify(|known| *known = None).or_insert(Some(node.id()));
+            }
+        }
+        let text = document.input_text();
+        let line_ends = text.match_indices('\n').map(|(at, _)| at).collect();
+        Self { document, by_id, line_ends }
+    }
+
+    /// The element with this `id`; `None` if it is empty, unknown, or several have it.
+    pub(super) fn element(&self, id: &str) -> Option<NodeId> {
+        self.by_id.get(id).copied().flatten()
+    }
+
+    fn node(&self, element: NodeId) -> Option<Node<'a, 'input>> {
+        self.document.get_node(element)
+    }
+
+    /// The number of the line in which an element begins, and the text of that element up to its
+    /// end or the end of the line.
+    pub(super) fn position(&self, element: NodeId) -> (usize, String) {
+        let Some(node) = self.node(element) else { return (1, String::new()) };
+        let start = node.range().start;
+        let text = self.document.input_text().get(start..).unwrap_or_default();
+        let end = text.find(['>', '\n']).map_or(text.len(), |end| end + 1);
+        let shown: String = text.get(..end).unwrap_or_default().chars().take(200).collect();
+        // The ids that this program adds are not the user's.
+        let shown = match (shown.find(" id=\"penup-"), shown.split(" id=\"penup-").nth(1)) {
+            (Some(from), Some(rest)) => {
+                let rest = rest.split_once('"').map_or("", |(_, rest)| rest);
+                format!("{}{rest}", shown.get(..from).unwrap_or_default())
+            }
+            _ => shown,
+        };
+        (self.line_ends.partition_point(|end| *end < start) + 1, shown.trim().to_owned())
+    }
+
+    /// Which Béziers of this element's path are arcs.
+    pub(super) fn arcs(&self, element: Option<NodeId>) -> Arcs {
+        let Some(node) = element.and_then(|element| self.node(element)) else {
+            return Arcs::Quarters;
+        };
+        let has_arcs = match node.tag_name().name() {
+            "circle" | "ellipse" | "rect" => true,
+            "path" => node.attribute("d").is_some_and(|data| data.contains(['a', 'A'])),
+            _ => false,
+        };
+        if has_arcs { Arcs::Any } else { Arcs::None }
+    }
+
+    /// The outermost layer that contains this element: a layer of Inkscape, or else a group right
+    /// below the root that has a label or a number in its `id`.
+    pub(super) fn layer(&self, element: NodeId) -> Option<Layer> {
+        let groups = self.node(element)?.ancestors().filter(|node| is_one_of(*node, &["g"]));
+        let layer = groups.filter(|node| is_layer(*node)).last()?;
+        let name = layer.attribute((INKSCAPE, "label")).or(layer.attribute("id"));
+        Some(Layer { element: layer.id(), name: name.unwrap_or_default().to_owned() })
+    }
+
+    /// Counts what the file has that is never drawn, in sentences for the user. `drawn` are the
+    /// elements that were found in the drawing.
+    pub(super) fn left_out(&self, drawn: &HashSet<NodeId>) -> Vec<String> {
+        let mut texts = Count::default();
+        let mut images = Count::default();
+        let mut foreign = Count::default();
+        let mut broken = Count::default();
+        let mut missing = Count::default();
+        for node in self.document.descendants() {
+            if !node.is_element() || is_within(node, &["clipPath", "mask", "pattern"]) {
+                continue;
+            }
+            let counted = if is_one_of(node, &["text"]) {
+                &mut texts
+            } else if is_one_of(node, &["image"]) {
+                &mut images
+            } else if is_one_of(node, &["foreignObject"]) && !is_within(node, &["switch"]) {
+                &mut foreign
+            } else if is_one_of(node, &["path"]) && has_error(node) {
+                &mut broken
+            } else if (is_one_of(node, &SHAPES) || is_one_of(node, &["use"]))
+                && !is_within(node, &NOT_DRAWN)
+                && node.attribute("id").is_some_and(|id| self.element(id).is_some())
+                && !drawn.contains(&node.id())
+            {
+                &mut missing
+            } else {
+                continue;
+            };
+            if !is_hidden(node) {
+                counted.add(self.document, node);
+            }
+        }
+        let mut said = Vec::new();
+        texts.say(&mut said, ["text is", "texts are"], "not read: convert text to paths");
+        images.say(&mut said, ["image is", "images are"], "not drawn");
+        let what = "not drawn: it is not SVG";
+        foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
+        let what = "not drawn as a whole: there is an error in the data, and the rest is left out";
+        broken.say(&mut said, ["path is", "paths are"], what);
+        let what = "not drawn: hidden, or without a size or points, or a reference to nothing";
+        missing.say(&mut said, ["element is", "elements are"], what);
+        said
+    }
+}
+
+/// How many elements of one kind there are, and in which line the first one begins.
+#[derive(Debug, Default)]
+struct Count {
+    number: usize,
+    line: u32,
+}
+
+impl Count {
+    fn add(&mut self, document: &Document<'_>, node: Node<'_, '_>) {
+        if self.number == 0 {
+            // Only once for each kind, because the position is counted from the beginning.
+            self.line = document.text_pos_at(node.range().start).row;
+        }
+        self.number += 1;
+    }
+
+    fn say(&self, said: &mut Vec<String>, [one, many]: [&str; 2], what: &str) {
+        let Self { number, line } = self;
+        match number {
+            0 => {}
+            1 => said.push(format!("1 {one} {what} (line {line})")),
+            _ => said.push(format!("{number} {many} {what} (the first in line {line})")),
+        }
+    }
+}
+
+fn is_within(node: Node<'_, '_>, names: &[&str]) -> bool {
+    node.ancestors().skip(1).any(|node| is_one_of(node, names))
+}
+
+/// Whether the path data of `node` has an error, at which the path ends.
+fn has_error(node: Node<'_, '_>) -> bool {
+    let data = node.attribute("d").unwrap_or_default();
+    data.trim() != "none" && svgtypes::PathParser::from(data).any(|segment| segment.is_err())
+}
+
+/// Whether the element or one that contains it says by itself that it is not shown.
+fn is_hidden(node: Node<'_, '_>) -> bool {
+    node.ancestors().any(|node| {
+        let says = |name: &str, value: &str| {
+            let style = node.attribute("style").unwrap_or_default().split(';');
+            let mut style = style.filter_map(|property| property.split_once(':'));
+            node.attribute(name).is_some_and(|own| own.trim() == value)
+                || style.any(|(own, own_value)| own.trim() == name && own_value.trim() == value)
+        };
+        says("display", "none") || says("visibility", "hidden")
+    })
+}
+
+fn is_layer(group: Node<'_, '_>) -> bool {
+    let is_on_top = group.parent_element().is_some_and(|parent| parent.parent_element().is_none());
+    let has_label = group.attribute((INKSCAPE, "label")).is_some();
+    let numbered = |id: &str| super::pens::number_in(id).is_some() && !id.starts_with("penup-");
+    group.attribute((INKSCAPE, "groupmode")) == Some("layer")
+        || is_on_top && (has_label || group.attribute("id").is_some_and(numbered))
+}

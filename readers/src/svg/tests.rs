@@ -1,0 +1,383 @@
+//! Tests of what an SVG draws: the lines that are sent are compared with the SVG's own geometry.
+
+use super::*;
+use crate::SourceFile;
+use crate::lines::Lines as _;
+use kurbo::Point;
+use penup::protocol::LINE_LIMIT;
+use std::collections::BTreeSet;
+use std::fmt::Write as _;
+
+/// A polyline that is sent, in mm, and the name of its pen.
+type Sent = (String, Vec<[f64; 2]>);
+
+fn read(svg: &str) -> Result<SourceFile, String> {
+    let read = SourceFile::new("a.svg".to_owned(), svg.as_bytes().to_vec());
+    read.map_err(|error| error.to_string())
+}
+
+/// The polylines that `contents` sends.
+fn polylines(contents: &SourceFile) -> Vec<Sent> {
+    let (mut vertices, mut pen) = (Vec::new(), String::new());
+    let mut sent: Vec<Sent> = Vec::new();
+    let mut is_continued = false;
+    for line in contents.in_order() {
+        let mut words = line.sent.split(' ');
+        let keyword = words.next();
+        let number = |word: &str| word.parse::<f64>().expect("a number");
+        match keyword {
+            Some("v") => {
+                let [x, y, z] = words.map(number).collect::<Vec<_>>().try_into().expect("three");
+                assert_eq!(z, 0.0);
+                vertices.push([x, y]);
+            }
+            Some("usemtl") => pen = words.next().expect("a name").to_owned(),
+            Some("l") => {
+                let vertex = |word| vertices[number(word) as usize - 1];
+                let positions: Vec<[f64; 2]> = words.map(vertex).collect();
+                match sent.last_mut() {
+                    // A long polyline is sent as several lines.
+                    Some((_, last)) if is_continued => {
+                        assert_eq!(last.last(), positions.first());
+                        last.extend(&positions[1..]);
+                    }
+                    _ => sent.push((pen.clone(), positions)),
+                }
+            }
+            other => panic!("{other:?}"),
+        }
+        is_continued = keyword == Some("l") && line.sent.len() > LINE_LIMIT - 6;
+    }
+    sent
+}
+
+/// An SVG whose pixel is a millimetre, on a page of 100 mm x 100 mm.
+fn in_mm(contents: &str) -> String {
+    format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' xmlns:xlink='http://www.w3.org/1999/xlink' \
+         xmlns:inkscape='http://www.inkscape.org/namespaces/inkscape' \
+         width='100mm' height='100mm' viewBox='0 0 100 100'>{contents}</svg>"
+    )
+}
+
+fn drawn(svg: &str) -> Vec<Sent> {
+    polylines(&read(svg).expect("an SVG"))
+}
+
+/// The polylines without their pens.
+fn positions(svg: &str) -> Vec<Vec<[f64; 2]>> {
+    drawn(svg).into_iter().map(|(_, positions)| positions).collect()
+}
+
+fn distance_to(positions: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+    let to_segment = |pair: &[[f64; 2]]| {
+        let line = kurbo::Line::new((pair[0][0], pair[0][1]), (pair[1][0], pair[1][1]));
+        kurbo::ParamCurveNearest::nearest(&line, Point::new(x, y), 1e-9).distance_sq.sqrt()
+    };
+    positions.windows(2).map(to_segment).fold(f64::INFINITY, f64::min)
+}
+
+/// Half a motor step in mm.
+const HALF_A_STEP: f64 = 1.0 / 160.0;
+
+/// Checks that `svg` draws one polyline within half a motor step of `curve`, which is asked for
+/// parameters from 0 to 1.
+fn follows(svg: &str, curve: impl Fn(f64) -> [f64; 2]) -> usize {
+    let all = positions(svg);
+    let [polyline] = all.as_slice() else { panic!("{all:?}") };
+    let samples: Vec<[f64; 2]> = (0..=20_000).map(|at| curve(f64::from(at) / 20_000.0)).collect();
+    for sample in samples.iter().step_by(7) {
+        assert!(distance_to(polyline, *sample) <= HALF_A_STEP, "{sample:?}");
+    }
+    for position in polyline {
+        assert!(distance_to(&samples, *position) <= 0.001, "{position:?}");
+    }
+    polyline.len()
+}
+
+#[test]
+fn lines_have_their_place_with_y_upward() {
+    let svg = in_mm("<path d='M10 20 H30 V50' stroke='red' fill='none'/><line x2='5' y2='5'/>");
+    assert_eq!(
+        drawn(&svg),
+        [
+            ("pen1".to_owned(), vec![[10.0, 80.0], [30.0, 80.0], [30.0, 50.0]]),
+            ("pen2".to_owned(), vec![[0.0, 100.0], [5.0, 95.0]]),
+        ]
+    );
+}
+
+#[test]
+fn units_and_the_view_box_give_true_size() {
+    for (size, page, scale) in [
+        ("width='96' height='192'", [25.4, 50.8], 25.4 / 96.0),
+        ("width='2in' height='1in'", [50.8, 25.4], 25.4 / 96.0),
+        ("width='72pt' height='6pc'", [25.4, 25.4], 25.4 / 96.0),
+        ("width='10cm' height='5cm' viewBox='0 0 1000 500'", [100.0, 50.0], 0.1),
+        ("viewBox='0 0 96 96'", [25.4, 25.4], 25.4 / 96.0),
+        ("width='50mm' viewBox='0 0 100 200'", [50.0, 100.0], 0.5),
+    ] {
+        let svg =
+            format!("<svg xmlns='http://www.w3.org/2000/svg' {size}><path d='M0 0L20 10'/></svg>");
+        let contents = read(&svg).expect("an SVG");
+        let Page { width, height } = contents.page().expect("a page");
+        assert_eq!([width, height], page, "{size}");
+        let sent = polylines(&contents);
+        let expected = [[0.0, height], [20.0 * scale, height - 10.0 * scale]];
+        for (position, expected) in sent[0].1.iter().zip(expected) {
+            assert!((position[0] - expected[0]).abs() < 6e-4, "{size}: {position:?}");
+            assert!((position[1] - expected[1]).abs() < 6e-4, "{size}: {position:?}");
+        }
+    }
+    // The picture keeps its proportions in the middle of the page.
+    let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='100mm' height='50mm' \
+               viewBox='-10 -10 20 20'><path d='M-10 -10L10 10'/></svg>";
+    assert_eq!(positions(svg), [[[25.0, 50.0], [75.0, 0.0]]]);
+}
+
+#[test]
+fn circles_and_arcs_are_followed_to_half_a_step() {
+    let circle = |radius: f64| {
+        move |at: f64| {
+            let (sine, cosine) = (at * std::f64::consts::TAU).sin_cos();
+            [50.0 + radius * cosine, 50.0 + radius * sine]
+        }
+    };
+    let points = follows(&in_mm("<circle cx='50' cy='50' r='50'/>"), circle(50.0));
+    // 199 chords would be off by half a step; rounding takes a part of that.
+    assert!((199..240).contains(&points), "{points}");
+    let arcs = "<path d='M90 50A40 40 0 0 1 10 50A40 40 0 0 1 90 50Z'/>";
+    follows(&in_mm(arcs), circle(40.0));
+    follows(&in_mm("<circle cx='.5' cy='.5' r='.4' transform='scale(100)'/>"), circle(40.0));
+    let used = "<defs><circle id='c' r='40'/></defs><use href='#c' x='50' y='50'/>";
+    follows(&in_mm(used), circle(40.0));
+    follows(&in_mm("<ellipse cx='50' cy='50' rx='45' ry='10'/>"), |at| {
+        let (sine, cosine) = (at * std::f64::consts::TAU).sin_cos();
+        [50.0 + 45.0 * cosine, 50.0 + 10.0 * sine]
+    });
+}
+
+#[test]
+fn beziers_are_followed_to_half_a_step() {
+    let points =
+        follows(&in_mm("<path d='M10 10C100 20 0 80 90 90' fill='none' stroke='red'/>"), |t| {
+            let u = 1.0 - t;
+            let at = |a: [f64; 4]| {
+                a[0] * u * u * u + 3.0 * (a[1] * u * u * t + a[2] * u * t * t) + a[3] * t * t * t
+            };
+            [at([10.0, 100.0, 0.0, 90.0]), 100.0 - at([10.0, 20.0, 80.0, 90.0])]
+        });
+    assert!(points < 110, "{points}");
+    follows(&in_mm("<path d='M10 10Q90 10 90 90'/>"), |t| {
+        let u = 1.0 - t;
+        let at = |a: [f64; 3]| a[0] * u * u + 2.0 * a[1] * u * t + a[2] * t * t;
+        [at([10.0, 90.0, 90.0]), 100.0 - at([10.0, 10.0, 90.0])]
+    });
+}
+
+#[test]
+fn many_short_lines_become_few() {
+    let mut data = String::from("M10 50");
+    for step in 1..=4000 {
+        let _ = write!(data, "L{} {}", 10.0 + f64::from(step) / 50.0, 50.0 + 1e-3);
+    }
+    let sent = positions(&in_mm(&format!("<path d='{data}'/>")));
+    assert_eq!(sent.len(), 1);
+    assert!(sent[0].len() < 4, "{sent:?}");
+    // A line that turns back keeps its end.
+    let back = positions(&in_mm("<path d='M10 50H60H20'/>"));
+    assert_eq!(back, [[[10.0, 50.0], [60.0, 50.0], [20.0, 50.0]]]);
+}
+
+#[test]
+fn transforms_are_nested_and_references_are_followed() {
+    let svg = in_mm(
+        "<g transform='translate(50 50)'><g transform='rotate(90)'><g transform='scale(2 3)'>\
+         <path d='M0 0H10V10' /></g></g></g>\
+         <defs><path id='a' d='M0 0H10'/></defs><use xlink:href='#a' x='5' y='6'/>\
+         <symbol id='s' viewBox='0 0 10 10'><path d='M0 0L10 10'/></symbol>\
+         <use href='#s' x='10' y='10' width='20' height='20'/>",
+    );
+    assert_eq!(
+        positions(&svg),
+        [
+            vec![[50.0, 50.0], [50.0, 30.0], [20.0, 30.0]],
+            vec![[5.0, 94.0], [15.0, 94.0]],
+            vec![[10.0, 90.0], [30.0, 70.0]],
+        ]
+    );
+}
+
+#[test]
+fn what_is_outside_of_the_page_or_of_a_convex_clip_path_is_cut_off() {
+    let contents = read(&in_mm("<path d='M-10 50H110'/><path d='M200 0h9'/>")).expect("an SVG");
+    assert_eq!(polylines(&contents)[0].1, [[0.0, 50.0], [100.0, 50.0]]);
+    assert_eq!(contents.notes(), ["2 paths reach beyond the page of the SVG: the rest is cut off"]);
+    let clipped = in_mm(
+        "<clipPath id='c'><rect x='20' y='20' width='10' height='10'/></clipPath>\
+         <g clip-path='url(#c)'><path d='M0 25H100'/></g>",
+    );
+    let contents = read(&clipped).expect("an SVG");
+    assert_eq!(polylines(&contents)[0].1, [[20.0, 75.0], [30.0, 75.0]]);
+    assert!(contents.notes().is_empty(), "{:?}", contents.notes());
+    let dented = clipped
+        .replace("<rect x='20' y='20' width='10' height='10'/>", "<path d='M0 0H50V50L40 10Z'/>");
+    let contents = read(&dented).expect("an SVG");
+    assert!(
+        contents.notes()[0].starts_with("1 clip path is not applied"),
+        "{:?}",
+        contents.notes()
+    );
+}
+
+#[test]
+fn strokes_are_dashed_and_shapes_without_a_stroke_have_outlines() {
+    let dashed = "<path d='M10 50H30' stroke='red' stroke-dasharray='5 3'/>";
+    assert_eq!(
+        positions(&in_mm(dashed)),
+        [[[10.0, 50.0], [15.0, 50.0]], [[18.0, 50.0], [23.0, 50.0]], [[26.0, 50.0], [30.0, 50.0]]]
+    );
+    let shapes = "<rect x='10' y='10' width='5' height='5'/>\
+                  <path d='M0 0H9' fill='none'/><path d='M0 0H9' style='display:none'/>\
+                  <g visibility='hidden'><path d='M0 0H9'/></g>\
+                  <g opacity='0'><path d='M0 0H9'/></g>";
+    let contents = read(&in_mm(shapes)).expect("an SVG");
+    assert_eq!(
+        polylines(&contents)[0].1,
+        [[10.0, 90.0], [15.0, 90.0], [15.0, 85.0], [10.0, 85.0], [10.0, 90.0]]
+    );
+    assert_eq!(polylines(&contents).len(), 1);
+    assert!(contents.notes().is_empty(), "{:?}", contents.notes());
+}
+
+fn used_pens(svg: &str) -> Vec<String> {
+    drawn(svg).into_iter().map(|(pen, _)| pen).collect()
+}
+
+#[test]
+fn layers_choose_pens_or_else_colours_do() {
+    let layer = |label: &str, contents: &str| {
+        format!("<g inkscape:groupmode='layer' inkscape:label='{label}'>{contents}</g>")
+    };
+    let red = "<path d='M0 0H9' stroke='red'/>";
+    let blue = "<path d='M0 5H9' stroke='blue'/>";
+    let two = [layer("2 red", red), layer("outline", blue), layer("pen5", red)].concat();
+    assert_eq!(used_pens(&in_mm(&two)), ["pen2", "pen1", "pen5"]);
+    // A layer within a layer belongs to the outer one, and a reference to where it stands.
+    let shared = "<defs><path id='p' d='M0 9H9'/></defs>";
+    let nested = layer("1", &layer("4", red)) + &layer("3", "<g><use href='#p'/></g>") + shared;
+    assert_eq!(used_pens(&in_mm(&nested)), ["pen1", "pen3"]);
+    // One layer says nothing where there are colours.
+    let one = layer("Layer 1", &format!("{blue}{red}{blue}"));
+    assert_eq!(used_pens(&in_mm(&one)), ["pen1", "pen2", "pen1"]);
+    assert_eq!(used_pens(&in_mm(&layer("pen7", red))), ["pen7"]);
+    let styled = "<style>.a{stroke:#00f}</style><path class='a' d='M0 5H9'/>".to_owned() + red;
+    assert_eq!(used_pens(&in_mm(&styled)), ["pen1", "pen2"]);
+    let groups = format!("<g id='layer3'>{red}</g><g id='pen_4'>{red}</g>");
+    assert_eq!(used_pens(&in_mm(&groups)), ["pen3", "pen4"]);
+}
+
+#[test]
+fn what_is_not_drawn_is_counted() {
+    let svg = in_mm(
+        "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
+         <image href='a.png' width='9' height='9'/>\
+         \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
+         <mask id='m'><rect width='5' height='5' fill='#fff'/></mask>\
+         <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
+    );
+    assert_eq!(
+        read(&svg).expect("an SVG").notes(),
+        [
+            "2 texts are not read: convert text to paths (the first in line 2)",
+            "1 image is not drawn (line 3)",
+            "1 path is not drawn as a whole: there is an error in the data, and the rest is left \
+             out (line 4)",
+            "2 elements are not drawn: hidden, or without a size or points, or a reference to \
+             nothing (the first in line 5)",
+            "1 mask is not applied: what it hides is drawn",
+            "1 line is not drawn, because a dot has no length",
+        ]
+    );
+}
+
+#[test]
+fn each_line_cites_its_element() {
+    let svg = in_mm("\n<g>\n<path\n d='M0 0H9'/></g>");
+    let contents = read(&svg).expect("an SVG");
+    let origins: BTreeSet<(usize, String)> = (contents.in_order().filter_map(|line| line.origin))
+        .map(|origin| (origin.line, origin.text))
+        .collect();
+    assert_eq!(origins, BTreeSet::from([(3, "<path".to_owned())]));
+    let svg = in_mm("<circle id='a' cx='9' cy='9' r='9'/>\n<circle cx='9' cy='9' r='5'/>");
+    let contents = read(&svg).expect("an SVG");
+    let last = contents.line(contents.count() - 1).and_then(|line| line.origin);
+    let last = last.expect("an origin");
+    assert_eq!((last.line, last.text.as_str()), (2, "<circle cx='9' cy='9' r='5'/>"));
+}
+
+#[test]
+fn every_line_is_one_that_a_plotter_takes() {
+    let mut data = String::from("M0 0");
+    for step in 0..2000 {
+        let _ = write!(data, "L{} {}", step * 37 % 91, step * 53 % 97);
+    }
+    let contents = read(&in_mm(&format!("<path d='{data}'/>"))).expect("an SVG");
+    for line in contents.in_order() {
+        assert!(line.sent.len() <= LINE_LIMIT, "{}", line.sent);
+        assert!(penup::protocol::Command::parse(&line.sent).is_ok(), "{}", line.sent);
+    }
+    let sent = polylines(&contents);
+    assert_eq!(sent.len(), 1);
+    assert!(sent[0].1.len() > 1900);
+}
+
+#[test]
+fn a_large_drawing_says_how_many_points_it_has() {
+    let line = |number: i32| format!("M{} {}h.01", number % 90, number / 90);
+    let data: String = (0..2500).map(line).collect();
+    let contents = read(&in_mm(&format!("<path d='{data}'/>"))).expect("an SVG");
+    let notes = contents.notes();
+    let [note] = notes else { panic!("{notes:?}") };
+    assert!(note.starts_with("the drawing has 5000 points, and lm3s6965 takes 1000"), "{note}");
+}
+
+#[test]
+fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
+    let deep = |depth: usize| {
+        in_mm(&format!("{}<path d='M0 0H9'/>{}", "<g>".repeat(depth), "</g>".repeat(depth)))
+    };
+    // As deep as `usvg` goes, a file needs more stack than a test has.
+    let deepest = deep(900);
+    let reader = std::thread::Builder::new().stack_size(256 << 20);
+    let reader = reader.spawn(move || positions(&deepest).len()).expect("a thread");
+    assert_eq!(reader.join().expect("no panic"), 1);
+    let numbers = "<path d='M0 0L1e38 1e38'/><circle r='NaN'/><path d='M-1e39 0L1e300 5'/>";
+    let huge = "<svg xmlns='http://www.w3.org/2000/svg' width='1e38' height='1e38'>\
+                <path d='M0 0H1e30V9'/></svg>";
+    for (svg, reason) in [
+        (String::new(), "this is not a well-formed SVG"),
+        ("<svg".to_owned(), "this is not a well-formed SVG"),
+        ("<html/>".to_owned(), "this is not a well-formed SVG"),
+        (in_mm(""), "there is nothing to draw in this SVG"),
+        (in_mm("<text>a</text>"), "nothing to draw in this SVG; 1 text is not read"),
+        (in_mm("<path fill='none' d='M0 0H9'/>"), "1 path has neither a stroke nor a fill"),
+        (in_mm("").replace("100mm", "0"), "the SVG has no size"),
+        (in_mm("").replace("100mm", "NaN"), "nothing to draw"),
+        (deep(5000), "nested too deeply"),
+        (in_mm("<circle r='1e30'/>"), "a curve of kilometres"),
+        (in_mm("<path d='M0 0C1e30 0 0 1e30 9 9'/>"), "a curve of kilometres"),
+        (in_mm("<g id='a'><use href='#a'/></g>"), "nothing to draw"),
+    ] {
+        let error = read(&svg).map(|contents| polylines(&contents)).expect_err(&svg);
+        assert!(error.starts_with("a.svg: ") && error.contains(reason), "{error}");
+    }
+    // Whatever these draw, they neither panic nor take long.
+    for svg in [in_mm(numbers), huge.to_owned()] {
+        let _ = read(&svg);
+    }
+    let error = SourceFile::new("a.svg".to_owned(), vec![0x1F, 0x8B, 8]).expect_err("compressed");
+    assert!(error.to_string().contains("gunzip"), "{error}");
+    let error = SourceFile::new("a.svg".to_owned(), b"<svg>\xFF".to_vec()).expect_err("no text");
+    assert!(error.to_string().contains("UTF-8"), "{error}");
+}

@@ -1,0 +1,67 @@
+//! Tests of how the format of a file is found.
+
+use super::*;
+
+/// Reads a file with this name and content; returns the number of its lines, or the message.
+fn read(name: &str, content: &[u8]) -> Result<usize, String> {
+    let file = SourceFile::new(name.to_owned(), content.to_vec());
+    file.map(|file| file.count()).map_err(|error| error.to_string())
+}
+
+/// The lines that a file with this name and content sends, or the message.
+pub(crate) fn sent(name: &str, content: &[u8]) -> Result<Vec<String>, String> {
+    let file = SourceFile::new(name.to_owned(), content.to_vec());
+    let file = file.map_err(|error| error.to_string())?;
+    let lines: Vec<String> = file.in_order().map(|line| line.sent).collect();
+    let single = (0..file.count()).map_while(|index| file.line(index)).map(|line| line.sent);
+    assert!(single.eq(lines.iter().cloned()));
+    Ok(lines)
+}
+
+/// What the user is told of a file that can be drawn.
+pub(crate) fn notes(name: &str, content: &[u8]) -> Vec<String> {
+    let file = SourceFile::new(name.to_owned(), content.to_vec());
+    file.expect("a file that can be drawn").notes().to_vec()
+}
+
+const UNKNOWN: &str = "penup reads Wavefront OBJ files, whose names end in .obj; SVG files, \
+                       whose names end in .svg; ";
+
+#[test]
+fn the_extension_decides_in_capitals_as_well() {
+    assert_eq!(read("a.obj", b""), Ok(0));
+    assert_eq!(read("A.OBJ", b"# v\nv 0 0 0"), Ok(1));
+    let error = read("a.obj", b"\x89PNG\r\n\x1a\n\0\0\0").expect_err("no text");
+    assert!(error.starts_with("a.obj:1: "), "{error}");
+}
+
+#[test]
+fn the_content_decides_where_the_extension_does_not() {
+    assert_eq!(read("cube", b"# a cube\nmtllib c.mtl\nv 0 0 0\nv 1 0 0\nl 1 2\n"), Ok(3));
+    assert_eq!(read("point", b"v 0 0 0"), Ok(1));
+    let long = [b"v 0 0 0 # long\n".repeat(100_000), b"v 1 2 3".to_vec()].concat();
+    assert_eq!(read("long.txt", &long), Ok(100_001));
+}
+
+#[test]
+fn a_file_of_no_known_format_is_refused_with_those_that_are_read() {
+    let png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
+    let contents: [&[u8]; 4] = [b"", b"Dear Ada,\n", png, b"l 1 2\n"];
+    for content in contents {
+        for name in ["a.zip", "a"] {
+            let error = read(name, content).expect_err("no known format");
+            assert!(error.starts_with(&format!("{name}: {UNKNOWN}")), "{error}");
+        }
+    }
+}
+
+#[test]
+fn every_format_has_extensions_in_lower_case() {
+    for format in FORMATS {
+        assert!(!format.extensions().is_empty(), "{format:?}");
+        for extension in format.extensions() {
+            assert_eq!(*extension, extension.to_lowercase(), "{format:?}");
+            assert!(!extension.starts_with('.'), "{format:?}");
+        }
+    }
+}

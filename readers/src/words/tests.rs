@@ -1,0 +1,39 @@
+use super::*;
+use penup::protocol::error_samples;
+
+#[test]
+fn no_refusal_of_the_library_shows_a_word_of_the_line() {
+    for refusal in error_samples() {
+        let text = refusal.to_string();
+        let reason = explained(refusal.number(), std::slice::from_ref(&text));
+        assert!(!reason.contains('$') && !reason.contains("ctrl-X"), "{text}: {reason}");
+        if error_entry(refusal.number()).is_none_or(|entry| entry.for_client.get().is_none()) {
+            let words = text.split('$').skip(1).map(|part| split_after(part, |c| c == '-').0);
+            words.for_each(|word| assert!(form(word).is_some(), "${word} is in no table: {text}"));
+            assert!(!reason.contains("send --"), "{reason}");
+        }
+    }
+}
+
+#[test]
+fn a_word_of_the_line_is_a_flag_or_has_words_for_it() {
+    for option in OPTIONS {
+        let has_words = matches!(form(option.name), Some(Form::Words(_)));
+        let same = OPTIONS.iter().filter(|other| other.name == option.name);
+        let is_flag = same.filter_map(|other| other.flag.get()).count() > 0;
+        assert_ne!(is_flag, has_words, "{}", option.name);
+    }
+}
+
+#[test]
+fn switches_and_unknown_words_are_for_client() {
+    assert_eq!(as_option("$fit=on"), "--fit");
+    assert_eq!(as_option("$cycle=off"), "no --cycle");
+    assert_eq!(as_option("v 1 2 3"), "v 1 2 3");
+    assert_eq!(
+        for_client("choose $see=faces, or set $130 and $131"),
+        "choose --see faces, or set the travel along x (setting 130 of the machine) and along y \
+         (setting 131)"
+    );
+    assert_eq!(for_client("a $newer=thing and $999 or $"), "a newer thing and 999 or ");
+}
