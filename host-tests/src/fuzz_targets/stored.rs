@@ -38,9 +38,20 @@ fn stopped_job() -> &'static CutFlash {
     })
 }
 
-/// Goes on with a job from the input, of which so many strokes are said to be drawn.
+/// Divides the input into settings and a job.
+fn divide(input: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (count, rest) = input.split_first()?;
+    Some(rest.split_at(rest.len().min(usize::from(*count) * SETTING_BYTES)))
+}
+
+/// Goes on with a job from the input. The first bytes of the settings say how many of how many
+/// strokes are said to be drawn, and what is wrong in the notes.
 fn resume_job(input: &[u8]) {
-    let &[drawn, strokes, flags, ref job @ ..] = input else { return };
+    let Some((settings, job)) = divide(input) else { return };
+    let [drawn, strokes, flags] = match *settings {
+        [drawn, strokes, flags, ..] => [drawn, strokes, flags],
+        _ => [1, 3, 0],
+    };
     let mut sound = stopped_job().clone();
     let mut notes = [0; NOTE_BYTES];
     let Some((slot, sum)) = LAYOUT.job.identify(&mut sound) else { return };
@@ -85,8 +96,7 @@ fn go_on(flash: CutFlash) {
 
 /// Draws a job from the input again.
 fn again(input: &[u8]) {
-    let Some((count, rest)) = input.split_first() else { return };
-    let (settings, job) = rest.split_at(rest.len().min(usize::from(*count) * SETTING_BYTES));
+    let Some((settings, job)) = divide(input) else { return };
     let values = settings.chunks_exact(SETTING_BYTES).map(|entry| {
         let [a, b, c, d, e, f] = <[u8; SETTING_BYTES]>::try_from(entry).expect("its length");
         (u16::from_le_bytes([a, b]), Value::from_bits(i32::from_le_bytes([c, d, e, f])))
