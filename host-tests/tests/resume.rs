@@ -3,8 +3,10 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup::boards::host::{CutFlash, LAYOUT};
+use penup::machine::Contacts;
+use penup::plotter::Board as _;
 use penup::storage::NOTE_BYTES;
-use penup_client::pins::PinChange;
+use penup_client::pins::{Machine, PinChange};
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on,
 };
@@ -336,6 +338,50 @@ fn a_job_that_is_given_up_or_stopped_in_an_emergency_can_go_on() {
             plotter.status().contains("WCO:0.000,0.000") || plotter.status().starts_with("<Run")
         );
     });
+}
+
+/// Homes a machine whose pen was left at `at`, in steps from its switches, and returns where it is
+/// homed, in steps from there.
+fn home(plotter: &mut Powered<'_, '_>, at: Point) -> Point {
+    plotter.send("$H\n");
+    let (mut machine, mut seen) = (Machine::default(), 0);
+    for _ in 0..60_000 {
+        let changes = plotter.board.trace().changes();
+        for change in &changes[seen..] {
+            machine.change(change.into());
+        }
+        seen = changes.len();
+        let (x, y) = machine.position();
+        plotter.board.set_contacts(Contacts { x: at.0 + x <= 0, y: at.1 + y <= 0, stop: false });
+        plotter.plotter.poll(plotter.board);
+        plotter.board.wait();
+        if plotter.heard().ends_with("ok\n") {
+            return machine.position();
+        }
+    }
+    panic!("the machine is not homed: {}", plotter.status());
+}
+
+#[test]
+fn a_machine_with_limit_switches_is_homed_first() {
+    let mut lines = lattice("$hidden=erased");
+    let (whole, ..) = undisturbed(&lines);
+    lines.insert(0, "$22=1".to_owned());
+    let (flash, before) = cut_after_five_strokes(&lines);
+    let mut homed = (0, 0);
+    let (_, changes) = switch_on(flash, |plotter| {
+        plotter.heard();
+        assert!(plotter.status().starts_with("<Alarm"));
+        assert!(plotter.say("$resume").ends_with("error:9\n"));
+        homed = home(plotter, (700, 300));
+        assert_eq!(plotter.say("$resume"), "ok\n");
+        plotter.finish();
+    });
+    let mut after = strokes_of(changes.iter().map(PinChange::from));
+    for (x, y) in after.iter_mut().flatten() {
+        (*x, *y) = (*x - homed.0, *y - homed.1);
+    }
+    assert_one_drawing(&whole, &[before, after]);
 }
 
 #[test]

@@ -3,8 +3,8 @@
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use penup::storage::{Slots, StorageError};
-use penup_host_tests::cut_flash::{Cut, CutFlash};
+use penup::boards::host::{Cut, CutFlash};
+use penup::storage::{Log, NOTE_BYTES, Slots, StorageError};
 
 /// The slots are not at the beginning of the flash, and each has more than one sector.
 const SLOTS: Slots = Slots { start: 4096, bytes: 8192 };
@@ -69,7 +69,7 @@ fn after_a_cut_between_any_two_bytes_it_is_the_old_state_or_the_new_one() {
         for budget in 0.. {
             let mut flash = CutFlash { budget, ..before.clone() };
             let outcome = save(&mut flash, &new);
-            flash.budget = usize::MAX;
+            let mut flash = flash.powered();
             let found = latest(&mut flash);
             if outcome.is_ok() {
                 assert_eq!(found.as_ref(), Some(&new));
@@ -80,6 +80,76 @@ fn after_a_cut_between_any_two_bytes_it_is_the_old_state_or_the_new_one() {
             let next = state(7, 300);
             save(&mut flash, &next).expect("it fits");
             assert_eq!(latest(&mut flash), Some(next), "after a cut after {budget} bytes");
+        }
+    }
+}
+
+/// Behind the slots, with more than one sector.
+const LOG: Log = Log { start: 5 * 4096, bytes: 2 * 4096 };
+
+/// Reads the notes and the bits of the log of the state with this checksum.
+fn log_of(flash: &mut CutFlash, of: u32) -> Option<(Vec<u8>, u32)> {
+    let mut notes = [0; NOTE_BYTES];
+    let (length, count) = LOG.read(flash, of, &mut notes)?;
+    Some((notes[..length].to_vec(), count))
+}
+
+#[test]
+fn a_log_is_read_as_it_was_written() {
+    let mut flash = CutFlash::new(7 * 4096);
+    assert_eq!(log_of(&mut flash, 7), None);
+    for notes in [&b""[..], b"notes", &[9; NOTE_BYTES]] {
+        LOG.begin(&mut flash, 7, notes).expect("it fits");
+        let mut count = 0;
+        // One by one, across a page, and to the end.
+        for next in [1, 2, 3, 2047, 2048, 2049, 6000, LOG.limit() - 1, LOG.limit()] {
+            LOG.note(&mut flash, count, next).expect("it is taken");
+            count = next;
+            assert_eq!(log_of(&mut flash, 7), Some((notes.to_vec(), count)));
+        }
+        LOG.note(&mut flash, count, count + 5).expect("what is beyond is left out");
+        assert_eq!(log_of(&mut flash, 7), Some((notes.to_vec(), count)));
+        assert_eq!(log_of(&mut flash, 8), None, "it belongs to another state");
+    }
+    let too_long = LOG.begin(&mut flash, 7, &[0; NOTE_BYTES + 1]);
+    assert_eq!(too_long, Err(StorageError::TooLong));
+    assert_eq!(log_of(&mut flash, 7).map(|(_, count)| count), Some(LOG.limit()));
+}
+
+#[test]
+fn after_a_cut_between_any_two_bytes_a_log_is_the_old_one_or_the_new_one_or_none() {
+    let mut before = CutFlash::new(7 * 4096);
+    LOG.begin(&mut before, 1, b"old").expect("it fits");
+    LOG.note(&mut before, 0, 3000).expect("it is taken");
+    let mut is_new = false;
+    for budget in 0.. {
+        let mut flash = CutFlash { budget, ..before.clone() };
+        let outcome = LOG.begin(&mut flash, 2, b"newer");
+        let mut flash = flash.powered();
+        let (old, new) = (log_of(&mut flash, 1), log_of(&mut flash, 2));
+        assert!(old.is_none_or(|old| budget == 0 && old == (b"old".to_vec(), 3000)), "{budget}");
+        assert!(new.as_ref().is_none_or(|new| *new == (b"newer".to_vec(), 0)), "{budget}");
+        assert!(outcome.is_err() || new.is_some(), "{budget}");
+        is_new |= new.is_some();
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    assert!(is_new);
+    // Bits that are cleared, within a page and across its border.
+    LOG.begin(&mut before, 1, b"old").expect("it fits");
+    LOG.note(&mut before, 0, 2040).expect("it is taken");
+    for to in [2041, 2048, 2060] {
+        for budget in 0.. {
+            let mut flash = CutFlash { budget, ..before.clone() };
+            let outcome = LOG.note(&mut flash, 2040, to);
+            let (notes, count) = log_of(&mut flash.powered(), 1).expect("the log");
+            assert_eq!(notes, b"old");
+            assert!((2040..=to).contains(&count), "{budget}: {count}");
+            if outcome.is_ok() {
+                assert_eq!(count, to);
+                break;
+            }
         }
     }
 }

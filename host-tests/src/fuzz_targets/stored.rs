@@ -1,21 +1,103 @@
 //! Records in flash that another version wrote, or that no version wrote.
 
-use penup::boards::host::{HostBoard, PORTS, QUEUE_LENGTH};
+use crate::cut_jobs::{empty_flash, switch_on};
+use crate::whole_jobs::job_lines;
+use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH};
 use penup::hpgl::Session;
 use penup::machine::{Contacts, EventRing, PulserState, Settings, Value};
 use penup::model::{Corner, Position};
 use penup::motion::EventQueue;
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices, Plotter, Record, Stored};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Kept, MemorySlices, Plotter, Record, Stored};
 use penup::protocol::{LineReader, RealTime};
+use penup::storage::NOTE_BYTES;
+use std::sync::OnceLock;
 
 /// The size of a stored setting: two bytes for its number, four for its value.
 const SETTING_BYTES: usize = 6;
 
 /// Starts a plotter with settings and a job from the input, and draws the job. The first byte is
 /// the number of settings; they follow, and the rest is the job.
+///
+/// Then starts a plotter whose flash holds that job and how far it has come, and one whose flash
+/// holds a sound job that has stopped, but for some bytes, and goes on with each.
 pub fn fuzz(input: &[u8]) {
-    let Some((count, rest)) = input.split_first() else { return };
-    let (settings, job) = rest.split_at(rest.len().min(usize::from(*count) * SETTING_BYTES));
+    again(input);
+    resume_job(input);
+    resume_image(input);
+}
+
+/// A flash that holds a job, which was cut after some strokes.
+fn stopped_job() -> &'static CutFlash {
+    static FLASH: OnceLock<CutFlash> = OnceLock::new();
+    FLASH.get_or_init(|| {
+        let lines = job_lines("cube.obj", &["$212=20", "$213=20", "$page=20x20", "$margin=4"]);
+        let (flash, _) = switch_on(empty_flash(), |plotter| {
+            plotter.order(&lines);
+            plotter.run(3000);
+        });
+        flash
+    })
+}
+
+/// Divides the input into settings and a job.
+fn divide(input: &[u8]) -> Option<(&[u8], &[u8])> {
+    let (count, rest) = input.split_first()?;
+    Some(rest.split_at(rest.len().min(usize::from(*count) * SETTING_BYTES)))
+}
+
+/// Goes on with a job from the input. The first bytes of the settings say how many of how many
+/// strokes are said to be drawn, and what is wrong in the notes.
+fn resume_job(input: &[u8]) {
+    let Some((settings, job)) = divide(input) else { return };
+    let [drawn, strokes, flags] = match *settings {
+        [drawn, strokes, flags, ..] => [drawn, strokes, flags],
+        _ => [1, 3, 0],
+    };
+    let mut sound = stopped_job().clone();
+    let mut notes = [0; NOTE_BYTES];
+    let Some((slot, sum)) = LAYOUT.job.identify(&mut sound) else { return };
+    let Some((length, _)) = LAYOUT.logs[slot].read(&mut sound, sum, &mut notes) else { return };
+    // The number of strokes may be another one, and a byte of the notes, too.
+    notes[8] = strokes;
+    if flags & 1 != 0 {
+        notes[usize::from(flags) % length] ^= drawn;
+    }
+    let mut kept = Kept::new(empty_flash(), LAYOUT);
+    if kept.save(Record::Job, &[job]).is_err() {
+        return;
+    }
+    if kept.begin_progress(&notes[..length], u32::from(strokes)).is_ok() {
+        // It may be more than there are.
+        let _ = kept.note_progress(u32::from(drawn));
+    }
+    go_on(kept.flash);
+}
+
+/// Goes on with a sound job in a flash in which some bytes differ: four of the input say where, and
+/// one says what.
+fn resume_image(input: &[u8]) {
+    let mut flash = stopped_job().clone();
+    for patch in input.chunks_exact(5).take(64) {
+        let [a, b, c, d, value] = <[u8; 5]>::try_from(patch).expect("its length");
+        let at = u32::from_le_bytes([a, b, c, d]) as usize % flash.bytes.len();
+        flash.bytes[at] = value;
+    }
+    go_on(flash);
+}
+
+/// Starts a plotter with this flash, and goes on with the job that it holds.
+fn go_on(flash: CutFlash) {
+    switch_on(flash, |plotter| {
+        plotter.send("$5=0\n$X\n$resume\n$resume=origin\n?");
+        plotter.run(2000);
+        plotter.board.receive(&[0x18]);
+        assert!(plotter.run(20_000) < 20_000, "the machine does not stop");
+    });
+}
+
+/// Draws a job from the input again.
+fn again(input: &[u8]) {
+    let Some((settings, job)) = divide(input) else { return };
     let values = settings.chunks_exact(SETTING_BYTES).map(|entry| {
         let [a, b, c, d, e, f] = <[u8; SETTING_BYTES]>::try_from(entry).expect("its length");
         (u16::from_le_bytes([a, b]), Value::from_bits(i32::from_le_bytes([c, d, e, f])))

@@ -4,7 +4,8 @@
 //! functions of the boot ROM do this work, called from RAM with interrupts masked: 45 ms for a
 //! sector, half a millisecond for a page. Meanwhile the bytes of the serial lines wait: those of
 //! the UART in RAM, where DMA stores them, and those of USB at the host. Steps would continue only
-//! as long as their words last, so callers ensure that nothing moves.
+//! as long as their words last, so callers ensure that nothing moves. Behind each stroke of a job a
+//! page is written while the pen is raised and no step waits.
 //!
 //! A worn flash reports no error; its cells simply no longer change. So what was erased or written
 //! is read back, and the error is [`Worn`] if it is not as expected.
@@ -25,7 +26,8 @@ use super::{BOOT_2, ROW, critical, emergency};
 
 /// The address at which the flash is mapped to memory, so that it can be read.
 const MAPPED_AT: usize = ROW.flash.start as usize;
-/// The memory map reserves the flash from here on for this module.
+/// The memory map reserves the flash from here on for this module. What lies below, from 640 KiB on,
+/// is to stay free for a stored model.
 const START: u32 = ROW.budget.flash as u32;
 /// The number of bytes in the flash chip, and so the offset at which it ends.
 const END: u32 = ROW.flash.size as u32;

@@ -9,7 +9,7 @@
 //! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
 //! | STEP_Z, DIR_Z of a motor that lifts the pen (high: down) | GP11, GP12 |
 //! | nothing: `usb` uses the pin when a host resets the bus | GP15 |
-//! | settings and last job | the last 288 KiB of flash |
+//! | settings, last job and its progress | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights, and the steps of its motor | PIO0_IRQ_0, priority 1 |
 //! | serial line's bytes | DMA channels 1 and 2; UART0_IRQ, USBCTRL_IRQ, priority 2 |
