@@ -29,7 +29,7 @@ fn lines_are_drawn_and_answered_as_listed() {
         if heard.trim() != answers.trim() {
             faults += &format!("{line}\n    answered {heard}\n");
         }
-        if let Some(difference) = difference(&inked(&bench), &strokes(drawn)) {
+        if let Some(difference) = difference(&inked(&bench), &strokes(drawn), 0.0) {
             faults += &format!("{line}\n    {difference}\n");
         }
     }

@@ -17,7 +17,7 @@ use std::fmt::Write as _;
 
 /// A plotter with little memory.
 fn bench() -> Bench {
-    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
+    let memory = Box::leak(Box::new(Memory::<4, 4, 16, 2>::new()));
     let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
     bench.heard();
     bench
@@ -118,6 +118,12 @@ fn files() -> [(&'static str, Vec<u8>); 4] {
     ]
 }
 
+/// How far the client's plan may be from the true figure, in steps: the chords of its arcs are up to
+/// 0.2 plotter units off, which are 0.4 steps.
+fn slack(name: &str) -> f64 {
+    if name == "chiplotle" { 0.4 } else { 0.0 }
+}
+
 #[test]
 fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
     assert!(vpype().len() > 14_701 && !vpype().contains(&b'\n'));
@@ -125,7 +131,7 @@ fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
         let mut bench = bench();
         let heard = draw(&mut bench, &bytes);
         assert!(!heard.contains("ok") && !heard.contains("error"), "{name}: {heard}");
-        assert_same_ink(name, &inked(&bench), &plan(&bytes));
+        assert_same_ink(name, &inked(&bench), &plan(&bytes), slack(name));
     }
 }
 
@@ -142,7 +148,7 @@ fn nothing_is_answered_that_hp_gl_does_not_ask_for() {
     let mut bench = self::bench();
     bench.board.receive(b"\xFDIN;PD100,100;OE;PA0,0;OE;");
     work(&mut bench, 50);
-    assert_eq!(bench.heard(), "ALARM:102\n8\r8\r");
+    assert_eq!(bench.heard(), "ALARM:10\n8\r8\r");
 }
 
 #[test]
@@ -180,7 +186,8 @@ fn control_x_and_a_dollar_line_end_it() {
     assert_eq!(bench.heard(), "");
     let heard = bench.say("\x18");
     assert!(heard.contains("Grbl 1.1h"), "{heard}");
-    assert_eq!(bench.say("G90\n?"), format!("ok\n{}", bench.say("?")));
+    assert_eq!(bench.say("G90\n"), "ok\n");
+    assert!(bench.say("?").starts_with("<Idle|"));
     bench.finish();
     assert_eq!(bench.say("IN;PU400,0;\n"), "");
     assert_eq!(bench.say("G90;\n"), "", "HP-GL");
@@ -189,12 +196,14 @@ fn control_x_and_a_dollar_line_end_it() {
     assert_eq!(bench.say("$hpgl\n"), "ok\n");
     assert_eq!(bench.say("PU0,0;OE;"), "0\r");
     // What was sent before is drawn before the line is carried out.
-    bench.board.receive(b"PU0,0;PD4000,0;\n$#\n");
-    work(&mut bench, 30);
-    assert_eq!(bench.heard(), "");
-    work(&mut bench, 10_000);
-    assert!(bench.heard().ends_with("ok\n"));
-    assert_eq!(units(&bench), [[0, 0], [4000, 0]]);
+    bench.board.trace().take_changes();
+    bench.board.receive(b"PU0,0;PD4000,0;\n$G\nG0 X200\n");
+    work(&mut bench, 15_000);
+    let heard = bench.heard();
+    assert!(heard.starts_with("[GC:") && heard.ends_with("ok\nok\n"), "{heard}");
+    let [[left, bottom], [right, top]] = units(&bench);
+    assert_eq!([right - left, top - bottom], [4000, 0]);
+    assert_eq!(bench.plotter.machine().position().x, 200 * 80);
 }
 
 #[test]
@@ -203,7 +212,8 @@ fn the_other_port_watches_and_cannot_interrupt() {
     bench.board.receive_by(1, b"$I\n");
     work(&mut bench, 1);
     bench.heard();
-    bench.board.receive(b"IN;PU0,0;PD4000,0;PD4000,400,0,400;");
+    let zigzag: String = (0..80).map(|index| format!("PD{},{};", index % 2 * 400, index)).collect();
+    bench.board.receive(format!("IN;PU0,0;{zigzag}").as_bytes());
     work(&mut bench, 100);
     bench.board.receive_by(1, b"?G0 X1\n");
     work(&mut bench, 2);
@@ -211,8 +221,9 @@ fn the_other_port_watches_and_cannot_interrupt() {
     assert!(heard.starts_with("<Run|"), "{heard}");
     assert!(heard.ends_with("error:8\n"), "{heard}");
     bench.board.receive(b"OI;");
-    work(&mut bench, 20_000);
+    work(&mut bench, 60_000);
     assert_eq!(bench.heard(), "7475A\r");
+    assert_eq!(units(&bench), [[0, 0], [400, 79]]);
     bench.board.receive_by(1, b"G90\nIN;PD0,0;");
     work(&mut bench, 5);
     assert!(bench.heard().starts_with("ok\n[MSG:HP-GL comes by the other port"));

@@ -1,7 +1,7 @@
 //! Senders that wait for the plotter, with a slow main loop.
 
 use super::ink::{assert_same_ink, inked, plan};
-use super::{bench, chiplotle, gnuplot, vpype};
+use super::{bench, chiplotle, gnuplot, slack, vpype};
 use penup::machine::State;
 use penup::plotter::Board;
 use penup_host_tests::whole_jobs::Bench;
@@ -100,7 +100,7 @@ fn a_sender_that_asks_for_room_loses_nothing() {
         b"OE;\x1B.E".iter().for_each(|byte| port.send(*byte));
         let answers = [port.answer(), port.answer()];
         assert!(answers.iter().all(|answer| answer == "0"), "{answers:?}");
-        assert_same_ink(name, &inked(&port.bench), &plan(&file));
+        assert_same_ink(name, &inked(&port.bench), &plan(&file), slack(name));
     }
 }
 
@@ -128,6 +128,6 @@ fn a_sender_that_obeys_xon_and_xoff_loses_nothing() {
         }
         assert!(stops > 0, "{name}: the sender was never stopped");
         port.finish();
-        assert_same_ink(name, &inked(&port.bench), &plan(&file));
+        assert_same_ink(name, &inked(&port.bench), &plan(&file), slack(name));
     }
 }
