@@ -172,6 +172,39 @@ pub fn plane_side(a: Vertex, b: Vertex, c: Vertex, d: Vertex) -> i64 {
     determinant(from_a(b), from_a(c), from_a(d))
 }
 
+/// The plane through three points, for asking of many points on which side they lie.
+///
+/// ```
+/// use penup::geometry::{Plane, Vertex, plane_side};
+/// let (a, b, c) = (Vertex::new(0, 2, 5), Vertex::new(1, 0, 4), Vertex::new(0, 1, 5));
+/// let d = Vertex::new(3, 3, 6);
+/// assert_eq!(Plane::through(a, b, c).side(d), plane_side(a, b, c, d));
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct Plane {
+    /// A point of the plane.
+    a: Vertex,
+    /// A vector perpendicular to the plane. Each part is within ±2^41.
+    normal: [i64; 3],
+}
+
+impl Plane {
+    /// Makes the plane through a, b and c. If they lie in one line, all points are on no side.
+    pub fn through(a: Vertex, b: Vertex, c: Vertex) -> Self {
+        let wide = |to: Vertex| [to.x - a.x, to.y - a.y, to.z - a.z].map_each(i64::from);
+        let ([x1, y1, z1], [x2, y2, z2]) = (wide(b), wide(c));
+        Self { a, normal: [y1 * z2 - z1 * y2, z1 * x2 - x1 * z2, x1 * y2 - y1 * x2] }
+    }
+
+    /// Returns [`plane_side`] of d. The bounds that it states hold here, too.
+    pub fn side(&self, d: Vertex) -> i64 {
+        let [x, y, z] = self.normal;
+        x * i64::from(d.x - self.a.x)
+            + y * i64::from(d.y - self.a.y)
+            + z * i64::from(d.z - self.a.z)
+    }
+}
+
 /// Returns an error bound for [`plane_side`]. If the absolute value of [`plane_side`] is greater, d
 /// lies off the plane by more than rounding can explain. `error_bound` is twice the greatest
 /// possible error of a coordinate.

@@ -34,7 +34,7 @@ impl<'a, I: Index> FaceSet<'a, I> {
     /// How many words are recorded.
     const MOST_USED: usize = 64;
     /// A set with fewer words than this is cleared as a whole, because recording takes longer.
-    const MANY_WORDS: usize = 512;
+    const MANY_WORDS: usize = 64;
 
     /// Returns how many words of a set of so many are recorded.
     const fn used(words: usize) -> usize {

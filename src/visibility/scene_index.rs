@@ -5,6 +5,8 @@ use super::edges::{ChosenSides, Outlines};
 use super::faces::{Face, Faces};
 use super::seams::Extent;
 use super::triangles::Ears;
+use crate::array::MapEach;
+use crate::geometry::Plane;
 use crate::index::Index;
 use crate::model::Corner;
 
@@ -51,6 +53,26 @@ impl<I: Index> SceneIndex<'_, I> {
         let shared = |corner: &&Corner<I>| other.iter().any(|there| at(there) == at(corner));
         let corners = self.outlines.element(one.first);
         corners.iter().filter(shared).count() >= 2
+    }
+
+    /// Returns the plane of a face that is a single triangle, and `None` for any other face.
+    pub fn plane(&self, face: Face) -> Option<Plane> {
+        let [a, b, c] =
+            self.triangle(face, 0)?.map_each(|number| self.coarse_projection.vertex(number));
+        self.triangle(face, 1).is_none().then(|| Plane::through(a, b, c))
+    }
+
+    /// Whether the element with this rank has corners on both sides of a plane as they are rounded.
+    /// If it has not, it does not pass through a triangle of the plane either
+    /// ([`Self::passes_through`]), for which a corner may at most count as lying in the plane.
+    pub fn is_on_both_sides(&self, plane: &Plane, rank: usize) -> bool {
+        let (mut before, mut behind) = (false, false);
+        self.outlines.element(self.faces.get(rank).first).iter().any(|corner| {
+            let side = plane.side(self.coarse_projection.vertex(corner.vertex()));
+            before |= side < 0;
+            behind |= side > 0;
+            before && behind
+        })
     }
 
     /// Whether a face has corners on both sides of the plane of a triangle. A face that only

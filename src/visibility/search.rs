@@ -116,9 +116,13 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         for one in 0..self.around.faces.len() {
             self.meet(one);
             let extent = self.around.extent(one);
+            // Most faces near a triangle lie on one side of it.
+            let plane = self.around.plane(self.around.faces.get(one));
             let mut met = core::mem::take(&mut self.met);
             let outcome = met.each(&mut |other| {
-                if extent.meets(&self.around.extent(other)) {
+                let may_pass =
+                    plane.as_ref().is_none_or(|plane| self.around.is_on_both_sides(plane, other));
+                if may_pass && extent.meets(&self.around.extent(other)) {
                     self.follow_seams_of(one, other, yield_counter, sink)?;
                 }
                 yield_counter.spend(200).map_err(VisibilityError::from)
