@@ -22,7 +22,9 @@ mod segmenter;
 mod settings;
 mod state;
 mod status;
+mod steady;
 mod stream;
+mod stroke_ends;
 mod tool;
 mod travel;
 
@@ -33,12 +35,14 @@ pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue
 pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 pub use state::{Alarm, MachineError, State};
 pub use status::Status;
+pub use stroke_ends::StrokeEnds;
 pub use tool::{Pen, Solenoid, servo};
 
 use backlash::Backlash;
 use progress::Progress;
 use segmenter::Segmenter;
 use state::{Activity, Source};
+use steady::Steady;
 use tool::Tool;
 
 use crate::drawing::PagePoint;
@@ -64,6 +68,8 @@ pub struct Machine<'m> {
     progress: Progress,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
+    /// The speed of the line that is being read, if lines have one speed.
+    steady: Steady,
     /// How much of its slack each motor has taken up.
     slack: Backlash,
     /// The contacts that were pressed when they were last observed.
@@ -104,6 +110,7 @@ impl<'m> Machine<'m> {
             ahead_ticks,
             progress: Progress::default(),
             segmenter: None,
+            steady: Steady::default(),
             slack: Backlash::default(),
             contacts: Contacts::default(),
             percent: 100,
@@ -253,6 +260,7 @@ impl<'m> Machine<'m> {
             && stopped
             && self.runner.is_at_rest()
         {
+            self.steady = Steady::default();
             self.pen = pen;
             source = Source::Path;
             if self.push(first, PathLength::MAX).is_err() {
