@@ -154,12 +154,17 @@ fn an_overlap_runs_along_many_short_chords() {
 
 #[test]
 fn strokes_that_would_leave_the_travel_are_refused() {
-    let mut bench = Bench::new();
-    bench.heard();
-    let answer =
-        bench.say("v 0 10 0\nv 400 10 0\nl 1 2\n$130=401\n$margin=0\n$223=10\n$222=10\n$plot\n");
-    assert!(answer.contains("error"), "{answer}");
-    assert!(bench.plotter.machine().is_stopped());
+    for (lead, is_refused) in [("0", false), ("10", true)] {
+        let mut bench = Bench::new();
+        bench.heard();
+        let line = "v 0 10 0\nv 400 10 0\nl 1 2\n$130=401\n$page=401x100\n$margin=0\n";
+        let answer = bench.say(&format!("{line}$222={lead}\n$223={lead}\n"));
+        assert!(!answer.contains("error"), "{answer}");
+        assert_eq!(bench.say("$plot\n").contains("error:"), is_refused, "{lead}");
+        if is_refused {
+            assert!(bench.plotter.machine().is_stopped());
+        }
+    }
 }
 
 fn with_one_speed(case: Case) -> Settings {
