@@ -5,9 +5,10 @@ use super::estimate::Estimate;
 use super::homing::Homing;
 use super::progress::Progress;
 use super::state::{Activity, Source};
+use super::steady::Steady;
 use super::{Alarm, JobSize, Machine, MachineError, Path, Setting, Target};
 use crate::drawing::PagePoint;
-use crate::motion::{EventQueue, PathLength, Progress as RunnerProgress, Runner};
+use crate::motion::{EventQueue, Progress as RunnerProgress, Runner};
 
 /// The longest time that one turn of the main loop may take: 20 ms, while it writes to the serial
 /// line.
@@ -60,6 +61,7 @@ impl Machine<'_> {
         self.end_log();
         self.progress = Progress::begin(size, self.runner.run());
         self.reset_ink_budget();
+        self.steady = Steady::default();
         self.activity = Activity::Run(source);
     }
 
@@ -191,7 +193,8 @@ impl Machine<'_> {
                 }
                 // The whole path was measured at the start, so every move fits.
                 Some(target) => {
-                    if self.push(target, PathLength::MAX).is_err() {
+                    let limit = self.steady_limit(path, target);
+                    if self.push(target, limit).is_err() {
                         self.abort();
                     }
                 }

@@ -22,7 +22,9 @@ mod segmenter;
 mod settings;
 mod state;
 mod status;
+mod steady;
 mod stream;
+mod stroke_ends;
 mod stroke_log;
 mod tool;
 mod travel;
@@ -34,12 +36,14 @@ pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue
 pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 pub use state::{Alarm, MachineError, State};
 pub use status::Status;
+pub use stroke_ends::StrokeEnds;
 pub use tool::{Pen, Solenoid, servo};
 
 use backlash::Backlash;
 use progress::Progress;
 use segmenter::Segmenter;
 use state::{Activity, Source};
+use steady::Steady;
 use stroke_log::StrokeLog;
 use tool::Tool;
 
@@ -68,6 +72,8 @@ pub struct Machine<'m> {
     log: StrokeLog,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
+    /// The speed of the line that is being read, if lines have one speed.
+    steady: Steady,
     /// How much of its slack each motor has taken up.
     slack: Backlash,
     /// The contacts that were pressed when they were last observed.
@@ -109,6 +115,7 @@ impl<'m> Machine<'m> {
             progress: Progress::default(),
             log: StrokeLog::default(),
             segmenter: None,
+            steady: Steady::default(),
             slack: Backlash::default(),
             contacts: Contacts::default(),
             percent: 100,
@@ -258,6 +265,7 @@ impl<'m> Machine<'m> {
             && stopped
             && self.runner.is_at_rest()
         {
+            self.steady = Steady::default();
             self.pen = pen;
             source = Source::Path;
             if self.push(first, PathLength::MAX).is_err() {

@@ -19,6 +19,11 @@ pub trait Path {
     fn next_target(&mut self) -> Option<Target>;
     /// Restarts the path at the first target.
     fn rewind(&mut self);
+    /// Shows the next targets of the same pen, as long as `visit` returns true, and stays where it
+    /// is. A path that is not known ahead shows none.
+    fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {
+        let _ = visit;
+    }
     /// The number of the pen, from 0, for the target that was returned last. Where the number
     /// changes, the machine stops and waits for [`Machine::resume`](super::Machine::resume).
     fn pen(&self) -> u8 {
@@ -63,6 +68,10 @@ impl Path for TargetList<'_> {
     fn rewind(&mut self) {
         self.next = 0;
     }
+    fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {
+        let rest = self.targets.get(self.next..).unwrap_or(&[]);
+        let _ = rest.iter().all(|&target| visit(target));
+    }
 }
 
 /// A tape as a path: its moves, drawn as full lines where its pen is down.
@@ -91,6 +100,12 @@ impl<I: Iterator<Item = u8> + Clone> Path for TapePath<I> {
     }
     fn rewind(&mut self) {
         *self = Self::new(self.start, self.rows.clone());
+    }
+    fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {
+        let mut rest = self.clone();
+        while let Some(target) = rest.next_target()
+            && visit(target)
+        {}
     }
 }
 

@@ -36,6 +36,7 @@ mod lookahead;
 mod profile;
 mod runner;
 mod smooth;
+mod steady;
 
 pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepBrake, StepLength, StepWay};
 pub use emitter::Emitter;
@@ -45,6 +46,7 @@ pub use limits::{Limits, LimitsError, MotionSettings};
 pub use lookahead::{Block, Lookahead};
 pub use profile::Profile;
 pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
+pub use steady::SteadySpeed;
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.
 pub const TICKS_PER_SECOND: u32 = 25_000_000;

@@ -385,7 +385,8 @@ impl<'m, I: Index> Plotter<'m, I> {
     /// The strokes of the job computed last, from the beginning.
     pub fn strokes(&mut self) -> Strokes<'_, I> {
         self.inner.cursor = Cursor::default();
-        self.inner.job.strokes(self.inner.words, &mut self.inner.cursor)
+        let ends = self.inner.machine.stroke_ends();
+        self.inner.job.strokes(self.inner.words, &mut self.inner.cursor, ends)
     }
 
     /// Carries out the real-time `requests`, and whatever else does not come by a line.
@@ -435,7 +436,8 @@ impl<I: Index> Inner<'_, I> {
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn plan<B: Board>(&mut self, board: &mut B) -> bool {
         let before = self.machine.planned_position();
-        let mut strokes = self.job.strokes(self.words, &mut self.cursor);
+        let ends = self.machine.stroke_ends();
+        let mut strokes = self.job.strokes(self.words, &mut self.cursor, ends);
         self.machine.fill(&mut strokes, board.queue());
         self.machine.planned_position() != before
     }

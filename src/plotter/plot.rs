@@ -102,7 +102,8 @@ impl<I: Index> Inner<'_, I> {
     /// Hands the job to the machine, which first measures its strokes.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
-        let strokes = self.job.strokes(self.words, &mut self.cursor);
+        let ends = self.machine.stroke_ends();
+        let strokes = self.job.strokes(self.words, &mut self.cursor, ends);
         let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
         self.machine.start(&mut strokes)?;
         if strokes.aborted {

@@ -39,7 +39,7 @@ mod with_feature {
 
     /// The settings that decide where ink falls, so that they must be the same in all parts of a
     /// drawing.
-    const PLACING: [Setting; 12] = [
+    const PLACING: [Setting; 15] = [
         Setting::InvertDirections,
         Setting::HomingPullOff,
         Setting::StepsPerMmX,
@@ -52,6 +52,9 @@ mod with_feature {
         Setting::HomedBelt,
         Setting::BacklashX,
         Setting::BacklashY,
+        Setting::StrokeOverlap,
+        Setting::StrokeLead,
+        Setting::StrokeTrail,
     ];
 
     /// A mark at the beginning of the notes; those with another layout have another mark.

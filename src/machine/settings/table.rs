@@ -92,6 +92,9 @@ pub enum Setting {
     /// `$204` The greatest jerk along the path, which is the rate of change of the acceleration; at
     /// least 0.1, or 0 for no limit.
     Jerk,
+    /// `$205` Whether a line is drawn at one speed between its ends and its sharp corners: the
+    /// greatest that its bends allow. It is for drawings, not for lines of G-code.
+    SteadySpeed,
     /// `$206` What moves the pen in G-code: 0 what the program shows, 1 M3 and M5, 2 Z, 3 S.
     PenMode,
     /// `$207` The Z at which the pen is down, and on the side that `$208` says.
@@ -119,6 +122,12 @@ pub enum Setting {
     PenSBelow,
     /// `$220` The length of the dots and gaps of a dotted line. A dash is three dots long.
     DotLength,
+    /// `$221` By how much a closed stroke of a drawing goes on beyond its end, along its beginning.
+    StrokeOverlap,
+    /// `$222` How far before its first point an open stroke of a drawing begins.
+    StrokeLead,
+    /// `$223` How far behind its last point an open stroke of a drawing ends.
+    StrokeTrail,
     /// `$230` The kinematics of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
     Kinematics,
     /// `$231` The distance from the left anchor of the belts to the right one.
@@ -232,6 +241,7 @@ pub const SETTINGS: &[SettingInfo] = {
         row(TravelSpeed, 202, "travel speed", "mm/min", (1.0, 32767.0, 6000.0), false),
         row(Centripetal, 203, "limit speed by curvature", "0|1", (0.0, 1.0, 1.0), true),
         row(Jerk, 204, "jerk", "m/s3", (0.0, 1000.0, 0.0), false),
+        row(SteadySpeed, 205, "one speed along a line of a drawing", "0|1", (0.0, 1.0, 0.0), true),
         row(PenMode, 206, "pen by: auto, M3 and M5, Z, S", "0|1|2|3", (0.0, 3.0, 0.0), true),
         row(PenZ, 207, "pen down at Z", "mm", (-1000.0, 1000.0, 0.0), false),
         row(PenZAbove, 208, "pen down at lower Z, higher Z", "0|1", (0.0, 1.0, 0.0), true),
@@ -245,6 +255,9 @@ pub const SETTINGS: &[SettingInfo] = {
         row(PenS, 216, "pen down at S", "", (0.0, 32767.0, 45.0), false),
         row(PenSBelow, 217, "pen down at higher S, lower S", "0|1", (0.0, 1.0, 0.0), true),
         row(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
+        row(StrokeOverlap, 221, "closed strokes go on by", "mm", (0.0, 10.0, 0.0), false),
+        row(StrokeLead, 222, "open strokes begin early by", "mm", (0.0, 10.0, 0.0), false),
+        row(StrokeTrail, 223, "open strokes end late by", "mm", (0.0, 10.0, 0.0), false),
         row(Kinematics, 230, "kinematics", "0|1|2", (0.0, 2.0, 0.0), true),
         row(AnchorWidth, 231, "distance between anchors", "mm", (100.0, 8000.0, 800.0), false),
         row(AnchorLeft, 232, "left anchor to the origin", "mm", (0.0, 8000.0, 190.0), false),

@@ -18,6 +18,7 @@ pub use strokes::{Cursor, Strokes};
 
 use crate::drawing::{Drawing, Stored};
 use crate::index::Index;
+use crate::machine::StrokeEnds;
 use crate::order::{self, Leg};
 use crate::stage::{Scratch, items};
 use crate::view::View;
@@ -154,8 +155,13 @@ impl<I: Index> Job<I> {
     }
 
     /// Returns the strokes of the job from `cursor` on. `words` is the working memory that holds
-    /// the job.
-    pub fn strokes<'a>(&self, words: &'a mut [u64], cursor: &'a mut Cursor<I>) -> Strokes<'a, I> {
+    /// the job. `ends` says by how much strokes are made longer.
+    pub fn strokes<'a>(
+        &self,
+        words: &'a mut [u64],
+        cursor: &'a mut Cursor<I>,
+        ends: Option<StrokeEnds>,
+    ) -> Strokes<'a, I> {
         // `compute` filled this memory, so both reads succeed. Otherwise there are no strokes.
         let nothing = Drawing::<I> { points: &[], segments: &[] };
         let leg_words = self.stored.bytes() / size_of::<u64>();
@@ -163,6 +169,6 @@ impl<I: Index> Job<I> {
         let tour =
             words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, self.legs)).unwrap_or(&[]);
         let drawing = self.stored.drawing(words).unwrap_or(nothing);
-        Strokes { drawing, tour, cursor }
+        Strokes { drawing, tour, cursor, ends }
     }
 }

@@ -1,8 +1,9 @@
 //! Hands the strokes of a job to the machine.
 
-use crate::drawing::Drawing;
+use crate::drawing::{Drawing, LineType, PagePoint, Segment};
 use crate::index::Index;
-use crate::machine::{Path, Target};
+use crate::machine::{Path, StrokeEnds, Target};
+use crate::motion::PathLength;
 use crate::order::Leg;
 
 /// Position in the strokes of a job: how far they have been handed to the machine.
@@ -10,13 +11,19 @@ use crate::order::Leg;
 pub struct Cursor<I = u16> {
     /// Index in the tour of the segment that is being handed over.
     leg: usize,
-    /// Number of the point at which the pen is, or `None` before the first move.
+    /// Number of the point at which the pen is, or `None` before the first move, and behind a
+    /// stroke that went on beyond its end.
     at: Option<I>,
     /// The pen of the segment that is being handed over, from 0.
     pen: u8,
     /// Index in the tour of the segment with which the path begins.
     #[cfg(feature = "resume")]
+    path_start: usize,
+    /// Index in the tour of the first segment of the stroke, or, while a closed stroke goes on
+    /// beyond its end, of the segment along which it does so.
     first: usize,
+    /// How much further it goes on.
+    beyond: PathLength,
 }
 
 /// The strokes of a job, as the [`Path`] that the machine follows. A pen-up move is inserted
@@ -29,23 +36,113 @@ pub struct Strokes<'a, I = u16> {
     pub(super) tour: &'a [Leg<I>],
     /// How far the strokes have been handed over.
     pub(super) cursor: &'a mut Cursor<I>,
+    /// By how much the strokes are made longer, if they are.
+    pub(super) ends: Option<StrokeEnds>,
+}
+
+impl<'a, I: Index> Strokes<'a, I> {
+    /// A segment of the tour, and the numbers of the points at which it begins and ends.
+    fn leg(&self, index: usize) -> Option<(&'a Segment<I>, [I; 2])> {
+        let leg = self.tour.get(index)?;
+        let segment = self.drawing.segments.get(leg.segment())?;
+        let ends = [segment.from(), segment.to()];
+        Some((segment, if leg.reversed() { [ends[1], ends[0]] } else { ends }))
+    }
+
+    /// The points with these numbers.
+    fn points(&self, [from, to]: [I; 2]) -> Option<[PagePoint; 2]> {
+        Some([*self.drawing.points.get(from.get())?, *self.drawing.points.get(to.get())?])
+    }
+
+    /// Whether a stroke ends with this segment of the tour.
+    fn ends_stroke(&self, index: usize) -> bool {
+        let Some((segment, [_, end])) = self.leg(index) else { return true };
+        self.leg(index + 1)
+            .is_none_or(|(next, [start, _])| start != end || next.pen() != segment.pen())
+    }
+
+    /// Whether the stroke that begins with this segment of the tour ends where it began.
+    fn is_closed(&self, first: usize) -> bool {
+        let last = (first..self.tour.len()).find(|&index| self.ends_stroke(index));
+        let ends = last.and_then(|last| Some((self.leg(first)?.1[0], self.leg(last)?.1[1])));
+        ends.is_some_and(|(start, end)| start == end)
+    }
+
+    /// Where the stroke that begins with this segment of the tour begins: early, if it is open.
+    #[inline(never)] // Without such settings, this is never called.
+    fn early(&self, ends: &StrokeEnds, index: usize) -> Option<PagePoint> {
+        let (segment, numbers) = self.leg(index)?;
+        let [from, to] = self.points(numbers)?;
+        if ends.lead == 0 || segment.line_type() != LineType::Full || self.is_closed(index) {
+            return Some(from);
+        }
+        Some(ends.along([to, from], from, ends.lead))
+    }
+
+    /// Where this segment of the tour ends: late, if an open stroke ends with it. Behind a closed
+    /// one, its beginning follows.
+    #[inline(never)] // As above.
+    fn late(&mut self, ends: &StrokeEnds, index: usize) -> Option<PagePoint> {
+        let (segment, numbers) = self.leg(index)?;
+        let [from, to] = self.points(numbers)?;
+        if !self.ends_stroke(index) || segment.line_type() != LineType::Full {
+            return Some(to);
+        }
+        if self.leg(self.cursor.first).is_some_and(|(_, [start, _])| start == numbers[1]) {
+            self.cursor.beyond = ends.overlap;
+            return Some(to);
+        }
+        if ends.trail > 0 {
+            self.cursor.at = None;
+        }
+        Some(ends.along([from, to], to, ends.trail))
+    }
+
+    /// The next target along the beginning of a closed stroke, behind its end.
+    #[inline(never)] // As above.
+    fn next_beyond(&mut self, ends: &StrokeEnds) -> Option<Target> {
+        let left = core::mem::take(&mut self.cursor.beyond);
+        // What comes next begins with a move with the pen up.
+        self.cursor.at = None;
+        let (segment, numbers) =
+            self.leg(self.cursor.first).filter(|_| self.cursor.first < self.cursor.leg)?;
+        let [from, to] = self.points(numbers)?;
+        let length = ends.length(from, to)?;
+        let ink = Some(segment.line_type()).filter(|&line_type| line_type == LineType::Full)?;
+        let mut point = to;
+        if length < left {
+            self.cursor.beyond = left - length;
+            self.cursor.first += 1;
+        } else {
+            point = ends.along([from, to], from, left);
+        }
+        Some(Target { point, ink: Some(ink) })
+    }
 }
 
 impl<I: Index> Path for Strokes<'_, I> {
     fn next_target(&mut self) -> Option<Target> {
-        let leg = self.tour.get(self.cursor.leg)?;
-        let segment = self.drawing.segments.get(leg.segment())?;
-        let (from, to) = if leg.reversed() {
-            (segment.to(), segment.from())
-        } else {
-            (segment.from(), segment.to())
-        };
+        let ends = self.ends;
+        if let Some(ends) = &ends
+            && self.cursor.beyond > 0
+            && let Some(target) = self.next_beyond(ends)
+        {
+            return Some(target);
+        }
+        let index = self.cursor.leg;
+        let (segment, [from, to]) = self.leg(index)?;
         let begins_here = self.cursor.at == Some(from);
         let number = if begins_here { to } else { from };
-        let point = *self.drawing.points.get(number.get())?;
+        let mut point = *self.drawing.points.get(number.get())?;
+        if !begins_here || self.cursor.pen != segment.pen() {
+            self.cursor.first = index;
+        }
         self.cursor.at = Some(number);
         self.cursor.pen = segment.pen();
         self.cursor.leg += usize::from(begins_here);
+        if let Some(ends) = &ends {
+            point = if begins_here { self.late(ends, index)? } else { self.early(ends, index)? };
+        }
         Some(Target { point, ink: begins_here.then(|| segment.line_type()) })
     }
 
@@ -56,11 +153,20 @@ impl<I: Index> Path for Strokes<'_, I> {
     fn rewind(&mut self) {
         *self.cursor = Cursor {
             #[cfg(feature = "resume")]
-            leg: self.cursor.first,
+            leg: self.cursor.path_start,
             #[cfg(feature = "resume")]
-            first: self.cursor.first,
+            path_start: self.cursor.path_start,
             ..Cursor::default()
         };
+    }
+
+    fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {
+        let before = *self.cursor;
+        while let Some(target) = self.next_target()
+            && self.cursor.pen == before.pen
+            && visit(target)
+        {}
+        *self.cursor = before;
     }
 }
 
@@ -72,12 +178,12 @@ impl<I: Index> Strokes<'_, I> {
         *self.cursor = Cursor::default();
         let (mut inked, mut pen, mut strokes) = (false, 0, 0u32);
         loop {
-            let first = self.cursor.leg;
+            let path_start = self.cursor.leg;
             let Some(Target { ink, .. }) = self.next_target() else { return false };
             // A change of the pen begins a new stroke.
             if ink.is_some() && (!inked || self.pen() != pen) {
                 if strokes == stroke {
-                    *self.cursor = Cursor { leg: first, first, ..Cursor::default() };
+                    *self.cursor = Cursor { leg: path_start, path_start, ..Cursor::default() };
                     return true;
                 }
                 strokes += 1;

@@ -1,0 +1,42 @@
+//! One speed along each line of a drawing ([`Setting::SteadySpeed`]), so that the ink is even.
+//!
+//! A line is what lies between two ends or sharp corners of a stroke. Before its first move is
+//! planned, all of it is looked at, up to [`MOST_MOVES`] moves of it; a longer line has a speed for
+//! every so many moves.
+
+use super::{Machine, Path, Setting, Target};
+use crate::motion::{PathLength, SteadySpeed};
+
+/// The most moves of a line that are looked at together. On the Pico that takes some 20 ms, in
+/// which the machine draws what was planned before.
+const MOST_MOVES: u32 = 1000;
+
+/// The speed of the line that is being read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) struct Steady {
+    /// How many moves of it have not been read yet.
+    moves: u32,
+    /// Its speed, as a stopping distance.
+    limit: PathLength,
+}
+
+impl Machine<'_> {
+    /// Returns the limit of the speed, as a stopping distance, for the move to `target`, which was
+    /// read from `path` last.
+    pub(super) fn steady_limit(&mut self, path: &mut dyn Path, target: Target) -> PathLength {
+        if target.ink.is_none() || !self.settings.is_on(Setting::SteadySpeed) {
+            self.steady.moves = 0;
+            return PathLength::MAX;
+        }
+        if self.steady.moves == 0 {
+            let mut line = SteadySpeed::new(self.runner.limits(), self.runner.page_end());
+            line.add(target.point);
+            path.look_ahead(&mut |next| {
+                next.ink == target.ink && line.moves() < MOST_MOVES && line.add(next.point)
+            });
+            self.steady = Steady { moves: line.moves().max(1), limit: line.limit() };
+        }
+        self.steady.moves -= 1;
+        self.steady.limit
+    }
+}

@@ -1,0 +1,69 @@
+//! The greatest speed that a stretch of a path can keep all along: what its narrowest bend allows.
+
+use super::curvature::Curvature;
+use super::junction::{Heading, corner};
+use super::{Limits, Lookahead, PathLength};
+use crate::drawing::PagePoint;
+
+/// Looks at a stretch of the path that no sharp corner divides, before it is drawn.
+#[derive(Debug)]
+pub struct SteadySpeed<'l> {
+    limits: &'l Limits,
+    /// Where the stretch ends so far.
+    at: PagePoint,
+    /// The way in which the last move runs, and its length.
+    last: Option<(Heading, PathLength)>,
+    curvature: Curvature,
+    /// It has no blocks, and tells the lowest limit of the bends alone.
+    bends: Lookahead<'static>,
+    lowest: PathLength,
+    moves: u32,
+}
+
+impl<'l> SteadySpeed<'l> {
+    /// A stretch that begins at `start`, without moves.
+    pub fn new(limits: &'l Limits, start: PagePoint) -> Self {
+        let mut bends = Lookahead::new(&mut []);
+        let mut curvature = Curvature::default();
+        curvature.restart(limits, start, &mut bends);
+        let (last, lowest) = (None, PathLength::MAX);
+        Self { limits, at: start, last, curvature, bends, lowest, moves: 0 }
+    }
+
+    /// How many moves there are.
+    pub fn moves(&self) -> u32 {
+        self.moves
+    }
+
+    /// Appends a move to `point`. Returns `false`, and appends nothing, if a sharp corner is before
+    /// it, or if it is longer than 16 m.
+    pub fn add(&mut self, point: PagePoint) -> bool {
+        let (dx, dy) = (point.x.wrapping_sub(self.at.x), point.y.wrapping_sub(self.at.y));
+        let Some(length) = self.limits.length(dx, dy) else {
+            return false;
+        };
+        if length > 0 {
+            let heading = Heading::new(self.limits, dx, dy, length);
+            if let Some((before, length_before)) = self.last {
+                let corner = corner(self.limits, before, heading, length.min(length_before));
+                if corner.is_sharp {
+                    return false;
+                }
+                self.lowest = self.lowest.min(corner.limit);
+            }
+            if self.limits.centripetal {
+                self.curvature.sync_consumed(self.limits, point, &mut self.bends);
+            }
+            self.last = Some((heading, length));
+            self.at = point;
+        }
+        self.moves += 1;
+        true
+    }
+
+    /// The greatest stopping distance that every bend of the stretch allows; more than 0.
+    pub fn limit(mut self) -> PathLength {
+        self.curvature.restart(self.limits, self.at, &mut self.bends);
+        self.lowest.min(self.bends.take_lowered()).max(PathLength::DELTA)
+    }
+}
