@@ -5,8 +5,8 @@ pub mod page;
 mod view;
 
 pub use machine::{
-    FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs, PortsArgs,
-    ResumeArgs, SetArgs, SettingsCommand, WatchArgs,
+    ConsoleArgs, FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs,
+    PortsArgs, ResumeArgs, SetArgs, SettingsCommand, WatchArgs,
 };
 pub use page::PageArgs;
 pub use view::ViewArgs;
@@ -91,18 +91,24 @@ pub enum Command {
     /// Draw the last job again, which the plotter has kept
     Again(PlotterArgs),
     /// Talk to a plotter line by line
-    Console(PortArgs),
+    Console(ConsoleArgs),
     /// Print the completions for a shell
     Completions {
         /// The shell
         #[arg(value_enum)]
         shell: Shell,
+        /// How the answer is printed.
+        #[command(flatten)]
+        format: FormatArgs,
     },
     /// Print the manual page, or write those of all commands
     Man {
         /// The folder to write penup.1, penup-plot.1 and the others to
         #[arg(value_name = "FOLDER")]
         folder: Option<PathBuf>,
+        /// How the answer is printed.
+        #[command(flatten)]
+        format: FormatArgs,
     },
 }
 
@@ -131,12 +137,13 @@ impl Command {
             | Self::Home(plotter)
             | Self::Unlock(plotter)
             | Self::Again(plotter) => &plotter.format,
-            Self::Preview(_)
-            | Self::Page(_)
-            | Self::Tape(TapeCommand::Decode { .. })
-            | Self::Console(_)
-            | Self::Completions { .. }
-            | Self::Man { .. } => return None,
+            Self::Tape(TapeCommand::Decode { format, .. })
+            | Self::Completions { format, .. }
+            | Self::Man { format, .. } => format,
+            Self::Console(args) => &args.format,
+            Self::Page(args) => &args.format,
+            // Its --json names a file for all that is known of the drawing.
+            Self::Preview(_) => return None,
         })
     }
 }
@@ -151,6 +158,9 @@ pub enum TapeCommand {
         /// The tape
         #[arg(value_name = "FILE")]
         file: PathBuf,
+        /// How the answer is printed.
+        #[command(flatten)]
+        format: FormatArgs,
     },
     /// Show what a tape draws
     Show(TapeShowArgs),

@@ -7,14 +7,15 @@ use crate::output;
 use clap::{Command, CommandFactory as _};
 use clap_complete::Shell;
 use clap_mangen::Man;
-use serde_json::Value;
+use serde_json::json;
 use std::path::Path;
 
 /// The completions for `shell`.
 pub fn completions(shell: Shell) -> Outcome {
     let mut text = Vec::new();
     clap_complete::generate(shell, &mut Cli::command(), "penup", &mut text);
-    Outcome::answer(String::from_utf8_lossy(&text).trim_end(), Value::Null)
+    let text = String::from_utf8_lossy(&text);
+    Outcome::answer(text.trim_end(), json!({ "completions": text }))
 }
 
 /// The manual page of the program, or all pages written to `folder`.
@@ -28,14 +29,16 @@ pub fn pages(folder: Option<&Path>) -> Result<Outcome, Error> {
     collect(&command, "penup", &mut pages);
     let Some(folder) = folder else {
         let (_, page) = pages.into_iter().next().unwrap_or_default();
-        return Ok(Outcome::answer(page.trim_end(), Value::Null));
+        return Ok(Outcome::answer(page.trim_end(), json!({ "page": page })));
     };
     std::fs::create_dir_all(folder)
         .map_err(|source| Error::Write { file: folder.display().to_string(), source })?;
     for (name, page) in &pages {
         output::write(&folder.join(name), page.as_bytes())?;
     }
-    Ok(Outcome::sentence(format!("{}: {} pages", folder.display(), pages.len())))
+    let names: Vec<&str> = pages.iter().map(|(name, _)| name.as_str()).collect();
+    let text = format!("{}: {} pages", folder.display(), pages.len());
+    Ok(Outcome::done(text, json!({ "folder": folder, "files": names })))
 }
 
 /// Adds the pages of `command`, which is called `name`, and of its subcommands.

@@ -32,7 +32,6 @@ use penup_job::results::JobReport;
 use penup_job::room::Room;
 use penup_job::{Job, Settings};
 use penup_readers::lines::Lines;
-use penup_readers::page::Page;
 use penup_readers::{Arrangement, ReadError, SourceFile};
 use serde_json::{Value, json};
 use std::io::{self, Write as _};
@@ -53,9 +52,10 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
         Command::Page(args) => page::serve(args),
         Command::Fit(args) => fit(args, quiet),
         Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, quiet, interrupt),
-        Command::Tape(TapeCommand::Decode { file }) => {
+        Command::Tape(TapeCommand::Decode { file, .. }) => {
             let text = tape::decode(&read_tape(file)?).map_err(damaged(file))?;
-            Ok(Outcome::answer(text.trim_end(), Value::Null))
+            let instructions: Vec<&str> = text.lines().collect();
+            Ok(Outcome::answer(text.trim_end(), json!({ "instructions": instructions })))
         }
         Command::Tape(TapeCommand::Show(args)) => show_tape(args),
         Command::Ports(args) => operate::ports(args),
@@ -77,9 +77,9 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
             operate::restore(file, plotter, interrupt)
         }
         Command::Again(args) => operate::again(args, quiet, interrupt),
-        Command::Console(args) => operate::console(args, interrupt),
-        Command::Completions { shell } => Ok(manual::completions(*shell)),
-        Command::Man { folder } => manual::pages(folder.as_deref()),
+        Command::Console(args) => operate::console(&args.port, args.format.json, interrupt),
+        Command::Completions { shell, .. } => Ok(manual::completions(*shell)),
+        Command::Man { folder, .. } => manual::pages(folder.as_deref()),
     }
 }
 

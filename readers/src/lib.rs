@@ -5,13 +5,15 @@
 //! file they come from. [`words`] says in the terms of the command line why one is refused.
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
-//! WebAssembly, the page. A format that needs a crate of its own is a feature: `ply`, `svg`.
+//! WebAssembly, the page. A large format is a feature: `dxf`, `ply`, `svg`.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
 //! that are read, and so is a file of 4 GiB or more.
 
 mod arrange;
+#[cfg(feature = "dxf")]
+mod dxf;
 mod error;
 mod format;
 mod gcode;
@@ -50,6 +52,8 @@ static FORMATS: &[&dyn Format] = &[
     &ply::Ply,
     &gcode::GCode,
     &hpgl::HpGl,
+    #[cfg(feature = "dxf")]
+    &dxf::Dxf,
     &tape::Tape,
 ];
 

@@ -166,6 +166,22 @@ impl Plan {
     }
 }
 
+/// The most pens that a plotter has.
+#[cfg(any(feature = "dxf", feature = "svg"))]
+const MOST_PENS: u32 = 32;
+
+/// The pen number in the name of a layer: `1`, `2 red`, `pen3`, `Layer 4`, `layer_5`. The number
+/// stands at the beginning, or after one word.
+#[cfg(any(feature = "dxf", feature = "svg"))]
+pub(crate) fn number_in(name: &str) -> Option<u32> {
+    let name = name.trim_start().trim_start_matches(['%', '!']).trim_start();
+    let word_end = name.find(|letter: char| !letter.is_alphabetic()).unwrap_or(name.len());
+    let rest = name.get(word_end..)?.trim_start_matches([' ', '_', '-', '#']);
+    let end = rest.find(|letter: char| !letter.is_ascii_digit()).unwrap_or(rest.len());
+    let number = rest.get(..end)?.parse().ok()?;
+    (1..=MOST_PENS).contains(&number).then_some(number)
+}
+
 /// Reads the lines of OBJ as a plan.
 ///
 /// # Errors
@@ -299,5 +315,30 @@ impl Lines for PlanLines {
             text: text.clone(),
         });
         Some(JobLine { sent: sent.clone(), origin })
+    }
+}
+
+#[cfg(all(test, feature = "svg"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_number_of_a_pen_is_found_in_the_name_of_a_layer() {
+        for (name, number) in [
+            ("1", Some(1)),
+            ("2 red", Some(2)),
+            ("pen3", Some(3)),
+            ("Layer 4", Some(4)),
+            ("layer_05", Some(5)),
+            ("12-outline", Some(12)),
+            ("red", None),
+            ("the house of 1893", None),
+            ("0", None),
+            ("33", None),
+            ("", None),
+            ("99999999999999999999", None),
+        ] {
+            assert_eq!(number_in(name), number, "{name}");
+        }
     }
 }

@@ -8,9 +8,12 @@
 //! a shape that is only filled is drawn as its outline. What has neither is not drawn. Text,
 //! images, masks, filters and clip paths that are not convex are counted, and the user is told.
 //!
+//! The names of layers may hold the codes of AxiDraw ([`axidraw`]).
+//!
 //! The reader refuses files that are no SVG, have nothing to draw, or have more points than fit in
 //! memory.
 
+mod axidraw;
 mod clip;
 mod drawing;
 mod flatten;
@@ -122,9 +125,14 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     plan.layers = chosen.layers;
     plan.areas = Some(areas);
     let mut notes = markup.left_out(&drawing.seen);
+    notes.extend(pens::not_obeyed(&marks));
     notes.extend(not_as_it_is(&drawing));
     if plan.is_empty() {
         let mut reasons = vec!["there is nothing to draw in this SVG".to_owned()];
+        if drawing.documentation > 0 {
+            let counted = counted(drawing.documentation, ["path is", "paths are"]);
+            reasons.push(format!("{counted} in layers that are not plotted, as % says"));
+        }
         if drawing.invisible > 0 {
             let counted = counted(drawing.invisible, ["path has", "paths have"]);
             reasons.push(format!("{counted} neither a stroke nor a fill that is seen"));
@@ -138,6 +146,11 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
 /// What is drawn otherwise than the file says, in sentences for the user.
 fn not_as_it_is(drawing: &Drawing<'_, '_>) -> impl Iterator<Item = String> {
     [
+        (
+            drawing.documentation,
+            ["path is", "paths are"],
+            "not drawn: the name of the layer begins with %",
+        ),
         (
             drawing.cut,
             ["path reaches", "paths reach"],

@@ -84,7 +84,7 @@ mod with_feature {
         let settings = PLACING.into_iter().flat_map(|setting| {
             [setting.info().number.into(), settings.get(setting).to_bits().cast_unsigned()]
         });
-        let mut notes = Notes::default();
+        let mut notes: Notes = [[0; 4]; WORDS];
         for (slot, word) in notes.iter_mut().zip(head.into_iter().chain(settings)) {
             *slot = word.to_le_bytes();
         }
@@ -237,7 +237,8 @@ mod with_feature {
             drawn: u32,
             cancel: &mut dyn Cancel,
         ) -> Result<(), CommandError> {
-            let strokes = self.job.strokes(self.words, &mut self.cursor);
+            let ends = self.machine.stroke_ends();
+            let strokes = self.job.strokes(self.words, &mut self.cursor, ends);
             let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
             let whole = self.machine.measure_whole(&mut strokes)?;
             if strokes.aborted {
@@ -261,7 +262,7 @@ mod with_feature {
 
     /// Reads the notes of the kept job, and how many of its strokes are drawn.
     fn read<B: Board>(board: &mut B) -> Option<(Notes, u32)> {
-        let mut notes = Notes::default();
+        let mut notes: Notes = [[0; 4]; WORDS];
         let (length, done) = board.progress(notes.as_flattened_mut())?;
         let [layout, ..] = notes.map(u32::from_le_bytes);
         (length == size_of::<Notes>() && layout == LAYOUT).then_some((notes, done))

@@ -27,6 +27,17 @@ pub struct PlotterArgs {
     pub format: FormatArgs,
 }
 
+/// Options of `penup console`.
+#[derive(Debug, Args)]
+pub struct ConsoleArgs {
+    /// How the plotter is found.
+    #[command(flatten)]
+    pub port: PortArgs,
+    /// How the answers are printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
+}
+
 /// How an answer is printed.
 #[derive(Debug, Args)]
 pub struct FormatArgs {

@@ -1,5 +1,6 @@
 //! The arguments of `penup page`, and what it does.
 
+use super::FormatArgs;
 use crate::error::Error;
 use crate::outcome::Outcome;
 use crate::serve::PageServer;
@@ -20,6 +21,9 @@ pub struct PageArgs {
     /// The port to listen at, on this computer alone; 0 takes one that is free
     #[arg(long, value_name = "PORT", default_value = "0")]
     pub listen: u16,
+    /// How an answer is printed.
+    #[command(flatten)]
+    pub format: FormatArgs,
     /// Print the address, and open no browser
     #[arg(long)]
     pub no_browser: bool,
@@ -33,7 +37,11 @@ pub fn serve(args: &PageArgs) -> Result<Outcome, Error> {
     let folder = args.folder.clone().unwrap_or_else(|| workspace::root().join("target/page"));
     let server = PageServer::new(&folder, args.file.as_deref(), args.listen)?;
     let address = server.address();
-    let printed = writeln!(io::stdout(), "{address}").and_then(|()| io::stdout().flush());
+    let said = match args.format.json {
+        true => serde_json::json!({ "address": address }).to_string(),
+        false => address.clone(),
+    };
+    let printed = writeln!(io::stdout(), "{said}").and_then(|()| io::stdout().flush());
     printed.map_err(|source| Error::Write { file: "the standard output".to_owned(), source })?;
     // A closed standard error is no reason to fail, nor is a computer without a browser.
     let say = |text: &str| drop(writeln!(io::stderr(), "penup: {text}"));

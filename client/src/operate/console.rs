@@ -29,11 +29,11 @@ const GREETING: &str = "Type lines for the plotter; ? asks for the status, ! hol
                         gives up. Ctrl-D ends.";
 
 /// Sends each line of the standard input when the one before is answered, and prints all that the
-/// plotter says. Lines of bytes that act at once are not held back. Ends at the end of the input.
+/// plotter says, with `is_json` each of its lines as an object. Lines of bytes that act at once are not held back. Ends at the end of the input.
 ///
 /// # Errors
 /// The port cannot be opened, or the line to the plotter breaks.
-pub fn console(args: &PortArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+pub fn console(args: &PortArgs, is_json: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(args)?;
     // A client that broke off may have left the plotter in a conversation with checksums.
     let (_, status) = Sender::join(&mut link, Patience::default(), interrupt)?;
@@ -43,7 +43,7 @@ pub fn console(args: &PortArgs, interrupt: &AtomicBool) -> Result<Outcome, Error
     if io::stdin().is_terminal() {
         eprintln!("{GREETING}");
     }
-    let refused = talk(&mut link, &typed())?;
+    let refused = talk(&mut link, &typed(), is_json)?;
     Ok(Outcome { text: String::new(), json: json!({ "refused": refused }), is_answer: false })
 }
 
@@ -56,12 +56,30 @@ fn typed() -> Receiver<String> {
     receiver
 }
 
+/// The lines that end within `bytes`, each as an object of JSON. What follows them stays in `line`.
+fn objects(bytes: &[u8], line: &mut Vec<u8>) -> Vec<u8> {
+    let mut objects = Vec::new();
+    for byte in bytes {
+        if *byte != b'\n' {
+            line.push(*byte);
+            continue;
+        }
+        let said = String::from_utf8_lossy(line).trim().to_owned();
+        line.clear();
+        if !said.is_empty() {
+            objects.extend(format!("{}\n", json!({ "said": said })).bytes());
+        }
+    }
+    objects
+}
+
 /// Returns how many lines were refused.
-fn talk(link: &mut SerialLink, typed: &Receiver<String>) -> Result<usize, Error> {
+fn talk(link: &mut SerialLink, typed: &Receiver<String>, is_json: bool) -> Result<usize, Error> {
     let mut reader = ReplyReader::default();
     let mut waiting: VecDeque<String> = VecDeque::new();
     let (mut is_open, mut is_answered, mut refused) = (true, true, 0);
     let mut buffer = [0; 256];
+    let mut line_said = Vec::new();
     let mut silences = 0;
     // A last question, such as that for the status, may still be answered.
     while is_open || !is_answered || !waiting.is_empty() || silences < LAST_SILENCES {
@@ -87,8 +105,9 @@ fn talk(link: &mut SerialLink, typed: &Receiver<String>) -> Result<usize, Error>
         silences = if count == 0 { silences + 1 } else { 0 };
         let bytes = buffer.get(..count).unwrap_or_default();
         let mut stdout = io::stdout().lock();
+        let said = if is_json { objects(bytes, &mut line_said) } else { bytes.to_vec() };
         stdout
-            .write_all(bytes)
+            .write_all(&said)
             .and_then(|()| stdout.flush())
             .map_err(|source| Error::Write { file: "the standard output".to_owned(), source })?;
         for reply in bytes.iter().filter_map(|byte| reader.push(*byte)) {
@@ -103,4 +122,17 @@ fn talk(link: &mut SerialLink, typed: &Receiver<String>) -> Result<usize, Error>
         }
     }
     Ok(refused)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::objects;
+
+    #[test]
+    fn each_whole_line_is_an_object() {
+        let mut line = Vec::new();
+        assert_eq!(objects(b"ok\r\n<Id", &mut line), b"{\"said\":\"ok\"}\n");
+        assert_eq!(objects(b"le>\n\n", &mut line), b"{\"said\":\"<Idle>\"}\n");
+        assert!(line.is_empty());
+    }
 }

@@ -1,8 +1,8 @@
 //! Files that a user gives to the client.
 
 use penup_client::files::parse;
-use penup_client::lines::Lines as _;
 use penup_readers::Arrangement;
+use penup_readers::lines::Lines as _;
 
 /// The names under which an input is read. The extension decides the format; of an unknown one,
 /// the content does.

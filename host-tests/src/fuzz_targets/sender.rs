@@ -1,9 +1,9 @@
 //! A plotter that answers the client with anything.
 
-use penup_client::lines::JobLine;
 use penup_client::link::Link;
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
+use penup_readers::lines::JobLine;
 use std::io;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};

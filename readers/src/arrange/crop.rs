@@ -101,6 +101,7 @@ fn inside(from: Point, to: Point, rectangle: [Point; 2]) -> Option<[Point; 2]> {
 /// The outline of what is inside both `outline` and a convex area, which lies on the side of each
 /// `(point, inward)` to which `inward` points (Sutherland & Hodgman 1974). Where the area cuts the
 /// outline into parts, they hang together by sides along the border, which surround nothing.
+#[cfg(feature = "svg")]
 pub(crate) fn clip_outline(outline: &[Point], sides: &[(Point, Point)]) -> Vec<Point> {
     let mut points = outline.to_vec();
     for &(origin, inward) in sides {

@@ -3,7 +3,8 @@
 //! [`PLAN_OPTIONS`] has one row for each option, from which the help of the command line is made. An
 //! [`Arrangement`] holds their values. The steps come in a fixed order: layers are chosen; the plan
 //! is scaled and turned, hatched, laid in the middle of the page, and cropped; then strokes are
-//! joined, simplified and begun elsewhere; and last the layers are given their pens.
+//! joined and simplified; and last the layers are given their pens. Where a closed stroke begins is
+//! nothing to choose here: the plotter begins it where that makes the moves between strokes short.
 //!
 //! A file that is no plan is refused if any of the options is given, and so is a value that leaves
 //! nothing to draw.
@@ -12,10 +13,10 @@ mod crop;
 mod hatch;
 mod layers;
 mod linemerge;
-mod reloop;
 mod simplify;
 mod table;
 
+#[cfg(feature = "svg")]
 pub(crate) use crop::clip_outline;
 pub use table::{PLAN_OPTIONS, PlanOption};
 
@@ -68,7 +69,6 @@ pub struct Arrangement {
     pub(crate) crop: Option<Crop>,
     pub(crate) linemerge: Option<f64>,
     pub(crate) simplify: Option<f64>,
-    pub(crate) reloop: bool,
     pub(crate) layer_order: Vec<String>,
 }
 
@@ -157,9 +157,6 @@ impl Arrangement {
         }
         if let Some(tolerance) = self.simplify {
             simplify::simplify(plan, tolerance);
-        }
-        if self.reloop {
-            reloop::reloop(plan);
         }
         if !self.layer_order.is_empty() {
             notes.push(layers::reorder(plan, &self.layer_order)?);

@@ -153,17 +153,6 @@ pub const PLAN_OPTIONS: &[PlanOption] = &[
         is_set: |arrangement| arrangement.simplify.is_some(),
     },
     PlanOption {
-        name: "reloop",
-        value: "",
-        help: "Begin each closed stroke at another of its points, so that the seams do not line up",
-        changes_size: false,
-        set: |arrangement, _| {
-            arrangement.reloop = true;
-            Ok(())
-        },
-        is_set: |arrangement| arrangement.reloop,
-    },
-    PlanOption {
         name: "layer-order",
         value: "NAMES",
         help: "Draw the layers in this order, by name or number, with commas between them: pen 1 \

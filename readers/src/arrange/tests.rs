@@ -227,27 +227,6 @@ proptest! {
     }
 
     #[test]
-    fn closed_strokes_begin_elsewhere_and_nothing_else_changes(plan in plans()) {
-        let before = after(&plan, &[]);
-        let begun = after(&plan, &[("reloop", "")]);
-        prop_assert_eq!(before.len(), begun.len());
-        for ((pen, old), (same_pen, new)) in before.iter().zip(&begun) {
-            prop_assert_eq!(pen, same_pen);
-            if old.len() < 3 || old.first() != old.last() {
-                prop_assert_eq!(old, new);
-                continue;
-            }
-            prop_assert_eq!(new.first(), new.last());
-            let mut turned = new[1..].to_vec();
-            let found = (0..turned.len()).any(|_| {
-                turned.rotate_left(1);
-                turned == old[1..]
-            });
-            prop_assert!(found, "{old:?} {new:?}");
-        }
-    }
-
-    #[test]
     fn hatch_lines_lie_inside_at_their_distance(
         outlines in vec(vec([0..150_000_i32, 0..150_000_i32], 3..9), 1..4),
         spacing in 1.0..9.0_f64, angle in -180.0..180.0_f64,

@@ -51,6 +51,8 @@ pub(super) struct Drawing<'a, 'input> {
     pub(super) seen: HashSet<NodeId>,
     /// The number of paths that have neither stroke nor fill, or are transparent.
     pub(super) invisible: usize,
+    /// The number of paths in layers that are not plotted.
+    pub(super) documentation: usize,
     /// The number of paths that reach beyond the page and are cut there.
     pub(super) cut: usize,
     /// The number of clip paths that are not applied.
@@ -94,6 +96,7 @@ impl<'a, 'input> Drawing<'a, 'input> {
             shapes: Vec::new(),
             seen: HashSet::new(),
             invisible: 0,
+            documentation: 0,
             cut: 0,
             clips: 0,
             masks: 0,
@@ -175,6 +178,11 @@ impl<'a, 'input> Drawing<'a, 'input> {
             return Ok(());
         };
         let element = own.or(context.element);
+        let place = context.element.or(own);
+        if place.is_some_and(|place| self.markup.is_documentation(place)) {
+            self.documentation += 1;
+            return Ok(());
+        }
         let dashes = stroke.and_then(|stroke| Some((stroke.dasharray()?, stroke.dashoffset())));
         let dashed = match dashes {
             None => None,

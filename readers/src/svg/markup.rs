@@ -3,6 +3,7 @@
 //! `usvg` keeps nothing of an element but its `id`. So every group and shape without one is given
 //! an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
 
+use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
 use std::collections::{HashMap, HashSet};
@@ -150,6 +151,11 @@ impl<'a, 'input> Markup<'a, 'input> {
         Some(Layer { element: layer.id(), name: name.unwrap_or_default().to_owned() })
     }
 
+    /// Whether a layer that contains this element is not plotted, because its name begins with `%`.
+    pub(super) fn is_documentation(&self, element: NodeId) -> bool {
+        self.node(element).is_some_and(is_in_documentation)
+    }
+
     /// Counts what the file has that is never drawn, in sentences for the user. `drawn` are the
     /// elements that were found in the drawing.
     pub(super) fn left_out(&self, drawn: &HashSet<NodeId>) -> Vec<String> {
@@ -179,7 +185,7 @@ impl<'a, 'input> Markup<'a, 'input> {
             } else {
                 continue;
             };
-            if !is_hidden(node) {
+            if !is_hidden(node) && !is_in_documentation(node) {
                 counted.add(self.document, node);
             }
         }
@@ -226,6 +232,15 @@ fn is_within(node: Node<'_, '_>, names: &[&str]) -> bool {
     node.ancestors().skip(1).any(|node| is_one_of(node, names))
 }
 
+/// Whether a layer that contains `node` is not plotted, because its name begins with `%`.
+fn is_in_documentation(node: Node<'_, '_>) -> bool {
+    let mut groups = node.ancestors().filter(|node| is_one_of(*node, &["g"]));
+    groups.any(|group| {
+        let name = group.attribute((INKSCAPE, "label")).or(group.attribute("id"));
+        is_layer(group) && name.is_some_and(|name| Control::of(name).is_documentation)
+    })
+}
+
 /// Whether the path data of `node` has an error, at which the path ends.
 fn has_error(node: Node<'_, '_>) -> bool {
     let data = node.attribute("d").unwrap_or_default();
@@ -248,7 +263,7 @@ fn is_hidden(node: Node<'_, '_>) -> bool {
 fn is_layer(group: Node<'_, '_>) -> bool {
     let is_on_top = group.parent_element().is_some_and(|parent| parent.parent_element().is_none());
     let has_label = group.attribute((INKSCAPE, "label")).is_some();
-    let numbered = |id: &str| super::pens::number_in(id).is_some() && !id.starts_with("penup-");
+    let numbered = |id: &str| crate::plan::number_in(id).is_some() && !id.starts_with("penup-");
     group.attribute((INKSCAPE, "groupmode")) == Some("layer")
         || is_on_top && (has_label || group.attribute("id").is_some_and(numbered))
 }

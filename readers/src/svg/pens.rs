@@ -1,11 +1,10 @@
 //! Chooses the pen of each stroke: by layers, or else by colours.
 
+use super::axidraw::Control;
+use crate::plan::number_in;
 use std::collections::{HashMap, HashSet};
 use std::hash::Hash;
 use usvg::roxmltree::NodeId;
-
-/// The most pens that a plotter has.
-const MOST_PENS: u32 = 32;
 
 /// A layer of the drawing.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -25,14 +24,29 @@ pub(super) struct Marks {
     pub(super) colour: Option<[u8; 3]>,
 }
 
-/// The pen number in the name of a layer: `1`, `2 red`, `pen3`, `Layer 4`, `layer_5`. The number
-/// stands at the beginning, or after one word.
-pub(super) fn number_in(name: &str) -> Option<u32> {
-    let word_end = name.find(|letter: char| !letter.is_alphabetic()).unwrap_or(name.len());
-    let rest = name.get(word_end..)?.trim_start_matches([' ', '_', '-', '#']);
-    let end = rest.find(|letter: char| !letter.is_ascii_digit()).unwrap_or(rest.len());
-    let number = rest.get(..end)?.parse().ok()?;
-    (1..=MOST_PENS).contains(&number).then_some(number)
+/// Says which codes of AxiDraw in the names of layers are not obeyed.
+pub(super) fn not_obeyed(marks: &[Marks]) -> Vec<String> {
+    let (layers, _) = distinct(marks.iter().filter_map(|marks| marks.layer.as_ref()));
+    let mut notes = Vec::new();
+    let alone = layers.len() < 2;
+    for layer in layers {
+        let (name, control) = (layer.name.trim(), Control::of(&layer.name));
+        let codes = control.not_obeyed();
+        if !codes.is_empty() {
+            notes.push(format!(
+                "the layer \"{name}\" is drawn with the speed and the pen of the others: {} cannot \
+                 be obeyed",
+                codes.join(" ")
+            ));
+        }
+        if control.pauses && alone {
+            notes.push(format!(
+                "there is no pause before the layer \"{name}\": it is the only one, and the machine \
+                 pauses where pens change"
+            ));
+        }
+    }
+    notes
 }
 
 /// The pens of paths, and their layers.
@@ -66,8 +80,16 @@ pub(super) fn pens(marks: &[Marks]) -> Chosen {
             layers: colours.iter().map(name).collect(),
         };
     }
-    let numbered: Vec<Option<u32>> =
+    let mut numbered: Vec<Option<u32>> =
         layers.iter().map(|layer| layer.map_or(Some(1), |layer| number_in(&layer.name))).collect();
+    // A layer before which the machine pauses has a pen that no other layer has.
+    let mut used = HashSet::new();
+    let pauses = |layer: &Layer| Control::of(&layer.name).pauses;
+    for (number, layer) in numbered.iter_mut().zip(&layers) {
+        if number.is_some_and(|number| !used.insert(number)) && layer.is_some_and(pauses) {
+            *number = None;
+        }
+    }
     let taken: HashSet<u32> = numbered.iter().copied().flatten().collect();
     let mut free = (1..).filter(|number| !taken.contains(number));
     let chosen: Vec<u32> =
@@ -95,29 +117,4 @@ fn distinct<T: Copy + Eq + Hash>(values: impl Iterator<Item = T>) -> (Vec<T>, Ve
     };
     let all = values.map(index).collect();
     (distinct, all)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_number_of_a_pen_is_found_in_the_name_of_a_layer() {
-        for (name, number) in [
-            ("1", Some(1)),
-            ("2 red", Some(2)),
-            ("pen3", Some(3)),
-            ("Layer 4", Some(4)),
-            ("layer_05", Some(5)),
-            ("12-outline", Some(12)),
-            ("red", None),
-            ("the house of 1893", None),
-            ("0", None),
-            ("33", None),
-            ("", None),
-            ("99999999999999999999", None),
-        ] {
-            assert_eq!(number_in(name), number, "{name}");
-        }
-    }
 }

@@ -278,6 +278,90 @@ fn layers_choose_pens_or_else_colours_do() {
 }
 
 #[test]
+fn the_codes_of_axidraw_are_obeyed_or_named() {
+    let layer = |label: &str, y: u32| {
+        format!("<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9'/></g>")
+    };
+    let notes = "<g inkscape:groupmode='layer' inkscape:label='% notes'><text>a</text></g>";
+    let svg = in_mm(&[layer("2", 1), layer("! 2 +S50+D100 red", 2), layer("%3", 3)].concat());
+    let svg = svg.replace("</svg>", &format!("{notes}</svg>"));
+    assert_eq!(used_pens(&svg), ["pen2", "pen1"]);
+    let contents = read(&svg).expect("an SVG");
+    assert_eq!(
+        contents.notes(),
+        [
+            "the layer \"! 2 +S50+D100 red\" is drawn with the speed and the pen of the others: \
+             +S50 +D100 cannot be obeyed",
+            "1 path is not drawn: the name of the layer begins with %",
+        ]
+    );
+    let error = read(&in_mm(&layer("%", 3))).map(drop).expect_err("nothing to draw");
+    assert!(error.contains("1 path is in layers that are not plotted"), "{error}");
+    let alone = read(&in_mm(&layer("!1", 3))).expect("an SVG");
+    assert!(alone.notes()[0].starts_with("there is no pause before the layer \"!1\""));
+}
+
+/// Reads an SVG and arranges it by these options.
+fn arranged(svg: &str, options: &[(&str, &str)]) -> Result<SourceFile, String> {
+    let mut arrangement = Arrangement::default();
+    for (option, value) in options {
+        arrangement.set(option, value)?;
+    }
+    let file = SourceFile::arranged("a.svg".to_owned(), svg.into(), &arrangement);
+    file.map_err(|error| error.to_string())
+}
+
+#[test]
+fn layers_are_chosen_by_label_number_or_colour() {
+    let layer = |label: &str, y: u32| {
+        format!("<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9'/></g>")
+    };
+    let svg = in_mm(&[layer("Sky", 1), layer("4 house", 2), layer("Tree", 3)].concat());
+    let heights = |svg: &str, options: &[(&str, &str)]| -> Vec<f64> {
+        let file = arranged(svg, options).expect("a plan");
+        polylines(&file).iter().map(|(_, points)| 100.0 - points[0][1]).collect()
+    };
+    assert_eq!(heights(&svg, &[("layer", "sky,4")]), [1.0, 2.0]);
+    assert_eq!(heights(&svg, &[("layer", "Tree")]), [3.0]);
+    let file = arranged(&svg, &[("layer-order", "Tree,4 house")]).expect("a plan");
+    let pens: Vec<String> = polylines(&file).into_iter().map(|(pen, _)| pen).collect();
+    assert_eq!(pens, ["pen3", "pen2", "pen1"]);
+    let coloured = in_mm("<path d='M0 1H9' stroke='red'/><path d='M0 2H9' stroke='#00f'/>");
+    assert_eq!(heights(&coloured, &[("layer", "#0000FF")]), [2.0]);
+    let error = arranged(&svg, &[("layer", "sea")]).map(drop).expect_err("refused");
+    assert!(error.contains("no layer \"sea\"; there are \"Sky\" (pen 1)"), "{error}");
+}
+
+#[test]
+fn filled_shapes_are_hatched_within_the_page_and_holes_stay_free() {
+    let svg = in_mm(
+        "<path d='M10 10H30V30H10ZM15 15H25V25H15Z'/>\
+         <rect x='50' y='50' width='10' height='10' fill='none' stroke='red'/>\
+         <rect x='70' y='70' width='10' height='10' fill='#fff' stroke='red'/>\
+         <rect x='90' y='10' width='50' height='10'/>",
+    );
+    let outlines = polylines(&read(&svg).expect("an SVG")).len();
+    let file = arranged(&svg, &[("hatch", "2,0")]).expect("a plan");
+    let lines = polylines(&file).split_off(outlines);
+    let length = |line: &Sent| line.1[1][0] - line.1[0][0];
+    let ink: f64 = lines.iter().map(|line| length(line).abs()).sum();
+    // 300 and 100 square millimetres by lines that are 2 mm apart.
+    assert!((ink - 200.0).abs() < 20.0, "{ink}");
+    for (_, points) in &lines {
+        let middle = [f64::midpoint(points[0][0], points[1][0]), 100.0 - points[0][1]];
+        let is_between = |from: [f64; 2], to: [f64; 2]| {
+            (0..2).all(|axis| (from[axis]..=to[axis]).contains(&middle[axis]))
+        };
+        let is_ring = is_between([10.0; 2], [30.0; 2]) && !is_between([15.1; 2], [24.9; 2]);
+        assert!(is_ring || is_between([90.0, 10.0], [100.0, 20.0]), "{points:?}");
+        assert!(points.iter().all(|point| point[0] <= 100.0), "{points:?}");
+    }
+    let outline = in_mm("<rect width='10' height='10' fill='none' stroke='red'/>");
+    let error = arranged(&outline, &[("hatch", "2")]).map(drop).expect_err("nothing filled");
+    assert!(error.contains("no closed, filled shape"), "{error}");
+}
+
+#[test]
 fn what_is_not_drawn_is_counted() {
     let svg = in_mm(
         "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\

@@ -1,0 +1,506 @@
+//! Reads the text form of DXF as plans: lines, polylines with bulges, arcs, circles, ellipses and
+//! splines, also in blocks, as they are seen from above.
+//!
+//! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
+//! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
+//! refuses the binary form, and a file that does not consist of pairs of a code and a value.
+
+mod curves;
+
+use super::arrange::Arrangement;
+use super::counted;
+use super::error::ReadError;
+use super::format::{Contents, Format};
+use super::plan::{Plan, Point, number_in};
+use crate::lines::Origin;
+use curves::{Affine, Curve, Spline};
+use std::collections::{BTreeMap, HashMap, HashSet};
+
+/// The format itself.
+#[derive(Debug)]
+pub(super) struct Dxf;
+
+/// The most blocks within each other.
+const MOST_NESTED: usize = 16;
+
+/// The most points before a file is refused. They take 160 MB.
+const MOST_POINTS: usize = 10_000_000;
+
+/// The units of `$INSUNITS` and their lengths in mm.
+const UNITS: [(i64, f64); 11] = [
+    (1, 25.4),
+    (2, 304.8),
+    (4, 1.0),
+    (5, 10.0),
+    (6, 1000.0),
+    (8, 0.000_025_4),
+    (9, 0.0254),
+    (10, 914.4),
+    (12, 0.000_1),
+    (13, 0.001),
+    (14, 100.0),
+];
+
+/// A code and its value, and the line of the file in which the value stands.
+#[derive(Debug, Clone, Copy)]
+struct Pair<'a> {
+    code: i32,
+    value: &'a str,
+    line: usize,
+}
+
+/// An entity of a drawing, such as a line.
+#[derive(Debug, Clone, Default)]
+struct Entity<'a> {
+    kind: &'a str,
+    line: usize,
+    pairs: Vec<Pair<'a>>,
+}
+
+/// A reason for a refusal, and the line.
+type Refusal = (usize, String);
+
+impl<'a> Entity<'a> {
+    fn text(&self, code: i32) -> Option<&'a str> {
+        self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.value)
+    }
+
+    /// All numbers with this code.
+    fn numbers(&self, code: i32) -> Result<Vec<f64>, Refusal> {
+        self.pairs.iter().filter(|pair| pair.code == code).map(|pair| number(*pair)).collect()
+    }
+
+    fn number(&self, code: i32, default: f64) -> Result<f64, Refusal> {
+        Ok(self.numbers(code)?.first().copied().unwrap_or(default))
+    }
+
+    fn point(&self, code: i32) -> Result<Point, Refusal> {
+        Ok([self.number(code, 0.0)?, self.number(code + 10, 0.0)?])
+    }
+
+    fn points(&self, code: i32) -> Result<Vec<Point>, Refusal> {
+        let (x, y) = (self.numbers(code)?, self.numbers(code + 10)?);
+        if x.len() != y.len() {
+            return Err((self.line, format!("{} has points without x or y", self.kind)));
+        }
+        Ok(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect())
+    }
+
+    fn flags(&self) -> Result<i64, Refusal> {
+        Ok(self.number(70, 0.0)? as i64)
+    }
+
+    fn layer(&self) -> &'a str {
+        self.text(8).unwrap_or("0")
+    }
+}
+
+fn number(pair: Pair<'_>) -> Result<f64, Refusal> {
+    match pair.value.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value.abs() < 1e12 => Ok(value),
+        _ => Err((pair.line, "this is no number that can be drawn".to_owned())),
+    }
+}
+
+/// What a file says.
+#[derive(Debug, Default)]
+struct Document<'a> {
+    unit: Option<i64>,
+    /// The layers that are not drawn.
+    hidden: HashSet<&'a str>,
+    /// The blocks with their base points.
+    blocks: HashMap<&'a str, (Point, Vec<Entity<'a>>)>,
+    entities: Vec<Entity<'a>>,
+}
+
+/// The pairs of a file.
+fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
+    let mut lines = text.lines().enumerate();
+    let mut pairs = Vec::new();
+    while let Some((index, code)) = lines.next() {
+        let Ok(code) = code.trim().parse() else {
+            if code.trim().is_empty() && lines.clone().all(|(_, line)| line.trim().is_empty()) {
+                break;
+            }
+            return Err((index + 1, "there should be a code of DXF, a whole number".to_owned()));
+        };
+        let Some((index, value)) = lines.next() else {
+            return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
+        };
+        pairs.push(Pair { code, value: value.trim(), line: index + 1 });
+    }
+    Ok(pairs)
+}
+
+/// Divides pairs into entities, each of which begins with code 0. A polyline takes its vertices.
+fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
+    let mut entities: Vec<Entity<'a>> = Vec::new();
+    for pair in pairs {
+        if pair.code == 0 {
+            entities.push(Entity { kind: pair.value, line: pair.line, pairs: Vec::new() });
+        } else if let Some(entity) = entities.last_mut() {
+            entity.pairs.push(*pair);
+        }
+    }
+    entities
+}
+
+fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> {
+    let mut document = Document::default();
+    let starts: Vec<usize> = (0..pairs.len())
+        .filter(|&at| pairs[at].code == 0 && pairs[at].value == "SECTION")
+        .collect();
+    for (number, &start) in starts.iter().enumerate() {
+        let end = starts.get(number + 1).copied().unwrap_or(pairs.len());
+        let section = &pairs[start..end];
+        match section.get(1).map(|pair| pair.value) {
+            Some("HEADER") => {
+                let mut after = section.iter().skip_while(|pair| pair.value != "$INSUNITS");
+                let unit = after.nth(1).filter(|pair| pair.code == 70);
+                document.unit = unit.map(|pair| number_of(*pair)).transpose()?;
+            }
+            Some("TABLES") => {
+                for layer in entities(section).iter().filter(|it| it.kind == "LAYER") {
+                    let is_hidden = layer.number(62, 7.0)? < 0.0 || layer.flags()? & 1 == 1;
+                    document.hidden.extend(layer.text(2).filter(|_| is_hidden));
+                }
+            }
+            Some("BLOCKS") => {
+                let mut block: Option<(&str, Point)> = None;
+                for entity in entities(section) {
+                    match (entity.kind, block) {
+                        ("BLOCK", _) => {
+                            let name = entity.text(2).unwrap_or_default();
+                            let base = entity.point(10)?;
+                            document.blocks.insert(name, (base, Vec::new()));
+                            block = Some((name, base));
+                        }
+                        ("ENDBLK" | "ENDSEC" | "SECTION", _) => block = None,
+                        (_, Some((name, _))) => {
+                            if let Some((_, entities)) = document.blocks.get_mut(name) {
+                                entities.push(entity);
+                            }
+                        }
+                        _ => {}
+                    }
+                }
+            }
+            Some("ENTITIES") => {
+                let is_own = |it: &Entity<'_>| !matches!(it.kind, "SECTION" | "ENDSEC" | "EOF");
+                document.entities = entities(section).into_iter().filter(is_own).collect();
+            }
+            _ => {}
+        }
+    }
+    Ok(document)
+}
+
+fn number_of(pair: Pair<'_>) -> Result<i64, Refusal> {
+    Ok(number(pair)? as i64)
+}
+
+/// What is drawn, and what is not.
+struct Drawing<'d, 'a> {
+    document: &'d Document<'a>,
+    /// The strokes with their entities' lines and kinds, and their layers.
+    strokes: Vec<(usize, &'a str, &'a str, Vec<Point>)>,
+    /// The number of entities of a kind that are not drawn, and the line of the first.
+    skipped: BTreeMap<String, (usize, usize)>,
+    points: usize,
+}
+
+impl<'d, 'a> Drawing<'d, 'a> {
+    fn skip(&mut self, what: &str, line: usize) {
+        self.skipped.entry(what.to_owned()).or_insert((0, line)).0 += 1;
+    }
+
+    fn all(
+        &mut self,
+        entities: &'d [Entity<'a>],
+        to_page: Affine,
+        outer_layer: Option<&'a str>,
+        depth: usize,
+    ) -> Result<(), Refusal> {
+        let mut at = 0;
+        while let Some(entity) = entities.get(at) {
+            at += 1;
+            // The vertices of a polyline of the old form follow it.
+            let first = at;
+            if entity.kind == "POLYLINE" {
+                while entities.get(at).is_some_and(|it| matches!(it.kind, "VERTEX" | "SEQEND")) {
+                    at += 1;
+                }
+            }
+            let layer = match (entity.layer(), outer_layer) {
+                ("0", Some(outer)) => outer,
+                (own, _) => own,
+            };
+            if self.document.hidden.contains(layer) {
+                self.skip("entities on layers that are off or frozen", entity.line);
+            } else if entity.number(67, 0.0)? != 0.0 {
+                self.skip("entities in paper space", entity.line);
+            } else {
+                let vertices = entities.get(first..at).unwrap_or_default();
+                self.entity(entity, vertices, to_page, layer, depth)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn entity(
+        &mut self,
+        entity: &'d Entity<'a>,
+        vertices: &[Entity<'a>],
+        to_page: Affine,
+        layer: &'a str,
+        depth: usize,
+    ) -> Result<(), Refusal> {
+        // What was drawn from below is mirrored.
+        let normal = [entity.number(210, 0.0)?, entity.number(220, 0.0)?, entity.number(230, 1.0)?];
+        let is_level = normal[0].hypot(normal[1]) < 1e-9;
+        let mirrored = Affine([-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+        let is_planar = !matches!(entity.kind, "LINE" | "ELLIPSE" | "SPLINE");
+        let to_page = match is_planar && normal[2] < 0.0 {
+            true => to_page.after(mirrored),
+            false => to_page,
+        };
+        if is_planar && !is_level {
+            self.skip(&format!("{}, tilted", entity.kind), entity.line);
+            return Ok(());
+        }
+        let curve = match entity.kind {
+            "LINE" => Curve::polyline(&[entity.point(10)?, entity.point(11)?]),
+            "LWPOLYLINE" => bulged(&light(entity)?, entity.flags()? & 1 == 1),
+            "POLYLINE" => {
+                let flags = entity.flags()?;
+                // Meshes have faces; the control points of a curve that was fitted are not drawn.
+                if flags & (16 | 64) != 0 {
+                    self.skip("POLYLINE, a mesh", entity.line);
+                    return Ok(());
+                }
+                let mut corners = Vec::new();
+                for vertex in vertices.iter().filter(|it| it.kind == "VERTEX") {
+                    if vertex.flags()? & 16 == 0 {
+                        corners.push((vertex.point(10)?, vertex.number(42, 0.0)?));
+                    }
+                }
+                bulged(&corners, flags & 1 == 1)
+            }
+            "CIRCLE" => Curve::arc(entity.point(10)?, entity.number(40, 0.0)?, 0.0, 360.0),
+            "ARC" => {
+                let (start, end) = (entity.number(50, 0.0)?, entity.number(51, 360.0)?);
+                let turn = (end - start).rem_euclid(360.0);
+                let turn = if turn == 0.0 { 360.0 } else { turn };
+                Curve::arc(entity.point(10)?, entity.number(40, 0.0)?, start, turn)
+            }
+            "ELLIPSE" => {
+                let [start, end] =
+                    [entity.number(41, 0.0)?, entity.number(42, std::f64::consts::TAU)?];
+                let ratio = entity.number(40, 1.0)? * normal[2].signum();
+                Curve::ellipse(entity.point(10)?, entity.point(11)?, ratio, [start, end])
+            }
+            "SPLINE" => {
+                let spline = Spline {
+                    degree: entity.number(71, 3.0)? as usize,
+                    knots: entity.numbers(40)?,
+                    control: entity.points(10)?,
+                    weights: entity.numbers(41)?,
+                };
+                if spline.control.is_empty() {
+                    self.skip("SPLINE without control points", entity.line);
+                    return Ok(());
+                }
+                let wrong = || (entity.line, "the knots of the spline do not fit it".to_owned());
+                Curve::spline(spline).ok_or_else(wrong)?
+            }
+            "INSERT" => return self.insert(entity, to_page, layer, depth),
+            "VERTEX" | "SEQEND" => return Ok(()),
+            kind => {
+                self.skip(kind, entity.line);
+                return Ok(());
+            }
+        };
+        let too_many = || (entity.line, "the file has too many points to be drawn".to_owned());
+        let points = curve.flattened(to_page, MOST_POINTS - self.points).ok_or_else(too_many)?;
+        self.points += points.len();
+        self.strokes.push((entity.line, entity.kind, layer, points));
+        Ok(())
+    }
+
+    /// Draws a block where it is inserted, in rows and columns if it is.
+    fn insert(
+        &mut self,
+        entity: &'d Entity<'a>,
+        to_page: Affine,
+        layer: &'a str,
+        depth: usize,
+    ) -> Result<(), Refusal> {
+        let name = entity.text(2).unwrap_or_default();
+        let document = self.document;
+        let Some((base, entities)) = document.blocks.get(name) else {
+            self.skip("INSERT of an unknown block", entity.line);
+            return Ok(());
+        };
+        if depth >= MOST_NESTED {
+            return Err((entity.line, "the blocks are nested too deeply".to_owned()));
+        }
+        let [x, y] = entity.point(10)?;
+        let scale = [entity.number(41, 1.0)?, entity.number(42, 1.0)?];
+        let (sine, cosine) = entity.number(50, 0.0)?.to_radians().sin_cos();
+        let counts = [entity.number(70, 1.0)?, entity.number(71, 1.0)?];
+        let gaps = [entity.number(44, 0.0)?, entity.number(45, 0.0)?];
+        if counts.iter().any(|count| !(0.0..=1000.0).contains(count)) {
+            return Err((entity.line, "a block is inserted at most 1000 times a row".to_owned()));
+        }
+        let turned = Affine([cosine, sine, -sine, cosine, x, y]);
+        let scaled =
+            Affine([scale[0], 0.0, 0.0, scale[1], -base[0] * scale[0], -base[1] * scale[1]]);
+        for row in 0..counts[1].max(1.0) as u32 {
+            for column in 0..counts[0].max(1.0) as u32 {
+                let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
+                let place = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
+                let inner = to_page.after(turned).after(place).after(scaled);
+                self.points += 1;
+                if self.points >= MOST_POINTS {
+                    return Err((entity.line, "the blocks are inserted too often".to_owned()));
+                }
+                self.all(entities, inner, Some(layer), depth + 1)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// The corners of a polyline of the new form, each with the bulge of the side that follows.
+fn light(entity: &Entity<'_>) -> Result<Vec<(Point, f64)>, Refusal> {
+    let mut corners: Vec<(Point, f64)> = Vec::new();
+    for pair in &entity.pairs {
+        match (pair.code, corners.last_mut()) {
+            (10, _) => corners.push(([number(*pair)?, 0.0], 0.0)),
+            (20, Some((point, _))) => point[1] = number(*pair)?,
+            (42, Some((_, bulge))) => *bulge = number(*pair)?,
+            _ => {}
+        }
+    }
+    Ok(corners)
+}
+
+/// A polyline whose sides are arcs where they bulge: the bulge is the tangent of a quarter of the
+/// angle, above 0 counterclockwise.
+fn bulged(corners: &[(Point, f64)], is_closed: bool) -> Curve {
+    let mut curve = Curve::polyline(&[]);
+    let first = corners.first().copied().filter(|_| is_closed && corners.len() > 1);
+    let all: Vec<(Point, f64)> = corners.iter().copied().chain(first).collect();
+    for pair in all.windows(2) {
+        let ((from, bulge), (to, _)) = (pair[0], pair[1]);
+        curve.side(from, to, bulge);
+    }
+    curve
+}
+
+impl Format for Dxf {
+    fn name(&self) -> &'static str {
+        "DXF"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["dxf"]
+    }
+
+    /// The file begins with a section, before which only comments stand.
+    fn recognises(&self, beginning: &[u8]) -> bool {
+        let text = String::from_utf8_lossy(beginning.get(..4096).unwrap_or(beginning));
+        let mut lines = text.lines().map(str::trim);
+        loop {
+            match (lines.next(), lines.next()) {
+                (Some("999"), Some(_)) => {}
+                (Some("0"), Some("SECTION")) => return true,
+                _ => return false,
+            }
+        }
+    }
+
+    fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
+        let refused = |reason: &str| {
+            Err(ReadError::Content { file: file.clone(), reason: reason.to_owned() })
+        };
+        if bytes.starts_with(b"AutoCAD Binary DXF") {
+            return refused("this is the binary form of DXF: save it as text (ASCII)");
+        }
+        let text = match std::str::from_utf8(&bytes) {
+            Ok(text) => text.trim_start_matches('\u{FEFF}').to_owned(),
+            // Files of before 2007 are written in the letters of a country; only names have them.
+            Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
+        };
+        let in_line = |(number, reason): Refusal| {
+            let line = text.lines().nth(number - 1).unwrap_or_default();
+            let shown = line.chars().take(Origin::MOST_SHOWN + 1).collect();
+            let origin = Origin { file: file.clone(), line: number, text: shown };
+            if line.contains('\0') {
+                return ReadError::NotText { origin, kind: "a DXF file" };
+            }
+            ReadError::Line { origin, reason }
+        };
+        let pairs = pairs(&text).map_err(in_line)?;
+        let document = document(&pairs).map_err(in_line)?;
+        let unit = match document.unit {
+            None | Some(0) => 1.0,
+            Some(unit) => match UNITS.iter().find(|(number, _)| *number == unit) {
+                Some((_, length)) => *length,
+                None => return refused("its unit ($INSUNITS) is none in which plans are drawn"),
+            },
+        };
+        let mut drawing = Drawing {
+            document: &document,
+            strokes: Vec::new(),
+            skipped: BTreeMap::new(),
+            points: 0,
+        };
+        let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
+        drawing.all(&document.entities, to_page, None, 0).map_err(in_line)?;
+        let mut layers: Vec<&str> = Vec::new();
+        for (_, _, layer, _) in &drawing.strokes {
+            if !layers.contains(layer) {
+                layers.push(layer);
+            }
+        }
+        let numbered: Vec<Option<u32>> = layers
+            .iter()
+            .map(|layer| if *layer == "0" { None } else { number_in(layer) })
+            .collect();
+        let taken: HashSet<u32> = numbered.iter().copied().flatten().collect();
+        let mut free = (1..).filter(|number| !taken.contains(number));
+        let pens: HashMap<&str, (u32, u32)> = (layers.iter().zip(numbered).zip(0..))
+            .map(|((layer, number), index)| {
+                (*layer, (number.or_else(|| free.next()).unwrap_or(1), index))
+            })
+            .collect();
+        let mut plan = Plan::new(file.clone());
+        for (line, kind, layer, points) in drawing.strokes {
+            let (pen, number) = pens.get(layer).copied().unwrap_or((1, 0));
+            plan.begin(line, kind.to_owned());
+            plan.draw_on(points, None, pen, number);
+        }
+        plan.layers = layers.into_iter().map(str::to_owned).collect();
+        let mut notes: Vec<String> = drawing
+            .skipped
+            .iter()
+            .map(|(what, (count, line))| match count {
+                1 => format!("1 {what} is not drawn (line {line})"),
+                _ => format!("{count} {what} are not drawn (the first in line {line})"),
+            })
+            .collect();
+        if document.unit.unwrap_or(0) == 0 {
+            notes.push("the file does not say its unit: it is taken as mm".to_owned());
+        }
+        if plan.is_empty() {
+            let entities = counted(document.entities.len(), ["entity", "entities"]);
+            notes.insert(0, format!("there is nothing to draw in this DXF with {entities}"));
+            return refused(&notes.join("; "));
+        }
+        Ok(plan.contents(None, notes))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,192 @@
+//! Tests of what DXF files draw.
+
+use crate::SourceFile;
+use crate::lines::Lines as _;
+use crate::tests::{notes, sent};
+
+/// A file with these tables and blocks, and entities, whose pairs stand with spaces between them.
+fn dxf(units: &str, before: &str, entities: &str) -> String {
+    let text = format!(
+        "0 SECTION 2 HEADER 9 $INSUNITS 70 {units} 0 ENDSEC {before} 0 SECTION 2 ENTITIES \
+         {entities} 0 ENDSEC 0 EOF"
+    );
+    text.split_whitespace().map(|word| format!("{}\r\n", word.replace('_', " "))).collect()
+}
+
+/// The pen and the points of each stroke.
+fn strokes(text: &str) -> Vec<(String, Vec<[f64; 2]>)> {
+    let file = SourceFile::new("a.dxf".to_owned(), text.into()).expect("a DXF");
+    let (mut vertices, mut pen, mut strokes) = (Vec::new(), String::new(), Vec::new());
+    for line in file.in_order() {
+        let mut words = line.sent.split(' ');
+        let number = |word: &str| word.parse::<f64>().expect("a number");
+        match words.next() {
+            Some("v") => {
+                let numbers: Vec<f64> = words.map(number).collect();
+                vertices.push([numbers[0], numbers[1]]);
+            }
+            Some("usemtl") => pen = words.collect(),
+            _ => {
+                let points = words.map(|word| vertices[number(word) as usize - 1]).collect();
+                strokes.push((pen.clone(), points));
+            }
+        }
+    }
+    strokes
+}
+
+#[test]
+fn lines_and_polylines_have_true_size_in_any_unit() {
+    let line = "0 LINE 8 walls 10 1 20 2 30 0 11 3 21 4 31 0";
+    for (units, factor) in [("4", 1.0), ("5", 10.0), ("1", 25.4), ("0", 1.0)] {
+        let at = |value: f64| (value * factor * 1000.0).round() / 1000.0;
+        let expected = [[at(1.0), at(2.0)], [at(3.0), at(4.0)]];
+        let [(pen, points)] = &strokes(&dxf(units, "", line))[..] else { panic!("{units}") };
+        assert_eq!((pen.as_str(), points.as_slice()), ("pen1", expected.as_slice()));
+    }
+    let unit = "the file does not say its unit: it is taken as mm";
+    assert_eq!(notes("a.dxf", dxf("0", "", line).as_bytes()), [unit]);
+    let light = "0 LWPOLYLINE 8 7_red 90 3 70 1 10 0 20 0 10 5 20 0 10 5 20 5";
+    let old = "0 POLYLINE 8 a 66 1 70 0 0 VERTEX 8 a 10 1 20 1 0 VERTEX 8 a 10 2 20 1 0 SEQEND";
+    assert_eq!(
+        strokes(&dxf("4", "", &[light, old].join(" "))),
+        [
+            ("pen7".to_owned(), vec![[0.0, 0.0], [5.0, 0.0], [5.0, 5.0], [0.0, 0.0]]),
+            ("pen1".to_owned(), vec![[1.0, 1.0], [2.0, 1.0]]),
+        ]
+    );
+}
+
+/// Checks that the only stroke stays within half a motor step of `radius` around a centre, has so
+/// long a way, and these ends.
+fn is_arc(entity: &str, centre: [f64; 2], radius: f64, length: f64, ends: [[f64; 2]; 2]) {
+    let all = strokes(&dxf("4", "", entity));
+    // A long stroke is sent as several lines, each of which begins where the one before ends.
+    let mut points: Vec<[f64; 2]> = Vec::new();
+    for (_, part) in &all {
+        assert!(points.last().is_none_or(|last| part.first() == Some(last)), "{entity}");
+        points.extend(part.iter().skip(usize::from(!points.is_empty())));
+    }
+    for pair in points.windows(2) {
+        for part in [0.0, 0.5] {
+            let point = [0, 1].map(|it: usize| pair[0][it] + part * (pair[1][it] - pair[0][it]));
+            let off = (point[0] - centre[0]).hypot(point[1] - centre[1]) - radius;
+            assert!(off.abs() < 0.005, "{off} {entity}");
+        }
+    }
+    let way: f64 =
+        points.windows(2).map(|it| (it[0][0] - it[1][0]).hypot(it[0][1] - it[1][1])).sum();
+    assert!((way - length).abs() < 0.01, "{way} {entity}");
+    let own = [points[0], points[points.len() - 1]];
+    for (own, end) in own.iter().zip(ends) {
+        assert!((own[0] - end[0]).hypot(own[1] - end[1]) < 0.002, "{own:?} {entity}");
+    }
+}
+
+#[test]
+fn arcs_circles_ellipses_bulges_and_splines_are_followed() {
+    use std::f64::consts::{FRAC_PI_2, PI, TAU};
+    let east = [15.0, 5.0];
+    is_arc("0 CIRCLE 10 5 20 5 40 10", [5.0; 2], 10.0, 10.0 * TAU, [east; 2]);
+    is_arc(
+        "0 ARC 10 5 20 5 40 10 50 270 51 0",
+        [5.0; 2],
+        10.0,
+        10.0 * FRAC_PI_2,
+        [[5.0, -5.0], east],
+    );
+    // An arc that was drawn from below is mirrored.
+    is_arc(
+        "0 ARC 10 -5 20 5 40 10 50 90 51 180 210 0 220 0 230 -1",
+        [5.0; 2],
+        10.0,
+        10.0 * FRAC_PI_2,
+        [[5.0, 15.0], east],
+    );
+    let round = "0 ELLIPSE 10 5 20 5 11 0 21 10 40 1 41 0 42 3.141592653589793";
+    is_arc(round, [5.0; 2], 10.0, 10.0 * PI, [[5.0, 15.0], [5.0, -5.0]]);
+    let bulge = |bulge: &str| format!("0 LWPOLYLINE 70 0 10 -5 20 5 42 {bulge} 10 15 20 5");
+    is_arc(&bulge("1"), [5.0; 2], 10.0, 10.0 * PI, [[-5.0, 5.0], east]);
+    is_arc(&bulge("-1"), [5.0; 2], 10.0, 10.0 * PI, [[-5.0, 5.0], east]);
+    let quarter = "0 LWPOLYLINE 70 0 10 15 20 5 42 0.41421356237309503 10 5 20 15";
+    is_arc(quarter, [5.0; 2], 10.0, 10.0 * FRAC_PI_2, [east, [5.0, 15.0]]);
+    // A quarter of a circle as a rational spline.
+    let spline = "0 SPLINE 71 2 40 0 40 0 40 0 40 1 40 1 40 1 41 1 41 0.7071067811865476 41 1 \
+                  10 15 20 5 10 15 20 15 10 5 20 15";
+    is_arc(spline, [5.0; 2], 10.0, 10.0 * FRAC_PI_2, [east, [5.0, 15.0]]);
+}
+
+#[test]
+fn blocks_are_inserted_turned_and_scaled_on_the_layer_of_the_insert() {
+    let blocks = "0 SECTION 2 BLOCKS 0 BLOCK 2 tick 10 1 20 0 \
+                  0 LINE 8 0 10 1 20 0 11 2 21 0 0 ENDBLK 0 ENDSEC";
+    let insert = "0 LINE 8 3 10 0 20 0 11 9 21 0 0 INSERT 8 2_b 2 tick 10 5 20 5 41 3 42 3 50 90";
+    assert_eq!(
+        strokes(&dxf("4", blocks, insert)),
+        [
+            ("pen3".to_owned(), vec![[0.0, 0.0], [9.0, 0.0]]),
+            ("pen2".to_owned(), vec![[5.0, 5.0], [5.0, 8.0]]),
+        ]
+    );
+    let rows = "0 INSERT 2 tick 10 0 20 0 70 3 71 2 44 10 45 20";
+    let all = strokes(&dxf("4", blocks, rows));
+    let begins: Vec<[f64; 2]> = all.iter().map(|(_, points)| points[0]).collect();
+    let expected = [[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [0.0, 20.0], [10.0, 20.0], [20.0, 20.0]];
+    assert_eq!(begins, expected);
+    let endless = "0 SECTION 2 BLOCKS 0 BLOCK 2 a 0 INSERT 2 a 0 ENDBLK 0 ENDSEC";
+    let error = sent("a.dxf", dxf("4", endless, "0 INSERT 2 a").as_bytes()).expect_err("endless");
+    assert!(error.contains("nested too deeply"), "{error}");
+}
+
+#[test]
+fn what_is_not_drawn_is_counted() {
+    let tables = "0 SECTION 2 TABLES 0 TABLE 2 LAYER 0 LAYER 2 off 62 -7 70 0 \
+                  0 LAYER 2 cold 62 7 70 1 0 ENDTAB 0 ENDSEC";
+    let text = dxf(
+        "4",
+        tables,
+        "0 LINE 8 a 10 0 20 0 11 9 21 0 0 TEXT 8 a 1 hello 0 TEXT 8 a 1 you 0 LINE 8 off 10 0 \
+         0 LINE 8 cold 10 0 0 LINE 67 1 10 0 0 CIRCLE 40 5 210 1 230 0 0 INSERT 2 none",
+    );
+    let said = notes("a.dxf", text.as_bytes());
+    let kinds: Vec<&str> = said.iter().filter_map(|it| it.split(" (").next()).collect();
+    assert_eq!(
+        kinds,
+        [
+            "1 CIRCLE, tilted is not drawn",
+            "1 INSERT of an unknown block is not drawn",
+            "2 TEXT are not drawn",
+            "1 entities in paper space is not drawn",
+            "2 entities on layers that are off or frozen are not drawn",
+        ]
+    );
+    let line = text.lines().position(|line| line == "TEXT").expect("a text") + 1;
+    assert!(said[2].ends_with(&format!("(the first in line {line})")), "{said:?}");
+}
+
+#[test]
+fn damaged_files_are_refused_with_their_line() {
+    let spline = "0 SPLINE 71 3 40 0 40 1 10 0 20 0 10 1 20 1";
+    for (text, reason) in [
+        ("0\nSECTION\nbanana\n".to_owned(), "a.dxf:3: there should be a code of DXF"),
+        ("0\nSECTION\n2\n".to_owned(), "a.dxf:3: the file ends after a code"),
+        (dxf("4", "", "0 LINE 10 one"), "this is no number"),
+        (dxf("4", "", "0 LINE 10 1e300"), "this is no number"),
+        (dxf("4", "", "0 LINE 10 nan"), "this is no number"),
+        (dxf("3", "", "0 LINE 11 5"), "its unit ($INSUNITS) is none"),
+        (dxf("4", "", spline), "the knots of the spline do not fit it"),
+        (dxf("4", "", "0 CIRCLE 40 1e11"), "too many points"),
+        (dxf("4", "", "0 TEXT 1 a"), "nothing to draw in this DXF with 1 entity; 1 TEXT is not"),
+        (String::new(), "nothing to draw in this DXF"),
+        ("AutoCAD Binary DXF\r\n".to_owned(), "the binary form of DXF"),
+    ] {
+        let error = sent("a.dxf", text.as_bytes()).expect_err(&text);
+        assert!(error.contains(reason), "{error}");
+    }
+    let whole = dxf("4", "", "0 LINE 8 a 10 0 20 0 11 9 21 0");
+    assert!(sent("a", whole.as_bytes()).is_ok(), "known by its beginning");
+    // However a file is cut, it is read or refused.
+    for end in 0..whole.len() {
+        let _ = sent("a.dxf", &whole.as_bytes()[..end]);
+    }
+}
