@@ -2,11 +2,9 @@
 
 use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH, Stamped};
 use penup::machine::{EventRing, PulserState};
-use penup::model::{Corner, Position};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices, Plotter, start};
-use penup::protocol::LineReader;
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, Plotter, start};
 use penup_client::emulator::{Machine, MachineEventKind};
-use penup_client::pins::PinChange;
+use penup_job::pins::PinChange;
 use std::collections::BTreeSet;
 
 /// A point of the page in steps.
@@ -102,24 +100,15 @@ pub fn switch_on(
     flash: CutFlash,
     work: impl FnOnce(&mut Powered<'_, '_>),
 ) -> (CutFlash, Vec<Stamped>) {
-    let mut vertices = vec![Position::ORIGIN; 1024];
-    let mut corners = vec![<Corner>::ZERO; 4096];
+    let mut memory = Box::new(Memory::<1024, 4096, 16384, PORTS>::new());
     let mut blocks = EMPTY_LOOKAHEAD;
-    let mut words = vec![0; 1 << 14];
-    let mut readers = [const { LineReader::new() }; PORTS];
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();
     let mut board = HostBoard::new(&mut ring, &pins);
     board.set_flash(flash);
     // A millisecond, which is more than a page takes typically.
     board.set_write_ticks(25_000);
-    let memory = MemorySlices {
-        vertices: &mut vertices,
-        corners: &mut corners,
-        blocks: &mut blocks,
-        words: &mut words,
-        readers: &mut readers,
-    };
+    let memory = memory.lend(&mut blocks);
     let mut plotter = start(&mut board, memory, &pins);
     work(&mut Powered { board: &mut board, plotter: &mut plotter });
     let changes = board.trace().changes();

@@ -1,11 +1,8 @@
 //! A plotter that receives any bytes at any time.
 
 use penup::boards::host::{HostBoard, PORTS, QUEUE_LENGTH};
-use penup::hpgl::Session;
 use penup::machine::{Contacts, EventRing, PulserState};
-use penup::model::{Corner, Position};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, MemorySlices, Plotter};
-use penup::protocol::LineReader;
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, Plotter};
 
 /// In the input, this byte begins an order to the bench; any other byte is sent to the plotter.
 ///
@@ -25,23 +22,12 @@ const TURNS: u32 = 2_000_000;
 /// Lets a small plotter receive the input, and checks at its end that the machine comes to rest,
 /// that it can be unlocked, and that it answers.
 pub fn fuzz(input: &[u8]) {
-    let mut vertices = [Position::ORIGIN; 256];
-    let mut corners = [<Corner>::ZERO; 1024];
+    let mut memory = Box::new(Memory::<256, 1024, 8192, PORTS>::new());
     let mut blocks = EMPTY_LOOKAHEAD;
-    let mut words = vec![0; 8192];
-    let mut hpgl = Session::new();
-    let mut readers = [const { LineReader::new() }; PORTS];
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();
     let mut board = HostBoard::new(&mut ring, &pins);
-    let memory = MemorySlices {
-        vertices: &mut vertices,
-        corners: &mut corners,
-        blocks: &mut blocks,
-        words: &mut words,
-        readers: &mut readers,
-        hpgl: &mut hpgl,
-    };
+    let memory = memory.lend(&mut blocks);
     let mut plotter = Plotter::new(memory, &pins);
     plotter.greet(&mut board);
 

@@ -3,12 +3,10 @@
 use crate::cut_jobs::{empty_flash, switch_on};
 use crate::whole_jobs::job_lines;
 use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH};
-use penup::hpgl::Session;
 use penup::machine::{Contacts, EventRing, PulserState, Settings, Value};
-use penup::model::{Corner, Position};
 use penup::motion::EventQueue;
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Kept, MemorySlices, Plotter, Record, Stored};
-use penup::protocol::{LineReader, RealTime};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Kept, Memory, Plotter, Record, Stored};
+use penup::protocol::RealTime;
 use penup::storage::NOTE_BYTES;
 use std::sync::OnceLock;
 
@@ -103,23 +101,12 @@ fn again(input: &[u8]) {
         (u16::from_le_bytes([a, b]), Value::from_bits(i32::from_le_bytes([c, d, e, f])))
     });
 
-    let mut vertices = [Position::ORIGIN; 64];
-    let mut corners = [<Corner>::ZERO; 256];
+    let mut memory = Box::new(Memory::<64, 256, 8192, PORTS>::new());
     let mut blocks = EMPTY_LOOKAHEAD;
-    let mut words = vec![0; 8192];
-    let mut hpgl = Session::new();
-    let mut readers = [const { LineReader::new() }; PORTS];
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();
     let mut board = Flash { board: HostBoard::new(&mut ring, &pins), job };
-    let memory = MemorySlices {
-        vertices: &mut vertices,
-        corners: &mut corners,
-        blocks: &mut blocks,
-        words: &mut words,
-        readers: &mut readers,
-        hpgl: &mut hpgl,
-    };
+    let memory = memory.lend(&mut blocks);
     let mut plotter = Plotter::with_settings(memory, &pins, Settings::restored(values));
     plotter.greet(&mut board);
     // Whatever the contacts are said to be, the stop is not pressed.
