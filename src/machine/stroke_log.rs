@@ -43,15 +43,17 @@ impl Machine<'_> {
         self.log.open = Some(Open { begin, noted, most: None, is_whole: false });
     }
 
-    /// Whether strokes are being noted.
-    pub fn logs_strokes(&self) -> bool {
-        self.log.open.is_some()
+    /// Whether a stroke may have to be noted now.
+    #[inline(always)] // It is called in every turn of the main loop.
+    pub fn may_note_stroke(&self) -> bool {
+        self.runner.is_pen_up() && self.log.open.is_some()
     }
 
     /// Whether the machine waits with the pen raised until the stroke before has been noted.
+    #[inline(always)] // It is called for each slice, most of them with the pen down.
     pub(super) fn waits_for_log(&self) -> bool {
-        self.log.open.is_some_and(|open| self.strokes_over(open) != open.noted)
-            && self.runner.is_pen_up()
+        self.runner.is_pen_up()
+            && self.log.open.is_some_and(|open| self.strokes_over(open) != open.noted)
     }
 
     /// The number of strokes that are planned to their end, as the motion planner counts them.

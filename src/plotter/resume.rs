@@ -150,7 +150,7 @@ mod with_feature {
         /// Keeps that a stroke has been drawn, if the pins have just drawn it and stand.
         #[inline(always)] // It is called in every turn of the main loop.
         pub(in crate::plotter) fn note_progress<B: Board>(&mut self, board: &mut B) {
-            if self.machine.logs_strokes()
+            if self.machine.may_note_stroke()
                 && let Some(strokes) = self.machine.stroke_to_note()
             {
                 self.note_stroke(strokes, board);

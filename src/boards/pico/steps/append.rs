@@ -50,6 +50,9 @@ impl EventQueue for Steps {
         } else {
             self.put_wait(word, beyond, event.ticks());
         }
+        if !self.moving {
+            self.rest_end = self.written;
+        }
         self.publish();
         Ok(())
     }

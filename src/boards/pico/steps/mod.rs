@@ -93,6 +93,8 @@ pub struct Steps {
     ticks: u32,
     /// Whether the machine is in motion after the last event.
     moving: bool,
+    /// The number of words put into the ring when it was last allowed to run dry; it wraps.
+    rest_end: u32,
     /// Whether the state machine has processed all words.
     drained: bool,
     /// Whether the state machine has taken nothing since it was drained, or since an underrun.
@@ -132,6 +134,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         slack: (0, 0),
         ticks: 0,
         moving: false,
+        rest_end: 0,
         drained: true,
         resting: true,
         taken_seen: 0,
@@ -173,6 +176,8 @@ impl Steps {
         let was_drained = self.drained;
         let was_resting = self.resting;
         let began = taken != self.taken;
+        // Words may have come behind a rest in which the ring has run dry.
+        let passes_rest = self.rest_end.wrapping_sub(self.taken) <= taken.wrapping_sub(self.taken);
         self.count_to(taken);
         let stalled = PIO0.fdebug().get() & STALLED != 0;
         let waits = PIO0.sm(0).sm_addr().get() == u32::from(engine::START);
@@ -186,7 +191,7 @@ impl Steps {
         self.resting = self.drained || (was_resting && !began);
         // Before the state machine begins, and when its beginning is first seen, the flag may be
         // left from before.
-        if stalled && !was_resting && (self.moving || !self.drained) {
+        if stalled && !was_resting && !passes_rest && (self.moving || !self.drained) {
             STATE.note_underrun();
             self.moving = false;
             self.resting = true;
