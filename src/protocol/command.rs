@@ -104,6 +104,10 @@ pub enum Command<'a> {
     Sleep,
     /// `$UF2`: becomes the drive onto which a new image is copied.
     ShowDrive,
+    /// `$hpgl`: begins HP-GL, where the line has a number, spaces or a comment. Alone on its line
+    /// the command is taken before it gets here.
+    #[cfg(feature = "hpgl")]
+    HpGl,
     /// `$J=…`: a jog, which moves with the pen up.
     Jog(GCode<'a>),
     /// `G…`, `M…`, `X…`: a line of G-code.
@@ -250,6 +254,8 @@ impl<'a> Command<'a> {
             "undo" => Ok(Self::Undo),
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
+            #[cfg(feature = "hpgl")]
+            "hpgl" => Ok(Self::HpGl),
             #[cfg(not(feature = "hpgl"))]
             "hpgl" => Err(CommandError::NoHpGl),
             "" => Ok(Self::Help),
