@@ -6,12 +6,12 @@ use penup::boards::host::{CutFlash, LAYOUT};
 use penup::machine::Contacts;
 use penup::plotter::Board as _;
 use penup::storage::NOTE_BYTES;
-use penup_client::pins::{Machine, PinChange};
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on,
 };
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_job::pins::{Machine, PinChange};
 
 /// A pen that takes little time, so that the tests do not either.
 const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];

@@ -31,7 +31,7 @@ impl ArcStep {
             // plotter units. A radian has 57.3 degrees.
             None => {
                 let root = (radius.length().unsigned_abs() >> 12).isqrt(); // in units of 2^-2
-                (sweep.unsigned_abs() * root).div_ceil(57 * 4 << 16)
+                (sweep.unsigned_abs() * root).div_ceil((57 * 4) << 16)
             }
         };
         Self { center, radius, sweep, chords: chords.clamp(1, 1 << 20) as u32 }

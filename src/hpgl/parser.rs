@@ -196,10 +196,10 @@ impl Interpreter {
             } else if !self.has_pairs && self.is_down && !was_down && !self.is_lost {
                 self.add(Step::Dot);
             }
-        } else if !self.is_bad {
-            if let Err(error) = self.carry_out(name, given) {
-                self.fail(error);
-            }
+        } else if !self.is_bad
+            && let Err(error) = self.carry_out(name, given)
+        {
+            self.fail(error);
         }
         self.forget_instruction();
     }
@@ -240,7 +240,7 @@ impl Interpreter {
             }
             b"VS" => {
                 let speed = numbers.first().copied().unwrap_or(0);
-                if speed < 0 || speed > 128 * UNIT {
+                if !(0..=128 * UNIT).contains(&speed) {
                     return Err(bad);
                 }
                 self.speed = speed;

@@ -549,6 +549,9 @@ impl<I: Index> Inner<'_, I> {
             Command::ShowDrive if !B::HAS_DRIVE => return Err(CommandError::UnknownSystemCommand),
             Command::ShowDrive if !self.is_without_job() => return Err(CommandError::Busy),
             Command::ShowDrive => return Ok(Next::ShowDrive),
+            // The receive interrupt does not know it in this form.
+            #[cfg(feature = "hpgl")]
+            Command::HpGl => return Err(CommandError::UnknownSystemCommand),
             Command::Unlock => self.unlock(board)?,
             Command::Home => self.home()?,
             Command::Check => {

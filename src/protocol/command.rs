@@ -109,6 +109,10 @@ pub enum Command<'a> {
     Sleep,
     /// `$UF2`: becomes the drive onto which a new image is copied.
     ShowDrive,
+    /// `$hpgl`: begins HP-GL, where the line has a number, spaces or a comment. Alone on its line
+    /// the command is taken before it gets here.
+    #[cfg(feature = "hpgl")]
+    HpGl,
     /// `$J=…`: a jog, which moves with the pen up.
     Jog(GCode<'a>),
     /// `G…`, `M…`, `X…`: a line of G-code.
@@ -264,6 +268,8 @@ impl<'a> Command<'a> {
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
             "resume" => Ok(Self::Resume { at_origin: false }),
+            #[cfg(feature = "hpgl")]
+            "hpgl" => Ok(Self::HpGl),
             #[cfg(not(feature = "hpgl"))]
             "hpgl" => Err(CommandError::NoHpGl),
             "" => Ok(Self::Help),

@@ -241,6 +241,19 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "hpgl")]
+    #[test]
+    fn in_the_texts_of_hp_gl_they_are_text() {
+        let both = [RealTime::STATUS, RealTime::HOLD];
+        assert_eq!(requests(b"LB?!"), both, "no HP-GL");
+        assert_eq!(requests(b"IN;PU;?!"), both);
+        assert_eq!(requests(b"IN;LB?!~\x03?!"), both);
+        assert_eq!(requests(b"IN;DT?;LB!~?!?"), [RealTime::HOLD, RealTime::STATUS]);
+        assert_eq!(requests(b"IN;LB\xFD\x18?"), [RealTime::EMERGENCY, RealTime::ABORT, both[0]]);
+        assert_eq!(requests(b"IN;PE?!~\xFD\xFB\x91;?!"), both);
+        assert_eq!(requests(b"IN;LB\n$?\x03\n$\n?!"), both);
+    }
+
     #[test]
     fn grbls_bytes_act_after_what_begins_no_letter() {
         assert_eq!(requests(b"\xC3\x85"), [], "a letter");
