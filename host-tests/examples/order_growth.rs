@@ -14,6 +14,9 @@ const PAGE: PagePoint = PagePoint { x: 22_400, y: 16_000 };
 /// The number of segments in each stroke of a flow field.
 const FLOW_SEGMENTS: u32 = 8;
 
+/// Makes a drawing of so many strokes, each seed another.
+type Kind = fn(u32, u32) -> Strokes;
+
 /// A generator of numbers that look random and are the same in every run.
 struct Random(u32);
 
@@ -136,7 +139,7 @@ fn main() {
     let mut numbers = std::env::args().skip(1).map(|word| word.parse::<u32>().expect("a number"));
     let usage = "EFFORT SEEDS COUNT...";
     let (effort, seeds) = (numbers.next().expect(usage), numbers.next().expect(usage));
-    let kinds: [(&str, fn(u32, u32) -> Strokes); 4] = [
+    let kinds: [(&str, Kind); 4] = [
         ("random", random),
         ("hatched", hatched),
         ("flow field", flow_field),

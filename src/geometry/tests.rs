@@ -52,6 +52,27 @@ fn sides_and_offsets_have_their_values_and_not_only_their_signs() {
 }
 
 #[test]
+fn a_plane_asks_the_same_as_four_points() {
+    let mut state = 1u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state >> 8
+    };
+    for _ in 0..2000 {
+        // Far corners of the range, where the products are greatest, and small coordinates, where
+        // points coincide.
+        let limit = if random() % 2 == 0 { COORDINATE_LIMIT } else { 2 };
+        let mut coordinate = || match random() % 3 {
+            0 => -limit,
+            1 => limit,
+            _ => random() as i32 % (limit + 1),
+        };
+        let [a, b, c, d] = [(); 4].map(|()| Vertex::new(coordinate(), coordinate(), coordinate()));
+        assert_eq!(Plane::through(a, b, c).side(d), plane_side(a, b, c, d));
+    }
+}
+
+#[test]
 fn four_points_of_the_model_lie_in_a_plane_or_not() {
     let points = |x: i32, y: i32, z: i32| [[3, 5, 7], [13, 4, 9], [2, 15, 11], [x, y, z]];
     // (3, 5, 7) + m (10, -1, 2) + n (-1, 10, 4)

@@ -61,7 +61,9 @@ impl<'s, I: Index> Cells<'s, I> {
             (row * sorted.columns + column) as usize
         };
         for point in I::below(count) {
-            begin[cell_of(point)] += I::ONE;
+            if let Some(begin) = begin.get_mut(cell_of(point)) {
+                *begin += I::ONE;
+            }
         }
         let mut sum = I::ZERO;
         for begin in begin.iter_mut() {
@@ -71,9 +73,13 @@ impl<'s, I: Index> Cells<'s, I> {
         // The cells are filled from the back, so that the end of each cell is counted down to its
         // begin.
         for point in I::below(count).rev() {
-            let begin = &mut begin[cell_of(point)];
+            let Some(begin) = begin.get_mut(cell_of(point)) else {
+                continue;
+            };
             *begin -= I::ONE;
-            points[begin.get()] = point;
+            if let Some(slot) = points.get_mut(begin.get()) {
+                *slot = point;
+            }
         }
         (sorted.begin, sorted.points) = (begin, points);
         Ok(sorted)

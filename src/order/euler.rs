@@ -54,7 +54,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
     /// Returns the next leg from `station` whose segments no trail has drawn yet.
     fn peek(&mut self, station: I) -> Option<Leg<I>> {
         while let Some(leg) = self.legs.first(station) {
-            if self.used[leg.segment()] == 0 {
+            if self.used.get(leg.segment()) == Some(&0) {
                 return Some(leg);
             }
             self.legs.drop_first(station);
@@ -121,7 +121,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
     /// Whether an undrawn part may be entered at `station`. It may if a pen-up move leads from
     /// there, which the entrance then replaces, or if no station of the part has such a move.
     fn is_entrance(&mut self, station: I) -> bool {
-        self.mate[station.get()] != I::NONE && self.peek(station).is_some()
+        self.mate.get(station.get()) != Some(&I::NONE) && self.peek(station).is_some()
     }
 
     /// Returns the station at which an undrawn part is best entered: the one for which `far` is

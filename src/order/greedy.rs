@@ -129,24 +129,32 @@ impl<'s, I: Index> Shortcuts<'s, I> {
 
     /// Notes that a choice names `point`.
     fn name(&mut self, choice: usize, point: I) {
-        if point != I::NONE {
-            self.next[choice] = self.namers[point.get()];
-            self.namers[point.get()] = I::new(choice);
+        // `point` may be `Index::NONE`, which nothing names.
+        if let Some(first) = self.namers.get_mut(point.get())
+            && let Some(next) = self.next.get_mut(choice)
+        {
+            *next = core::mem::replace(first, I::new(choice));
         }
     }
 
     /// Returns the point that wins at a node of the tournament.
     fn winner(&self, node: usize) -> usize {
-        let count = self.winners.len();
-        if node < count { self.winners[node].get() } else { node - count }
+        match self.winners.get(node) {
+            Some(winner) => winner.get(),
+            None => node - self.winners.len(),
+        }
     }
 
     /// Decides a node of the tournament again.
     fn play(&mut self, node: usize, choices: &[ChoiceOf<I>], mate: &[I]) {
-        let key =
-            |point: usize| (mate[point] == I::NONE).then(|| (choices[point].0[1], Reverse(point)));
+        let key = |point: usize| {
+            let choice = choices.get(point).filter(|_| mate.get(point) == Some(&I::NONE))?;
+            Some((choice.0[1], Reverse(point)))
+        };
         let [left, right] = [self.winner(2 * node), self.winner(2 * node + 1)];
-        self.winners[node] = I::new(if key(left) >= key(right) { left } else { right });
+        if let Some(winner) = self.winners.get_mut(node) {
+            *winner = I::new(if key(left) >= key(right) { left } else { right });
+        }
     }
 
     /// Decides all nodes again in which a point takes part.
@@ -202,7 +210,7 @@ fn choose_near<I: Index>(
     let mut looked_at = 1;
     near.search(odd.position(chooser), &mut |other| {
         looked_at += 1;
-        if mate[other.get()] != I::NONE {
+        if mate.get(other.get()) != Some(&I::NONE) {
             return None;
         }
         if other != chooser && odd.least_distance(chooser, other) <= nearest.farthest() {
@@ -271,30 +279,40 @@ fn with_shortcuts<I: Index>(
     }
     for _ in 0..choices.len() / 2 {
         let chooser = shortcuts.winner(1);
-        let chosen = choices[chooser].points::<I>()[0];
-        let chooser = I::new(chooser);
+        let Some(choice) = choices.get(chooser) else {
+            break;
+        };
+        let (chooser, chosen) = (I::new(chooser), choice.points::<I>()[0]);
         join(mate, chooser, chosen);
         shortcuts.replay(chooser, choices, mate);
         shortcuts.replay(chosen, choices, mate);
         let lost = |point| point == chooser || point == chosen;
         for gone in [chooser, chosen] {
-            let mut namer = core::mem::replace(&mut shortcuts.namers[gone.get()], I::NONE);
-            while namer != I::NONE {
+            let Some(namer) = shortcuts.namers.get_mut(gone.get()) else {
+                continue;
+            };
+            let mut namer = core::mem::replace(namer, I::NONE);
+            // The list ends with `Index::NONE`.
+            while let Some(&next) = shortcuts.next.get(namer.get()) {
                 let choice = namer.get();
-                namer = shortcuts.next[choice];
+                namer = next;
                 let point = I::new(choice / 2);
-                if mate[point.get()] != I::NONE {
+                let Some(choices_of) = choices.get_mut(point.get()) else {
+                    continue;
+                };
+                if mate.get(point.get()) != Some(&I::NONE) {
                     continue;
                 }
-                let old = choices[point.get()].points::<I>();
+                let old = choices_of.points::<I>();
+                let mut new = old;
                 if old.into_iter().any(lost) {
-                    let near = &mut shortcuts.near;
-                    choices[point.get()] = choose_near(odd, mate, point, near, work_budget)?;
+                    *choices_of = choose_near(odd, mate, point, &mut shortcuts.near, work_budget)?;
+                    new = choices_of.points::<I>();
                     shortcuts.replay(point, choices, mate);
                 }
                 // A point that is still among the choices is named by the other of the two. If both
                 // were lost, this one names the first new point, and the other the second.
-                let [first, second] = choices[point.get()].points::<I>();
+                let [first, second] = new;
                 let is_first_new = old.into_iter().all(lost) || !old.contains(&first);
                 shortcuts.name(choice, if is_first_new { first } else { second });
             }
@@ -320,8 +338,11 @@ fn free_the_longest<I: Index>(odd: &OddPoints<'_, I>, mate: &mut [I]) {
 
 /// Makes the points `a` and `b` partners, between which the pen will be lifted.
 fn join<I: Index>(mate: &mut [I], a: I, b: I) {
-    mate[a.get()] = b;
-    mate[b.get()] = a;
+    for (from, to) in [(a, b), (b, a)] {
+        if let Some(mate) = mate.get_mut(from.get()) {
+            *mate = to;
+        }
+    }
 }
 
 /// Tries once to exchange the partners of each point's pair and of another pair. `near` must hold
@@ -341,27 +362,33 @@ fn exchange<I: Index>(
     let mut improved = false;
     for a in I::below(odd.real_count()) {
         let mut looked_at = 1;
-        let (b, own) = (mate[a.get()], lengths[a.get()]);
-        let mut best = (0, I::NONE);
+        let (Some(&b), Some(&own)) = (mate.get(a.get()), lengths.get(a.get())) else {
+            break;
+        };
+        let mut best = (0, [I::NONE; 2]);
         near.search(odd.position(a), &mut |c| {
             looked_at += 1;
+            let (&d, &other) = mate.get(c.get()).zip(lengths.get(c.get()))?;
             if c != a && c != b && odd.least_distance(a, c) < own {
-                let now = own + lengths[c.get()];
+                let now = own + other;
                 // To be better than the best so far, the new moves must be shorter than this.
                 let bound = now.saturating_sub(best.0);
-                let then = sum_below(odd, [a, c, b, mate[c.get()]], bound);
+                let then = sum_below(odd, [a, c, b, d], bound);
                 if then < bound {
-                    best = (now - then, c);
+                    best = (now - then, [c, d]);
                 }
             }
             Some(own)
         });
-        if best.1 != I::NONE {
-            let c = best.1;
-            for (from, to) in [(a, c), (b, mate[c.get()])] {
+        let (gain, [c, d]) = best;
+        if gain > 0 {
+            for (from, to) in [(a, c), (b, d)] {
                 join(mate, from, to);
-                lengths[from.get()] = odd.distance(from, to);
-                lengths[to.get()] = lengths[from.get()];
+                for end in [from, to] {
+                    if let Some(length) = lengths.get_mut(end.get()) {
+                        *length = odd.distance(from, to);
+                    }
+                }
             }
             improved = true;
         }

@@ -70,17 +70,27 @@ impl<'s, I: Index> Remaining<'s, I> {
 
     /// Calls `look` with the points of one cell that are left.
     fn look_into(&mut self, cell: usize, limit: &mut u32, look: &mut dyn FnMut(I) -> Option<u32>) {
-        let points = &mut *self.cells.points;
-        let mut at = self.cells.begin[cell];
-        while at < self.end[cell] {
-            match look(points[at.get()]) {
+        let (Some(begin), Some(end)) = (self.cells.begin.get(cell), self.end.get_mut(cell)) else {
+            return;
+        };
+        let mut points = self.cells.points.get_mut(begin.get()..end.get()).unwrap_or_default();
+        let mut at = 0;
+        while let Some(&point) = points.get(at) {
+            match look(point) {
                 Some(farthest) => {
                     *limit = farthest;
-                    at += I::ONE;
+                    at += 1;
                 }
                 None => {
-                    self.end[cell] -= I::ONE;
-                    points[at.get()] = points[self.end[cell].get()];
+                    // The last point takes its place.
+                    let Some((last, rest)) = core::mem::take(&mut points).split_last_mut() else {
+                        return;
+                    };
+                    if let Some(place) = rest.get_mut(at) {
+                        *place = *last;
+                    }
+                    points = rest;
+                    *end -= I::ONE;
                 }
             }
         }
