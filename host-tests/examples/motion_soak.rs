@@ -9,6 +9,8 @@
 //! measured against that of a machine which knows the whole path, as a part of the limit where that
 //! is more; 1.3 is allowed, because a bend may be found late.
 
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
 use penup::drawing::PagePoint;
 use penup_host_tests::event_checker::Run;
 use penup_host_tests::motion_cases::{Case, Orders};
