@@ -9,6 +9,8 @@
 //! measured against that of a machine which knows the whole path, as a part of the limit where that
 //! is more; 1.3 is allowed, because a bend may be found late.
 
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
 use penup::drawing::PagePoint;
 use penup_host_tests::event_checker::Run;
 use penup_host_tests::motion_cases::{Case, Orders};
@@ -25,8 +27,8 @@ fn number(random: &mut Random, from: f64, to: f64) -> f64 {
     from + (to - from) * random.below(1 << 40) as f64 / (1u64 << 40) as f64
 }
 
-/// Settings within the ranges of the property tests, and a jerk (mm/s³) from the tenth of one power
-/// of ten to another.
+/// Settings within the ranges of the property tests. `jerk` is the range of the decimal logarithm
+/// of the jerk in mm/s³.
 fn case(random: &mut Random, jerk: [f64; 2]) -> Case {
     Case {
         speed: number(random, 5.0, 120.0),

@@ -29,14 +29,20 @@ impl Machine<'_> {
             return PathLength::MAX;
         }
         if self.steady.moves == 0 {
-            let mut line = SteadySpeed::new(self.runner.limits(), self.runner.page_end());
-            line.add(target.point);
-            path.look_ahead(&mut |next| {
-                next.ink == target.ink && line.moves() < MOST_MOVES && line.add(next.point)
-            });
-            self.steady = Steady { moves: line.moves().max(1), limit: line.limit() };
+            self.steady = self.line_ahead(path, target);
         }
         self.steady.moves -= 1;
         self.steady.limit
+    }
+
+    /// Looks at the line that begins with the move to `target`.
+    #[inline(never)] // Drawings without one speed never come here: it would only fill the cache.
+    fn line_ahead(&self, path: &mut dyn Path, target: Target) -> Steady {
+        let mut line = SteadySpeed::new(self.runner.limits(), self.runner.page_end());
+        line.add(target.point);
+        path.look_ahead(&mut |next| {
+            next.ink == target.ink && line.moves() < MOST_MOVES && line.add(next.point)
+        });
+        Steady { moves: line.moves().max(1), limit: line.limit() }
     }
 }

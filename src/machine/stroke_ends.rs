@@ -56,7 +56,9 @@ impl Machine<'_> {
         };
         let overlap = length(Setting::StrokeOverlap);
         let [lead, trail] = [length(Setting::StrokeLead), length(Setting::StrokeTrail)];
-        let is_any = overlap > 0 || lead > 0 || trail > 0;
-        is_any.then(|| StrokeEnds { limits: *self.runner.limits(), overlap, lead, trail })
+        if overlap == 0 && lead == 0 && trail == 0 {
+            return None;
+        }
+        Some(StrokeEnds { limits: *self.runner.limits(), overlap, lead, trail })
     }
 }

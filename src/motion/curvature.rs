@@ -61,6 +61,7 @@ impl Curvature {
 
     /// The path goes on to `point`, the end of the last block of `blocks`. Limits the blocks that
     /// lie on too narrow a curve.
+    #[inline(always)] // Where each chord is pushed: elsewhere it would drive that out of the cache.
     pub(super) fn sync_consumed(
         &mut self,
         limits: &Limits,
@@ -101,6 +102,7 @@ fn place(limits: &Limits, point: PagePoint) -> Place {
 }
 
 /// Half the radius of the circle through three points, if it slows the machine at all.
+#[inline(always)] // As above.
 fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Option<PathLength> {
     // Within ±2^28, so products of two stay below 2^57.
     let (ax, ay) = (middle.x - first.x, middle.y - first.y);
@@ -142,7 +144,7 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
         return None;
     }
     let (a, b, c) = (a.isqrt(), b.isqrt(), c.isqrt());
-    let height = (twice_area / c).saturating_sub(rounding);
+    let height = twice_area.checked_div(c)?.saturating_sub(rounding);
     let half_radius = (a * b).checked_div(4 * height)?;
     (half_radius < top).then(|| {
         let bits = half_radius << (PathLength::FRAC_NBITS - FRACTION_BITS);

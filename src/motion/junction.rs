@@ -16,7 +16,7 @@ impl Heading {
         // One division for both parts: 2^63 over a length from 2^31 on.
         let length = length.to_bits().max(1);
         let zeros = length.leading_zeros();
-        let inverse = (1u64 << 63) / u64::from(length << zeros);
+        let inverse = (1u64 << 63).checked_div((length << zeros).into()).unwrap_or(0);
         let part = |steps: i32, step: u32| {
             // Units of 2^-32 mm; the length's are 2^-18 mm. A part is no longer than the whole but for
             // rounding, below 2^46, so that 32 bits hold it in units of the length as it is shifted.
@@ -54,6 +54,7 @@ impl Corner {
 ///
 /// Points lie on the grid of steps, so a corner may be nothing but rounding: it counts as less
 /// sharp by as much as rounding can explain.
+#[inline(always)] // Where each chord is pushed: elsewhere it would drive that out of the cache.
 pub(super) fn corner(
     limits: &Limits,
     before: Heading,
@@ -97,6 +98,7 @@ pub(super) fn corner(
 }
 
 /// Half the length of a vector of two parts within ±2^31, at most 2^30.
+#[inline(always)] // As above.
 fn half_length(x: i32, y: i32) -> u64 {
     let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
     // Opposite headings can add up to 2^31 by one unit of rounding: within 32 unsigned bits.

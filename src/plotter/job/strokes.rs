@@ -121,6 +121,7 @@ impl<'a, I: Index> Strokes<'a, I> {
 }
 
 impl<I: Index> Path for Strokes<'_, I> {
+    #[inline(always)] // Where steps are planned, which is done for each chord.
     fn next_target(&mut self) -> Option<Target> {
         let ends = self.ends;
         if let Some(ends) = &ends
