@@ -234,7 +234,11 @@ test("keys, undo, names of controls", async () => {
   const { stdout } = await run(PENUP, ["preview", "--help"]);
   const flags = [...stdout.matchAll(/^ +--([a-z-]+)/gm)].map(([, name]) => name);
   const own = new Set(
-    "landscape svg png json motion set repeat board machine quiet".split(" "),
+    (
+      "landscape svg png json motion set repeat board machine quiet " +
+      "view azimuth elevation y-up layer scale rotate hatch center crop linemerge simplify " +
+      "layer-order"
+    ).split(" "),
   );
   for (const name of flags.filter((flag) => !own.has(flag))) {
     assert.equal(await page.locator(`#option-${name}`).count(), 1, name);

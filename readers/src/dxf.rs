@@ -132,7 +132,7 @@ fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
     Ok(pairs)
 }
 
-/// Divides pairs into entities, each of which begins with code 0. A polyline takes its vertices.
+/// Divides pairs into entities, each of which begins with code 0.
 fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
     let mut entities: Vec<Entity<'a>> = Vec::new();
     for pair in pairs {
@@ -166,17 +166,17 @@ fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> {
                 }
             }
             Some("BLOCKS") => {
-                let mut block: Option<(&str, Point)> = None;
+                let mut block: Option<&str> = None;
                 for entity in entities(section) {
                     match (entity.kind, block) {
                         ("BLOCK", _) => {
                             let name = entity.text(2).unwrap_or_default();
                             let base = entity.point(10)?;
                             document.blocks.insert(name, (base, Vec::new()));
-                            block = Some((name, base));
+                            block = Some(name);
                         }
                         ("ENDBLK" | "ENDSEC" | "SECTION", _) => block = None,
-                        (_, Some((name, _))) => {
+                        (_, Some(name)) => {
                             if let Some((_, entities)) = document.blocks.get_mut(name) {
                                 entities.push(entity);
                             }

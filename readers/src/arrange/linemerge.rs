@@ -3,10 +3,16 @@
 use crate::plan::{Plan, Point, Stroke};
 use std::collections::HashMap;
 
+/// A square of the plane, for the strokes of one pen and layer.
+type Square = (u32, u32, i64, i64);
+
+/// An end of a stroke: its number, and whether it is its last point.
+type End = (usize, bool);
+
 /// The ends of strokes by the square of the plane in which they lie.
 struct Ends {
     side: f64,
-    squares: HashMap<(u32, u32, i64, i64), Vec<(usize, bool)>>,
+    squares: HashMap<Square, Vec<End>>,
 }
 
 impl Ends {
@@ -14,7 +20,7 @@ impl Ends {
         ((x / self.side).floor() as i64, (y / self.side).floor() as i64)
     }
 
-    fn insert(&mut self, (pen, layer): (u32, u32), point: Point, end: (usize, bool)) {
+    fn insert(&mut self, (pen, layer): (u32, u32), point: Point, end: End) {
         let (x, y) = self.square(point);
         self.squares.entry((pen, layer, x, y)).or_default().push(end);
     }
@@ -26,9 +32,9 @@ impl Ends {
         (pen, layer): (u32, u32),
         point: Point,
         strokes: &[Option<Stroke>],
-    ) -> Option<(usize, bool)> {
+    ) -> Option<End> {
         let (x, y) = self.square(point);
-        let mut nearest: Option<(f64, (usize, bool))> = None;
+        let mut nearest: Option<(f64, End)> = None;
         for square in (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (pen, layer, x + dx, y + dy))) {
             for &end in self.squares.get(&square).into_iter().flatten() {
                 let (index, is_last) = end;

@@ -47,9 +47,9 @@ pub const PLAN_OPTIONS: &[PlanOption] = &[
         changes_size: true,
         set: |arrangement, text| {
             let factors = numbers(text)?;
-            let factors = match factors.as_slice() {
-                &[factor] => [factor, factor],
-                &[x, y] => [x, y],
+            let factors = match *factors.as_slice() {
+                [factor] => [factor, factor],
+                [x, y] => [x, y],
                 _ => return Err("a scale is one factor, or one for each axis".to_owned()),
             };
             if !factors.iter().all(|factor| FACTORS.contains(&factor.abs())) {

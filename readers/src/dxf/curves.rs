@@ -175,7 +175,7 @@ impl Curve {
                     let radius = half(axes[0]).max(half(axes[1])) * to_page.most();
                     let chord = 2.0 * (1.0 - CHORD_ERROR / radius.max(2.0 * CHORD_ERROR)).acos();
                     let count = (turn.abs() / chord).ceil().max(1.0);
-                    if !(count < (most - points.len().min(most)) as f64) {
+                    if count.is_nan() || count >= most.saturating_sub(points.len()) as f64 {
                         return None;
                     }
                     points.extend((1..=count as u64).map(|at| {
