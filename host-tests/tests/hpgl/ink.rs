@@ -1,9 +1,12 @@
 //! What the pins ink, and what they should.
 
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
 use penup::boards::host::Change;
-use penup_client::formats::SourceFile;
-use penup_client::lines::Lines as _;
+use penup_client::files::parse;
 use penup_host_tests::whole_jobs::Bench;
+use penup_readers::Arrangement;
+use penup_readers::lines::Lines as _;
 use std::collections::HashMap;
 
 /// Steps per millimetre, and per plotter unit.
@@ -55,7 +58,8 @@ pub fn units(bench: &Bench) -> [[i32; 2]; 2] {
 
 /// The strokes that the client's reader of HP-GL finds in a file.
 pub fn plan(bytes: &[u8]) -> Vec<Segment> {
-    let file = SourceFile::new("file.hpgl".to_owned(), bytes.to_vec()).expect("a valid file");
+    let file = parse("file.hpgl".to_owned(), bytes.to_vec(), &Arrangement::default());
+    let file = file.expect("a valid file");
     let (mut vertices, mut segments) = (Vec::new(), Vec::new());
     for index in 0.. {
         let Some(line) = file.line(index) else { break };
