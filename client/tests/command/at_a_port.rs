@@ -62,7 +62,11 @@ fn a_file_is_sent_with_its_settings_and_drawn() {
     let plotter = Plugged::new(FakePlotter::new(Fault::None));
     let line = ["plot", "cube.obj", "--eye", "-3,-4,2.5", "--port", &plotter.device];
     let (code, stdout, stderr) = penup(folder.path(), &line);
-    assert_eq!((code, stdout.as_str()), (Some(0), "cube.obj is drawn\n"), "{stderr}");
+    assert_eq!(
+        (code, stdout.as_str()),
+        (Some(0), "cube.obj is drawn; the model reaches from 0, 0, 0 to 1, 1, 1\n"),
+        "{stderr}"
+    );
     let lines = plotter.unplug().lines;
     let file = CUBE.lines().filter(|line| !line.starts_with('#'));
     let count = file.clone().count();

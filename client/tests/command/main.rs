@@ -163,8 +163,8 @@ fn a_plan_is_arranged_before_it_is_drawn() {
     near(&[], 160.0);
     near(&["--scale", "2"], 320.0);
     near(&["--crop", "10,10,30,100"], 80.0);
-    // 40 mm of 10 lines, less than one at the border.
-    near(&["--hatch", "4,0"], 160.0 + 400.0);
+    // 13 lines of 40 mm, from 21 mm to 57 mm.
+    near(&["--hatch", "3,0"], 160.0 + 520.0);
     let (_, said) = drawn(&["--center"]);
     assert!(said.contains("reaches from 85, 128.5 to 125, 168.5 mm"), "{said}");
     let (code, _, noted) = penup(folder.path(), &["preview", "square.gcode", "--layer", "7"]);
