@@ -196,7 +196,7 @@ impl Dialect {
     fn take_line(&mut self, byte: u8) -> Token {
         let ends_line = byte == b'\n' || byte == b'\r';
         self.state = match (self.state, byte) {
-            (State::In(2), b';' | b'\n' | b'\r' | b'A'..=b'Z') => {
+            (State::In(2), b';' | b'\n' | b'\r') => {
                 return self.begin(Beginning::Initialize, byte);
             }
             (State::Escape, b'.' | b'%') => {
@@ -300,14 +300,15 @@ mod tests {
         for (bytes, expected) in [
             (b"IN;PU;".as_slice(), "llBccc"),
             (b"G0\nIN\nPU", "lllllBcc"),
-            (b" INSP1", "lllBcc"),
+            (b" IN;SP1", "lllBccc"),
+            (b"INSIDE;\nIN\rPU", "llllllllllBcc"),
             (b"\x1B.(IN;", "lBeccc"),
             (b"\x1B.I81;;17:PU", "lBeeeeeeeecc"),
             (b"\x1B%0BPU", "lBeecc"),
             (b"$hpgl\r\nPU", "lllllBccc"),
             (b"(IN;)\n", "llllll"),
             (b"xIN;\n", "lllll"),
-            (b"INK\n", "llBc"),
+            (b"INK\n", "llll"),
             (b"in;\n", "llll"),
             (b"IN3\n", "llll"),
             (b"$hpg\n", "lllll"),
