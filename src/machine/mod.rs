@@ -64,8 +64,6 @@ pub struct Machine<'m> {
     ahead_ticks: u32,
     /// The size of the present job, or of the last one, and how far it has come.
     progress: Progress,
-    /// How far the strokes of the job have been noted.
-    log: StrokeLog,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
     /// How much of its slack each motor has taken up.
@@ -78,6 +76,8 @@ pub struct Machine<'m> {
     rapid_percent: u8,
     /// The number of the pen in the holder, counted from 0.
     pen: u8,
+    /// How far the strokes of the job have been noted.
+    log: StrokeLog,
 }
 
 impl<'m> Machine<'m> {
