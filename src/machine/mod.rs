@@ -68,8 +68,6 @@ pub struct Machine<'m> {
     ahead_ticks: u32,
     /// The size of the present job, or of the last one, and how far it has come.
     progress: Progress,
-    /// How far the strokes of the job have been noted.
-    log: StrokeLog,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
     /// The speed of the line that is being read, if lines have one speed.
@@ -84,6 +82,8 @@ pub struct Machine<'m> {
     rapid_percent: u8,
     /// The number of the pen in the holder, counted from 0.
     pen: u8,
+    /// How far the strokes of the job have been noted.
+    log: StrokeLog,
 }
 
 impl<'m> Machine<'m> {

@@ -52,8 +52,14 @@ impl Machine<'_> {
     /// Whether the machine waits with the pen raised until the stroke before has been noted.
     #[inline(always)] // It is called for each slice, most of them with the pen down.
     pub(super) fn waits_for_log(&self) -> bool {
-        self.runner.is_pen_up()
-            && self.log.open.is_some_and(|open| self.strokes_over(open) != open.noted)
+        self.runner.is_pen_up() && self.waits_with_pen_up()
+    }
+
+    /// Whether the machine, whose pen is up, waits until the stroke before has been noted.
+    #[cold]
+    #[inline(never)]
+    fn waits_with_pen_up(&self) -> bool {
+        self.log.open.is_some_and(|open| self.strokes_over(open) != open.noted)
     }
 
     /// The number of strokes that are planned to their end, as the motion planner counts them.

@@ -126,9 +126,6 @@ pub struct Runner<'m> {
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     lift: Lift,
-    /// When the pen was last told to go up, in ticks of the events; wraps.
-    #[cfg(feature = "resume")]
-    raised_at: u32,
     stopping: bool,
     stopping_after_stroke: bool,
     /// How fast the piece in work was allowed to end, if more blocks may allow it to be faster.
@@ -154,6 +151,9 @@ pub struct Runner<'m> {
     in_stroke: bool,
     /// Since the pen last moved, speeds were greater: what waits may still be as fast.
     was_faster: SliceSpeed,
+    /// When the pen was last told to go up, in ticks of the events; wraps.
+    #[cfg(feature = "resume")]
+    raised_at: u32,
 }
 
 impl<'m> Runner<'m> {

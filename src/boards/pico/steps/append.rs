@@ -50,7 +50,7 @@ impl EventQueue for Steps {
         } else {
             self.put_wait(word, beyond, event.ticks());
         }
-        if !self.moving {
+        if !self.moving && word & TARGETS == target::WAIT {
             self.rest_end = self.written;
         }
         self.publish();
