@@ -268,10 +268,7 @@ fn frame(machine: &Machine<'_>) -> (Point, Rectangle) {
     let settings = machine.settings();
     let steps = settings.page_steps();
     let units = |steps: i32, per_mm: Value| {
-        let per_mm = i64::from(per_mm.to_bits());
-        if per_mm <= 0 {
-            return 0;
-        }
+        let per_mm = i64::from(per_mm.to_bits()).max(1);
         divide_rounding(product(i64::from(steps), UNITS_PER_MM << 32), per_mm.into()) as i64
     };
     let [x_per_mm, y_per_mm] = steps;

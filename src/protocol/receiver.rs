@@ -115,19 +115,9 @@ impl<'q> Receiver<'q> {
         if !self.mark() {
             return Err(byte);
         }
-        self.put(byte)?;
-        self.damage = Damage::None;
-        Ok(())
-    }
-
-    /// Puts a byte or a mark into the queue and counts it.
-    ///
-    /// # Errors
-    /// The byte, if there is no room for it.
-    #[cfg_attr(feature = "hpgl", inline(never))]
-    fn put(&mut self, byte: u8) -> Result<(), u8> {
         self.queue.enqueue(byte)?;
         self.count = self.count.wrapping_add(1);
+        self.damage = Damage::None;
         Ok(())
     }
 
@@ -147,6 +137,7 @@ impl<'q> Receiver<'q> {
     }
 
     /// Has the loss of bytes marked in the queue.
+    #[cfg_attr(feature = "hpgl", inline(never))]
     fn note_loss(&mut self) {
         if self.has_heard && self.damage == Damage::None {
             self.damage = Damage::Unmarked;
@@ -156,7 +147,8 @@ impl<'q> Receiver<'q> {
 
     /// Puts a pending mark into the queue if there is room. Returns whether no mark is pending.
     pub fn mark(&mut self) -> bool {
-        if self.damage == Damage::Unmarked && self.put(DAMAGED).is_ok() {
+        if self.damage == Damage::Unmarked && self.queue.enqueue(DAMAGED).is_ok() {
+            self.count = self.count.wrapping_add(1);
             self.damage = Damage::Marked;
         }
         self.damage != Damage::Unmarked
