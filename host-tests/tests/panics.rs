@@ -20,8 +20,10 @@ const MOST: [(&str, [usize; 2]); 16] = [
     ("model", [10, 42]),
     ("motion", [7, 18]),
     ("order", [50, 393]),
-    ("plotter", [6, 2]),
-    ("protocol", [3, 4]),
+    // The Pico has two more since the main loop reads HP-GL: divisions that are inlined there.
+    ("plotter", [6, 4]),
+    // The Pico has one more since losses are marked apart from damaged bytes.
+    ("protocol", [3, 5]),
     ("stage.rs", [0, 44]),
     ("step", [3, 13]),
     ("view", [2, 11]),

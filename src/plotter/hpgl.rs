@@ -7,7 +7,7 @@
 use super::{Board, PORT_LIMIT, Plotter, REPLY_BYTES, Replies, Reply};
 use crate::array::MapEach;
 use crate::drawing::{LineType, PAGE_LIMIT, PagePoint};
-use crate::fixed::{divide_down, divide_rounding, product};
+use crate::fixed::{divide_rounding, product};
 use crate::hpgl::{Dialect, Order, Point, Rectangle, Session, Token, UNITS_PER_MM};
 use crate::index::Index;
 use crate::machine::{Machine, MachineError, Setting, State, Target, Value};
@@ -269,7 +269,7 @@ fn frame(machine: &Machine<'_>) -> (Point, Rectangle) {
     let steps = settings.page_steps();
     let units = |steps: i32, per_mm: Value| {
         let per_mm = i64::from(per_mm.to_bits()).max(1);
-        divide_down(product(i64::from(steps), UNITS_PER_MM << 32), per_mm.into()) as i64
+        divide_rounding(product(i64::from(steps), UNITS_PER_MM << 32), per_mm.into()) as i64
     };
     let [x_per_mm, y_per_mm] = steps;
     let [width, height] = [Setting::TravelX, Setting::TravelY]
@@ -290,7 +290,7 @@ fn steps_at(machine: &Machine<'_>, Point { x, y }: Point) -> PagePoint {
     let steps = |position: i64, per_mm: Value, most: i32| {
         let exact = product(position, per_mm.to_bits().into());
         let steps = divide_rounding(exact, i128::from(UNITS_PER_MM) << 32);
-        steps.clamp(0, most.into()) as i32
+        steps.min(most.into()).max(0) as i32
     };
     PagePoint { x: steps(x, x_per_mm, most.x), y: steps(y, y_per_mm, most.y) }
 }

@@ -137,6 +137,7 @@ impl<'q> Receiver<'q> {
     }
 
     /// Has the loss of bytes marked in the queue.
+    #[cfg_attr(feature = "hpgl", inline(never))]
     fn note_loss(&mut self) {
         if self.has_heard && self.damage == Damage::None {
             self.damage = Damage::Unmarked;
