@@ -104,6 +104,7 @@ impl Machine<'_> {
 
     /// During an alarm, a motor that holds the pen down raises it as soon as the queue is empty.
     /// After a restart the motors had no current, so they are switched off again afterwards.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn raise_pen(&mut self, alarm: Alarm, queue: &mut dyn EventQueue) {
         let restarted = alarm == Alarm::Restarted;
         if self.pins.is_halted() {
@@ -137,6 +138,7 @@ impl Machine<'_> {
 
     /// Changes the state after the runner has planned the machine to a stop, for the reason
     /// `progress`.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn after_stop(&mut self, progress: RunnerProgress) {
         match self.activity {
             Activity::Run(source) | Activity::Hold { source, .. }

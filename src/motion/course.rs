@@ -117,6 +117,7 @@ impl BlockCursor {
 
     /// From the plan's place to the first where the machine can stand, which is half a move behind
     /// one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn to_whole_step(&self, least: u64) -> u64 {
         let length = self.move_length.max(1);
         // The first such place, or the one before it.
@@ -147,6 +148,7 @@ impl BlockCursor {
 
     /// Stands at the first such place that is not nearer than `least`, and stays with it: how far
     /// that is, 2^-32 mm.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn stop_behind(&mut self, least: u64) -> u64 {
         if self.stop == u64::MAX {
             self.stop = self.place + self.to_whole_step(least);
@@ -261,6 +263,7 @@ impl BlockCursor {
     }
 
     /// Begins the next piece of a dotted line.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn next_piece(&mut self) {
         self.piece += 1;
         self.place = self.move_length * u64::from(self.piece_moves);

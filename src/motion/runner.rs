@@ -594,6 +594,7 @@ impl<'m> Runner<'m> {
     }
 
     /// Gives up what waits; the machine must stand, the pen at `page`.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub fn forget_path(&mut self, page: PagePoint) {
         self.lookahead.clear();
         self.course = None;

@@ -260,6 +260,7 @@ impl Interval {
 
     /// The next slice, or as much of it as there is `room` for (2^-32 mm); `None` at the end of the interval or
     /// without room.
+    #[inline(never)] // Without a limit of jerk, it would only fill the cache.
     pub(super) fn next_slice(&mut self, room: u64) -> Option<Slice> {
         if room == 0 {
             return None;
@@ -337,6 +338,7 @@ impl Road<'_, '_> {
     ///
     /// If nothing is allowed, it brakes. From rest, if not even the least acceleration is, it
     /// creeps: what is left is less than a start and a stop take.
+    #[inline(never)] // Without a limit of jerk, it would only fill the cache.
     pub(super) fn next(&self, from: State) -> Interval {
         let jerk = self.jerk;
         let (mut slices, is_uneven) = jerk.slices_from(from);

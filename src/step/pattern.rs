@@ -54,6 +54,7 @@ impl Pattern {
 
     /// The number of moves from the start of the line to the end of piece number `piece`, counted
     /// from 0.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub const fn end_of(self, piece: u32) -> u32 {
         if self.repeats == 0 {
             return self.moves;
