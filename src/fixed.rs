@@ -448,7 +448,8 @@ impl fmt::Display for Length {
 ///
 /// ```
 /// use penup::fixed::BinaryFraction;
-/// assert_eq!(format!("{}", BinaryFraction { units: -3, fraction_bits: 1, decimals: 3 }), "-1.500");
+/// assert_eq!(format!("{}", BinaryFraction { units: -3, fraction_bits: 1, decimals: 3 }),
+/// "-1.500");
 /// ```
 #[derive(Debug, Clone, Copy)]
 pub struct BinaryFraction {

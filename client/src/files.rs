@@ -47,8 +47,8 @@ pub fn read(path: &Path, arrangement: &Arrangement) -> Result<SourceFile, Error>
 }
 
 /// Checks `bytes`, the contents of a file called `name`, and arranges its plan. A file that may be
-/// nested is read on a stack of its own. A damaged one may make `usvg` panic, which ends that thread
-/// only.
+/// nested is read on a stack of its own. A damaged one may make `usvg` panic, which ends that
+/// thread only.
 ///
 /// # Errors
 /// The format is unknown, or the file contains something that no plotter accepts.

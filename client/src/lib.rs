@@ -1,11 +1,11 @@
 //! The library of the `penup` command, which sends files to a plotter, emulates plotters and
 //! previews drawings.
 //!
-//! A job passes through the modules in this order. [`cli`] reads the command line, [`files`] has the
-//! file read by [`penup_readers`], and a [`Job`](penup_job::Job) joins both into the lines to send.
-//! [`sender`] sends these lines over a [`link`] and follows the plotter's replies with
-//! [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an [`emulator`] of one
-//! of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
+//! A job passes through the modules in this order. [`cli`] reads the command line, [`files`] has
+//! the file read by [`penup_readers`], and a [`Job`](penup_job::Job) joins both into the lines to
+//! send. [`sender`] sends these lines over a [`link`] and follows the plotter's replies with
+//! [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an [`emulator`] of
+//! one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
 //! [`penup_job::picture`] renders its path, [`png`] the image of that, and [`output`] writes the
 //! files. [`penup_job::results`] are what is known about a job afterwards.
 //!

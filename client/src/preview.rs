@@ -57,8 +57,8 @@ impl<I: Index> InMemory<I> {
         Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
     }
 
-    /// Starts a plotter with this memory, and with flash in which it keeps its settings and jobs, as
-    /// when its power comes on.
+    /// Starts a plotter with this memory, and with flash in which it keeps its settings and jobs,
+    /// as when its power comes on.
     pub fn with_flash(room: Room, flash: CutFlash) -> Self {
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));

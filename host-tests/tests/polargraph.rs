@@ -130,7 +130,8 @@ proptest! {
             while belts != end {
                 let at = moves.next().expect("every corner is reached");
                 let off = polargraph.off(at, from, target.point);
-                // Half of the 1/8191 in which pieces lie beside the steps, and the bow of a segment.
+                // Half of the 1/8191 in which pieces lie beside the steps, and the bow of a
+                // segment.
                 prop_assert!(off <= 0.5005, "{} steps at {:?} from {:?} to {:?}, begins {:?} ends \
                  {:?}", off, at, from, target.point, settings.kinematics().motors(from), end);
                 belts = at;

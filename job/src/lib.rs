@@ -1,8 +1,8 @@
 //! What a program on a computer and the page in a browser share about a job: what is sent to a
 //! plotter, what the plotter answers, and what it then draws.
 //!
-//! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`] has the
-//! words of the serial line, and reads the replies. [`view`] says from where a model is
+//! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
+//! has the words of the serial line, and reads the replies. [`view`] says from where a model is
 //! seen. [`twin`] computes what the plotter must then
 //! contain, and [`room`] the memory that takes. [`pins`] and [`watch`] follow the pen to its
 //! [`path`], [`strokes`] and [`results`] tell what was drawn, and [`picture`] shows it.

@@ -65,8 +65,8 @@ fn sine_cosine(degrees: f64) -> (f64, f64) {
     }
 }
 
-/// Turns `vector` as the shortest turn does that brings z to `up`: so what stands upright where z is
-/// up stands upright where `up` is. `None` if `up` has no direction.
+/// Turns `vector` as the shortest turn does that brings z to `up`: so what stands upright where z
+/// is up stands upright where `up` is. `None` if `up` has no direction.
 ///
 /// ```
 /// use penup_job::view::turned_upright;

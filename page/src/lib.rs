@@ -2,8 +2,8 @@
 //!
 //! [`Sheet`] draws what a camera sees, fast enough to turn it. [`Board`] is an emulated plotter:
 //! the firmware's own session behind a pipe of bytes. [`Session`] is the other end of such a pipe:
-//! it sends a drawing to a plotter, emulated or real, and follows it. The module `options` describes
-//! the controls, and files are read by the readers of the client.
+//! it sends a drawing to a plotter, emulated or real, and follows it. The module `options`
+//! describes the controls, and files are read by the readers of the client.
 //!
 //! Nothing here reads a clock or waits. The front end in `page/www` passes bytes and time in, and
 //! runs each of the three in a worker of its own, so that the page never freezes. Whatever is

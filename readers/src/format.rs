@@ -59,8 +59,8 @@ pub(super) trait Format: Debug + Sync {
 
     /// Turns `bytes`, the contents of the file that the user calls `file`, into lines to send.
     /// There are fewer bytes than [`SIZE_LIMIT`]. The lines hold geometry and pens, but no command
-    /// that acts on the machine. What the format drops is counted in the notes. A plan is arranged by
-    /// the caller; of the `arrangement` a format only learns what it must find out for that.
+    /// that acts on the machine. What the format drops is counted in the notes. A plan is arranged
+    /// by the caller; of the `arrangement` a format only learns what it must find out for that.
     ///
     /// # Errors
     /// The file contains something that no plotter accepts, or that this format does not allow.

@@ -197,8 +197,8 @@ impl Lines for SourceFile {
     }
 }
 
-/// Checks that a file called `name` which begins with these bytes, its first [`BEGINNING`] or all, is
-/// of a format that is read. So a large file of another kind is refused before the rest is read.
+/// Checks that a file called `name` which begins with these bytes, its first [`BEGINNING`] or all,
+/// is of a format that is read. So a large file of another kind is refused before the rest is read.
 ///
 /// # Errors
 /// The format is unknown.

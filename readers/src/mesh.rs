@@ -135,8 +135,8 @@ impl Mesh {
         Some((line, number))
     }
 
-    /// The faces of OBJ lines whose corners are absolute numbers or count back; `None` if a line is of
-    /// another form.
+    /// The faces of OBJ lines whose corners are absolute numbers or count back; `None` if a line is
+    /// of another form.
     pub(super) fn of_lines(lines: &dyn Lines) -> Option<Self> {
         let mut mesh = Self::default();
         let mut numbers = Vec::new();

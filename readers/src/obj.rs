@@ -68,8 +68,8 @@ impl Format for Obj {
     }
 }
 
-/// The most lines of a file that is searched for nearly flat edges. More of them would take time and
-/// memory out of proportion to a hint.
+/// The most lines of a file that is searched for nearly flat edges. More of them would take time
+/// and memory out of proportion to a hint.
 const MOST_SEARCHED: usize = 300_000;
 
 /// Says that most edges are nearly flat, if they are.

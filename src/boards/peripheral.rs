@@ -2,8 +2,8 @@
 
 use core::ptr;
 
-/// Where a register lies within its peripheral: a multiple of 4 bytes below 4096, which is as far as
-/// the registers of every peripheral reach.
+/// Where a register lies within its peripheral: a multiple of 4 bytes below 4096, which is as far
+/// as the registers of every peripheral reach.
 #[derive(Clone, Copy)]
 pub struct Offset(usize);
 

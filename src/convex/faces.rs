@@ -33,8 +33,8 @@ use crate::stage::{Cancel, Scratch};
 /// The number of vertices that are tested between two checks for cancelling.
 const VERTICES_PER_CHECK: usize = 64;
 
-/// An edge with its two faces: the vertices at which it begins and ends, and the faces on its left and
-/// right.
+/// An edge with its two faces: the vertices at which it begins and ends, and the faces on its left
+/// and right.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub(super) struct HullEdge<I>([I; 4]);

@@ -123,7 +123,8 @@ pub enum SolidError {
         /// The number of different positions that there are.
         distinct: usize,
     },
-    /// There are more vertices than elements can refer to: [`crate::model::Corner::VERTEX_NUMBER_LIMIT`].
+    /// There are more vertices than elements can refer to:
+    /// [`crate::model::Corner::VERTEX_NUMBER_LIMIT`].
     TooManyVertices,
     /// A coordinate is beyond ±2^30.
     PositionOutOfRange {

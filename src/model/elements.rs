@@ -7,8 +7,8 @@ use bytemuck::{Pod, Zeroable};
 /// A vertex number as an element stores it, with two flags.
 ///
 /// The lowest bits are the vertex number, from 0: 14 bits of the 16 on a board. The next bit is set
-/// in the corners of a bar, and the highest in the last corner of an element. So a face of n corners
-/// takes n numbers and needs no header.
+/// in the corners of a bar, and the highest in the last corner of an element. So a face of n
+/// corners takes n numbers and needs no header.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct Corner<I = u16>(pub(super) I);
@@ -31,8 +31,8 @@ impl<I: Index> Corner<I> {
         I::ONE << (Self::VERTEX_BITS + 1)
     }
 
-    /// Makes the corner at `vertex`, which must be below [`Corner::VERTEX_NUMBER_LIMIT`] (higher bits are
-    /// discarded).
+    /// Makes the corner at `vertex`, which must be below [`Corner::VERTEX_NUMBER_LIMIT`] (higher
+    /// bits are discarded).
     pub fn new(vertex: I, of_bar: bool, last: bool) -> Self {
         let bar = if of_bar { Self::bar() } else { I::ZERO };
         let last = if last { Self::last() } else { I::ZERO };

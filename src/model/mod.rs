@@ -94,8 +94,8 @@ pub struct Model<'m, I = u16> {
 }
 
 impl<'m, I: Index> Model<'m, I> {
-    /// Makes an empty model that can hold as many vertices as the first slice has, and as many corners
-    /// as the slice has. Their contents are discarded.
+    /// Makes an empty model that can hold as many vertices as the first slice has, and as many
+    /// corners as the slice has. Their contents are discarded.
     pub fn new(vertices: &'m mut [Position], corners: &'m mut [Corner<I>]) -> Self {
         Self {
             vertices: Vertices::new(vertices),
@@ -205,8 +205,8 @@ impl<'m, I: Index> Model<'m, I> {
         self.store.used()
     }
 
-    /// Returns the same for a model whose numbers have the width of `J`. Curves take fewer numbers of
-    /// 32 bits than of 16.
+    /// Returns the same for a model whose numbers have the width of `J`. Curves take fewer numbers
+    /// of 32 bits than of 16.
     pub fn corner_count_of<J: Index>(&self) -> usize {
         let curves = self.curves();
         let (mut here, mut there) = (0, 0);

@@ -14,8 +14,8 @@ use core::ops::Range;
 /// The number of pens that a drawing may use.
 pub const PEN_LIMIT: u8 = 32;
 
-/// A change of the pen: the index of an element's first corner, and the pen, from 0, of the elements
-/// from there on, which is another than before.
+/// A change of the pen: the index of an element's first corner, and the pen, from 0, of the
+/// elements from there on, which is another than before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(transparent)]
 pub struct PenRun<I = u16>([I; RUN]);

@@ -1,12 +1,12 @@
 //! No step leaves faster than the machine can stop within the steps that wait.
 //!
-//! Should the planner be late, the queue runs dry at speed. So the step interrupt keeps each interval
-//! above √(ℓ²/2as): s is what the steps that wait come to along the path, ℓ the length of one of
-//! them. A queue that holds the stopping distance is not slowed at all; one that runs dry is a ramp
-//! down to rest, on the path. When more comes, s grows by a step's length a step, which is a ramp up.
-//! The squared speed is then the lesser of two functions of the place, the plan's and this one, and
-//! neither changes faster than the acceleration allows. (It does not keep the jerk: it is for what
-//! should not happen.)
+//! Should the planner be late, the queue runs dry at speed. So the step interrupt keeps each
+//! interval above √(ℓ²/2as): s is what the steps that wait come to along the path, ℓ the length of
+//! one of them. A queue that holds the stopping distance is not slowed at all; one that runs dry is
+//! a ramp down to rest, on the path. When more comes, s grows by a step's length a step, which is a
+//! ramp up. The squared speed is then the lesser of two functions of the place, the plan's and this
+//! one, and neither changes faster than the acceleration allows. (It does not keep the jerk: it is
+//! for what should not happen.)
 //!
 //! Lengths are counted in units of 2a·4^k ticks², with k such that the longest step is just below
 //! 2^16 of them: then the interval is 2^k·ℓ/√s ticks, one product of 32 bits and a shift.
@@ -126,7 +126,8 @@ impl BrakeRule {
 pub struct QueueSize {
     /// How many can be counted on to wait, on a long path; 0 for no end.
     pub steps: u32,
-    /// How many wait when it is full; more than can be, if the main loop is never late by as much as they last.
+    /// How many wait when it is full; more than can be, if the main loop is never late by as much
+    /// as they last.
     pub full: u32,
 }
 
@@ -146,8 +147,8 @@ impl QueueSize {
 }
 
 impl Limits {
-    /// The rule for a `queue` of steps that are at most `longer` times as long as a diagonal one, on a
-    /// machine that is never faster than the stopping distance `fastest`.
+    /// The rule for a `queue` of steps that are at most `longer` times as long as a diagonal one,
+    /// on a machine that is never faster than the stopping distance `fastest`.
     ///
     /// It brakes as hard as the machine accelerates, or harder if it must in order to stop within
     /// 13/16 of the queue. Both by 1/32, so that it never slows a plan that is in time.
@@ -239,8 +240,8 @@ impl BrakeOrders {
         self.taken.store(taken.wrapping_add(units), Ordering::Relaxed);
     }
 
-    /// Units of the steps that wait. Negative for a moment, between a step's way into the queue and its
-    /// entry in the sum.
+    /// Units of the steps that wait. Negative for a moment, between a step's way into the queue and
+    /// its entry in the sum.
     #[inline(always)]
     pub(super) fn waiting(&self) -> i32 {
         let queued = self.queued.load(Ordering::Relaxed);
@@ -274,9 +275,9 @@ impl StepLength {
         Self { before: 0, behind: 0, later: 0 }
     }
 
-    /// The steps from the next one on are so long, or from the one behind it on: from the last step of
-    /// the old length to the first of the new one it is half of both. The first of all lengths is that of
-    /// the step before, too.
+    /// The steps from the next one on are so long, or from the one behind it on: from the last step
+    /// of the old length to the first of the new one it is half of both. The first of all lengths
+    /// is that of the step before, too.
     #[inline]
     pub fn set(&mut self, units: u32, after_next: bool) {
         self.set_from(units, self.start(after_next));
@@ -390,8 +391,9 @@ impl Brake {
         is_calm
     }
 
-    /// Takes some steps at once, `around` units in all, and none with fewer ticks to the next than it says. `None` and nothing
-    /// taken near rest, where speed changes more from step to step: within 64 steps of the `longest` way.
+    /// Takes some steps at once, `around` units in all, and none with fewer ticks to the next than
+    /// it says. `None` and nothing taken near rest, where speed changes more from step to step:
+    /// within 64 steps of the `longest` way.
     #[inline(always)] // Where the interrupt that asks for it lies.
     pub fn pass_evenly(&mut self, around: u32, longest: u32, orders: &BrakeOrders) -> Option<u32> {
         let top = orders.top.load(Ordering::Relaxed);
@@ -423,8 +425,8 @@ impl Brake {
     }
 }
 
-/// The brake of an interrupt that comes at each step and has no time to look closely at each: the little that
-/// always has to be done is [`StepBrake::step`], and the rest comes in pieces.
+/// The brake of an interrupt that comes at each step and has no time to look closely at each: the
+/// little that always has to be done is [`StepBrake::step`], and the rest comes in pieces.
 #[derive(Debug, Default)]
 pub struct StepBrake {
     /// With no more units waiting than these, a step must be looked at.
@@ -511,8 +513,8 @@ impl StepBrake {
         !is_calm
     }
 
-    /// Does a piece of what has to be done. Whether there is more of it, and the least ticks from the last step to the
-    /// next, as far as is known.
+    /// Does a piece of what has to be done. Whether there is more of it, and the least ticks from
+    /// the last step to the next, as far as is known.
     #[inline(always)]
     pub fn work(&mut self, orders: &BrakeOrders) -> (bool, u32) {
         let todo = self.todo;

@@ -110,8 +110,8 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
     let (cx, cy) = (last.x - first.x, last.y - first.y);
     let twice_area = (i64::from(ax) * i64::from(by) - i64::from(ay) * i64::from(bx)).unsigned_abs();
     let top = u64::from(limits.top.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
-    // r = abc / 2·(twice the area), and each length is at least its greater part, and 11/16 of both: most
-    // circles are wide, and known to be without a root.
+    // r = abc / 2·(twice the area), and each length is at least its greater part, and 11/16 of
+    // both: most circles are wide, and known to be without a root.
     let least = |x: i32, y: i32| {
         let (x, y) = (x.unsigned_abs(), y.unsigned_abs());
         let sum = x + y;

@@ -83,9 +83,9 @@ impl Emitter {
         (self.directions ^ levels.directions) & levels.axes != 0
     }
 
-    /// Some moves of `line`, which do not [turn](Emitter::turns), after [another](Emitter::has_stepped). They
-    /// take place at the times of `train` after `start`, or later if the pins need longer. They are no faster than
-    /// [`Emitter::keeps_up`] says.
+    /// Some moves of `line`, which do not [turn](Emitter::turns), after
+    /// [another](Emitter::has_stepped). They take place at the times of `train` after `start`, or
+    /// later if the pins need longer. They are no faster than [`Emitter::keeps_up`] says.
     pub(super) fn steps(
         &mut self,
         start: u32,

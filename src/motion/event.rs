@@ -16,9 +16,9 @@ use crate::step::tape::Instruction;
 /// | 7 | 0 | 1 |
 /// | 8–31 | ticks to the next event | the same |
 ///
-/// With bit 6 set and bit 7 clear it stands aside of both. With bit 2 it is an event of the motor that lifts the pen:
-/// bit 3 a pulse, bit 4 it runs down. Without bit 2 it is no event, but tells how long the steps behind it are:
-/// see [`StepBrake`](super::StepBrake).
+/// With bit 6 set and bit 7 clear it stands aside of both. With bit 2 it is an event of the motor
+/// that lifts the pen: bit 3 a pulse, bit 4 it runs down. Without bit 2 it is no event, but tells
+/// how long the steps behind it are: see [`StepBrake`](super::StepBrake).
 ///
 /// A change of direction is an event of its own, without a pulse, before the pulse. Waits longer
 /// than 2^24 - 1 ticks (0.67 s) are several events.
@@ -229,9 +229,9 @@ const fn axis_step(levels: u8, pulse: u8, down: u8) -> i32 {
 
 /// Steps at even intervals along a line.
 ///
-/// Times count from somewhere, in units of 2^-15 ticks; events are words without their ticks. Each step handed over
-/// lasts up to the next one, which waits for that. A board may make the words of its queue from the fields,
-/// as [`StepTrain::push_each`] does.
+/// Times count from somewhere, in units of 2^-15 ticks; events are words without their ticks. Each
+/// step handed over lasts up to the next one, which waits for that. A board may make the words of
+/// its queue from the fields, as [`StepTrain::push_each`] does.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct StepTrain {
@@ -315,9 +315,9 @@ pub trait EventQueue {
     fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         train.push_each(count, |event| self.push(event))
     }
-    /// The steps that follow are so long, in units of the [`BrakeRule`](super::BrakeRule), below 2^16;
-    /// but for the next one, if a step of the old length has still to come. Takes a place, as an event
-    /// does.
+    /// The steps that follow are so long, in units of the [`BrakeRule`](super::BrakeRule), below
+    /// 2^16; but for the next one, if a step of the old length has still to come. Takes a place, as
+    /// an event does.
     ///
     /// # Errors
     /// The word that found the queue full.

@@ -18,8 +18,9 @@ impl Heading {
         let zeros = length.leading_zeros();
         let inverse = (1u64 << 63).checked_div((length << zeros).into()).unwrap_or(0);
         let part = |steps: i32, step: u32| {
-            // Units of 2^-32 mm; the length's are 2^-18 mm. A part is no longer than the whole but for
-            // rounding, below 2^46, so that 32 bits hold it in units of the length as it is shifted.
+            // Units of 2^-32 mm; the length's are 2^-18 mm. A part is no longer than the whole but
+            // for rounding, below 2^46, so that 32 bits hold it in units of the length as it is
+            // shifted.
             let part = u64::from(steps.unsigned_abs()) * u64::from(step);
             let part = ((part << zeros) >> 14).min(u32::MAX.into());
             let heading = (part * inverse) >> 33;
@@ -49,8 +50,8 @@ impl Corner {
 ///
 /// Junction deviation δ rounds a corner of turning angle θ by an arc of radius
 /// δ cos(θ/2) / (1 - cos(θ/2)); half of it is the stopping distance. Where the blocks are too short
-/// for that arc, the arc that touches both in the middle of the shorter counts, ½ l / tan(θ/2): on a
-/// dense polyline that is the circle through its points.
+/// for that arc, the arc that touches both in the middle of the shorter counts, ½ l / tan(θ/2): on
+/// a dense polyline that is the circle through its points.
 ///
 /// Points lie on the grid of steps, so a corner may be nothing but rounding: it counts as less
 /// sharp by as much as rounding can explain.

@@ -1,9 +1,10 @@
 //! The pen on a motor of its own: from rest to rest, so that it lands softly.
 //!
-//! Its steps count down from an upper stop. Where that is, is not known after the motor had no current: then
-//! the pen is first driven up by more than its travel, slowly, against the stop.
+//! Its steps count down from an upper stop. Where that is, is not known after the motor had no
+//! current: then the pen is first driven up by more than its travel, slowly, against the stop.
 //!
-//! Each pulse leaves in the middle of its step: step n from a rest, from 0, leaves √((2n + 1)/a) after it.
+//! Each pulse leaves in the middle of its step: step n from a rest, from 0, leaves √((2n + 1)/a)
+//! after it.
 
 use super::TICKS_PER_SECOND;
 
@@ -14,12 +15,14 @@ pub struct LiftRule {
     pub travel: i32,
     /// The least ticks from one step to the next.
     pub least_ticks: u32,
-    /// The square of the ticks in which acceleration brings a steps-per-tick up: (ticks per second)²/(steps/s²).
+    /// The square of the ticks in which acceleration brings a steps-per-tick up: (ticks per
+    /// second)²/(steps/s²).
     pub square: u64,
 }
 
 impl LiftRule {
-    /// For `travel` steps, below 2^18, at most `rate` steps a second (1 at least), `acceleration` steps/s² (20 at least).
+    /// For `travel` steps, below 2^18, at most `rate` steps a second (1 at least), `acceleration`
+    /// steps/s² (20 at least).
     pub fn new(travel: i32, rate: u32, acceleration: u32) -> Self {
         let second = u64::from(TICKS_PER_SECOND);
         Self {

@@ -6,13 +6,14 @@
 //!
 //! Speed is planned as *stopping distance*, v²/2a, in millimetres: a block of length L raises or
 //! lowers it by at most L, and an arc of radius r allows r/2. So the look-ahead only adds and
-//! compares lengths, exactly; a square root is taken when a block begins, if at all. What a block allows is passed on
-//! to those before it as it comes, so nothing is looked for when one begins. Within a block
-//! time goes in slices of [`SLICE_TICKS`], or longer ones while the speed stays; the speed is constant within a slice, so its
-//! moves are evenly spaced, a [`StepTrain`], and every slice begins on the exact parabola.
+//! compares lengths, exactly; a square root is taken when a block begins, if at all. What a block
+//! allows is passed on to those before it as it comes, so nothing is looked for when one begins.
+//! Within a block time goes in slices of [`SLICE_TICKS`], or longer ones while the speed stays; the
+//! speed is constant within a slice, so its moves are evenly spaced, a [`StepTrain`], and every
+//! slice begins on the exact parabola.
 //!
-//! With a limit on jerk, another planner (`smooth`) is at work: at intervals it looks how far acceleration may rise such that
-//! all that is known ahead can still be kept.
+//! With a limit on jerk, another planner (`smooth`) is at work: at intervals it looks how far
+//! acceleration may rise such that all that is known ahead can still be kept.
 //!
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.

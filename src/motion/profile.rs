@@ -94,8 +94,9 @@ impl Profile {
     /// Begins at `entry`, goes `length`, at most `top` fast, and ends as fast as `exit_allowed` and
     /// the acceleration let it.
     ///
-    /// If `entry` is faster than `top`, the speed is shed first. `exit_allowed` must be within reach,
-    /// which it is if it comes from the same look-ahead as `entry`; else the profile sheds all it can.
+    /// If `entry` is faster than `top`, the speed is shed first. `exit_allowed` must be within
+    /// reach, which it is if it comes from the same look-ahead as `entry`; else the profile sheds
+    /// all it can.
     pub(super) fn new(
         limits: &Limits,
         entry: Pace,

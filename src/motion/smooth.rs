@@ -1,16 +1,17 @@
 //! Speeds without kinks: acceleration along the path changes no faster than the limit on jerk.
 //!
-//! Time goes in intervals of constant jerk. At the beginning of each, [`Road::next`] takes the greatest
-//! acceleration for its end from which all that is known ahead can still be kept: the end of the
-//! path, corners, bends, feeds. Every limit is looked at by itself: braking to it as fast as
-//! acceleration and jerk let it, and without acceleration in the end, must be possible before it stands. That is
-//! enough for all of them together, since who brakes harder than one limit asks is slower everywhere. So nothing
-//! is bound to where blocks begin or end: acceleration runs on through any number of short ones. At the greatest
-//! speed an interval lasts as long as what is known lets it; a bend that is found later ends it.
+//! Time goes in intervals of constant jerk. At the beginning of each, [`Road::next`] takes the
+//! greatest acceleration for its end from which all that is known ahead can still be kept: the end
+//! of the path, corners, bends, feeds. Every limit is looked at by itself: braking to it as fast as
+//! acceleration and jerk let it, and without acceleration in the end, must be possible before it
+//! stands. That is enough for all of them together, since who brakes harder than one limit asks is
+//! slower everywhere. So nothing is bound to where blocks begin or end: acceleration runs on
+//! through any number of short ones. At the greatest speed an interval lasts as long as what is
+//! known lets it; a bend that is found later ends it.
 //!
-//! Within an interval acceleration grows evenly until it is at its limit, and stays there. So an interval of the
-//! hardest braking is nowhere behind the braking that was reckoned with. Where braking ends soon, intervals are
-//! shorter, so that speed and acceleration end together.
+//! Within an interval acceleration grows evenly until it is at its limit, and stays there. So an
+//! interval of the hardest braking is nowhere behind the braking that was reckoned with. Where
+//! braking ends soon, intervals are shorter, so that speed and acceleration end together.
 //!
 //! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
 //! slices, negative for braking. Then all changes are polynomials in whole numbers.
@@ -24,8 +25,8 @@ use core::num::NonZeroU32;
 /// changes at the ends of intervals only.
 const MOST_GROWTH: i32 = 18;
 
-/// Where slices are taken together, a constant speed leaves the place that the acceleration leads to by no more than this,
-/// 2^-32 mm: 4 nm.
+/// Where slices are taken together, a constant speed leaves the place that the acceleration leads
+/// to by no more than this, 2^-32 mm: 4 nm.
 const MOST_DEVIATION: u64 = 1 << 14;
 
 /// Slices, about 0.1 s: a cruise is not looked after more often than that.
@@ -36,8 +37,9 @@ const LONGEST_CRUISE: u16 = 512;
 pub(super) struct JerkLimit {
     /// With which braking is reckoned, 2^-40 mm per slice³, below 2^23.
     jerk: NonZeroU32,
-    /// The longest ramp, 2^7 to 2^16: no acceleration beyond the limit, nor beyond what the greatest
-    /// speed leaves time for. A multiple of the slices of an interval, as all ramps are at its ends.
+    /// The longest ramp, 2^7 to 2^16: no acceleration beyond the limit, nor beyond what the
+    /// greatest speed leaves time for. A multiple of the slices of an interval, as all ramps are at
+    /// its ends.
     longest: i32,
 }
 
@@ -53,7 +55,8 @@ impl JerkLimit {
         fastest: SliceSpeed,
     ) -> Option<Self> {
         let bits = u64::from(jerk_m_per_s3.to_bits().unsigned_abs());
-        // 2^-16 m/s³ to 2^-40 mm/slice³: bits * 1000 * 2^24 * (2^12 / 5^8 / 2^6)³, the twos cancelled.
+        // 2^-16 m/s³ to 2^-40 mm/slice³: bits * 1000 * 2^24 * (2^12 / 5^8 / 2^6)³, the twos
+        // cancelled.
         let jerk = (((bits << 36) / 5u64.pow(10)) << 9) / 5u64.pow(11);
         let jerk = jerk * 16 / u64::from(MOST_GROWTH.unsigned_abs());
         let (acceleration, fastest) =
@@ -157,17 +160,18 @@ impl JerkLimit {
         ((u64::from(speed) << 16) / u64::from(self.jerk.get())) as i64
     }
 
-    /// How fast it is when the ramp has ended as soon as it can. One that builds speed up does not end within less than
-    /// an interval: to reckon with less would let a speed that cannot be kept rise and fall for ever.
+    /// How fast it is when the ramp has ended as soon as it can. One that builds speed up does not
+    /// end within less than an interval: to reckon with less would let a speed that cannot be kept
+    /// rise and fall for ever.
     fn settled(self, state: State) -> u64 {
         let shortest = if state.ramp > 0 { 16 * i32::from(self.slices()) } else { 0 };
         let square = i64::from(state.ramp) * i64::from(state.ramp.abs().max(shortest));
         (i64::from(state.speed) + ((self.jerk() * square) >> 17)).max(0).unsigned_abs()
     }
 
-    /// How far it is, 2^-32 mm, from the speed and ramp of `from` to the speed `to` and no ramp, braking as
-    /// hard as the limits let it; to `to` alone, if the ramp of a faster `from` leads on to a slower
-    /// speed. If `to` is never passed, nothing of use.
+    /// How far it is, 2^-32 mm, from the speed and ramp of `from` to the speed `to` and no ramp,
+    /// braking as hard as the limits let it; to `to` alone, if the ramp of a faster `from` leads on
+    /// to a slower speed. If `to` is never passed, nothing of use.
     pub(super) fn braking_distance(self, from: State, to: u32) -> u64 {
         let ramp = i64::from(from.ramp);
         let (from, to) = (self.scaled(from.speed) + 1, self.scaled(to));
@@ -258,8 +262,8 @@ impl Interval {
         Self { limit, from, growth, stride, slices, done: 0, speed, rest: Slice::default() }
     }
 
-    /// The next slice, or as much of it as there is `room` for (2^-32 mm); `None` at the end of the interval or
-    /// without room.
+    /// The next slice, or as much of it as there is `room` for (2^-32 mm); `None` at the end of the
+    /// interval or without room.
     #[inline(never)] // Without a limit of jerk, it would only fill the cache.
     pub(super) fn next_slice(&mut self, room: u64) -> Option<Slice> {
         if room == 0 {
@@ -374,8 +378,8 @@ impl Road<'_, '_> {
         Interval::new(jerk, from, least, slices)
     }
 
-    /// How it moves after an interval of such a growth, and how fast it is when it has no ramp any more; `None` if that is
-    /// too fast.
+    /// How it moves after an interval of such a growth, and how fast it is when it has no ramp any
+    /// more; `None` if that is too fast.
     fn settled(&self, from: State, growth: i32, slices: u16) -> Option<(State, u64)> {
         let speed = i64::from(from.speed) + self.jerk.gain(from.ramp, growth, slices);
         let ramp = self.jerk.grown(from.ramp, growth, slices);
@@ -497,8 +501,8 @@ mod tests {
         }
     }
 
-    /// The way, mm, from a speed, mm/s, and ramp, braking as hard as possible for `first` slices and
-    /// then less and less; and the speed then.
+    /// The way, mm, from a speed, mm/s, and ramp, braking as hard as possible for `first` slices
+    /// and then less and less; and the speed then.
     fn braked(limit: JerkLimit, from: State, hard: f64) -> (f64, f64) {
         let jerk = f64::from(limit.jerk.get()) / 2f64.powi(40) / SLICE.powi(3);
         let (mut speed, mut way) = (f64::from(from.speed) / 2f64.powi(32) / SLICE, 0.0);

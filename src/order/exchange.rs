@@ -280,8 +280,8 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         Ok(None)
     }
 
-    /// Returns the stations to which a new move from `station` may lead: [`Index::NONE`] for the gap, if
-    /// `by_gap`, then `station` itself, then its neighbours.
+    /// Returns the stations to which a new move from `station` may lead: [`Index::NONE`] for the
+    /// gap, if `by_gap`, then `station` itself, then its neighbours.
     pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
         let own = [I::NONE, station].into_iter().skip(usize::from(!by_gap));
         own.chain(self.neighbours.of(station))

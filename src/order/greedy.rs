@@ -61,8 +61,8 @@ pub(super) fn pair<I: Index>(
     Ok(())
 }
 
-/// The two nearest points found so far, each with its distance, in order of the distance and then of
-/// the number.
+/// The two nearest points found so far, each with its distance, in order of the distance and then
+/// of the number.
 struct Nearest<I>([(u32, I); 2]);
 
 impl<I: Index> Nearest<I> {
@@ -98,8 +98,8 @@ impl<I: Index> Nearest<I> {
 struct Shortcuts<'s, I> {
     /// The unpaired points, and some that have been paired since.
     near: Remaining<'s, I>,
-    /// A tournament of the points for the greatest regret: node k is the better of the nodes 2 k and
-    /// 2 k + 1, and the points themselves follow the last node.
+    /// A tournament of the points for the greatest regret: node k is the better of the nodes 2 k
+    /// and 2 k + 1, and the points themselves follow the last node.
     winners: &'s mut [I],
     /// For each point, the first of the choices that name it, or [`Index::NONE`]. Choice 2 k is one
     /// of point k, and choice 2 k + 1 is its other.
@@ -346,12 +346,12 @@ fn join<I: Index>(mate: &mut [I], a: I, b: I) {
 }
 
 /// Tries once to exchange the partners of each point's pair and of another pair. `near` must hold
-/// all points but the free ends, and `lengths` the length of each move at both of its points. Returns
-/// whether anything became shorter.
+/// all points but the free ends, and `lengths` the length of each move at both of its points.
+/// Returns whether anything became shorter.
 ///
-/// Of two moves that become shorter in all, one of the new ones is shorter than an old one. So it is
-/// enough to give each point a partner that is nearer than its own; of these exchanges, the one that
-/// saves most is made.
+/// Of two moves that become shorter in all, one of the new ones is shorter than an old one. So it
+/// is enough to give each point a partner that is nearer than its own; of these exchanges, the one
+/// that saves most is made.
 fn exchange<I: Index>(
     odd: &OddPoints<'_, I>,
     near: &mut Remaining<'_, I>,

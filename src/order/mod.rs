@@ -7,7 +7,8 @@
 //!
 //! 1. `network` turns the segments of one pen into a graph of stations and chains.
 //! 2. `matching` pairs the odd stations so that the total length is the least. `greedy` pairs them
-//!    in less memory, without that guarantee; `remaining` finds for it, and for step 3, what is near.
+//!    in less memory, without that guarantee; `remaining` finds for it, and for step 3, what is
+//!    near.
 //! 3. `euler` traces the strokes along Eulerian tours, one connected part after another, the
 //!    nearest part first.
 //! 4. `improve` shortens the tour of several parts: `patch_cycles` changes pen-up moves so that

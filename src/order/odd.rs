@@ -60,8 +60,8 @@ impl<'a, I: Index> OddPoints<'a, I> {
         self.stations.get(odd.get()).copied()
     }
 
-    /// Sorts all odd points but the free ends into the cells of a grid, where those near a place are
-    /// found.
+    /// Sorts all odd points but the free ends into the cells of a grid, where those near a place
+    /// are found.
     ///
     /// # Errors
     /// [`OutOfScratch`] if there are fewer than [`Remaining::bytes`].

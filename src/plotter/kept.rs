@@ -104,8 +104,8 @@ impl<F: MultiwriteNorFlash> Kept<F> {
     /// Carries out [`Board::begin_progress`](super::Board::begin_progress).
     ///
     /// # Errors
-    /// [`NotStored`] if no job is kept, if the log cannot hold so many strokes, or if the flash does
-    /// not take it.
+    /// [`NotStored`] if no job is kept, if the log cannot hold so many strokes, or if the flash
+    /// does not take it.
     pub fn begin_progress(&mut self, notes: &[u8], strokes: u32) -> Result<(), NotStored> {
         self.open = None;
         let (slot, sum) = self.layout.job.identify(&mut self.flash).ok_or(NotStored)?;

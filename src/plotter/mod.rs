@@ -232,8 +232,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         }
     }
 
-    /// Returns the same plotter without `$undo`. With it, the time in which a model is received grows
-    /// with the square of its size, because the whole model is copied before each change.
+    /// Returns the same plotter without `$undo`. With it, the time in which a model is received
+    /// grows with the square of its size, because the whole model is copied before each change.
     #[must_use]
     pub fn without_undo(mut self) -> Self {
         self.inner.can_undo = false;

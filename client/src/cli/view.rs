@@ -59,12 +59,13 @@ impl ViewArgs {
         &self.arrangement
     }
 
-    /// The settings for a file that was arranged by [`ViewArgs::arrangement`]. Where the arguments do
-    /// not say otherwise, a file that has a page is drawn on that, and at true size no margin is kept
-    /// free: so its plan keeps its place.
+    /// The settings for a file that was arranged by [`ViewArgs::arrangement`]. Where the arguments
+    /// do not say otherwise, a file that has a page is drawn on that, and at true size no margin is
+    /// kept free: so its plan keeps its place.
     ///
     /// # Errors
-    /// The direction of the view contradicts the projection, or the file is a plan, which has no up.
+    /// The direction of the view contradicts the projection, or the file is a plan, which has no
+    /// up.
     pub fn settings_for(&self, file: &SourceFile) -> Result<Settings, String> {
         let mut settings = self.settings.clone();
         settings.page = file.sheet();
@@ -84,8 +85,8 @@ impl ViewArgs {
         Ok(settings)
     }
 
-    /// Chooses the eye if the arguments give a direction, or say what is up: the plotter's own choice
-    /// is made for models with z up.
+    /// Chooses the eye if the arguments give a direction, or say what is up: the plotter's own
+    /// choice is made for models with z up.
     fn look(&self, file: &SourceFile, settings: &mut Settings) -> Result<(), String> {
         let position = |name: &str| -> Option<[f64; 3]> {
             let parts = settings.value(name)?.split(',').map(|part| part.trim().parse());

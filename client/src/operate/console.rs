@@ -29,7 +29,8 @@ const GREETING: &str = "Type lines for the plotter; ? asks for the status, ! hol
                         gives up. Ctrl-D ends.";
 
 /// Sends each line of the standard input when the one before is answered, and prints all that the
-/// plotter says, with `is_json` each of its lines as an object. Lines of bytes that act at once are not held back. Ends at the end of the input.
+/// plotter says, with `is_json` each of its lines as an object. Lines of bytes that act at once are
+/// not held back. Ends at the end of the input.
 ///
 /// # Errors
 /// The port cannot be opened, or the line to the plotter breaks.

@@ -68,8 +68,8 @@ impl Sender<'_> {
         self.draw_kept(AGAIN, progress)
     }
 
-    /// Goes on with the job that a loss of power or a reset has stopped, and waits until the machine
-    /// is idle. With `at_origin` the user has put the pen at the origin by hand.
+    /// Goes on with the job that a loss of power or a reset has stopped, and waits until the
+    /// machine is idle. With `at_origin` the user has put the pen at the origin by hand.
     ///
     /// # Errors
     /// As [`Sender::plot`].

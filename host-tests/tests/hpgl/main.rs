@@ -118,8 +118,8 @@ fn files() -> [(&'static str, Vec<u8>); 4] {
     ]
 }
 
-/// How far the client's plan may be from the true figure, in steps: the chords of its arcs are up to
-/// 0.2 plotter units off, which are 0.4 steps.
+/// How far the client's plan may be from the true figure, in steps: the chords of its arcs are up
+/// to 0.2 plotter units off, which are 0.4 steps.
 fn slack(name: &str) -> f64 {
     if name == "chiplotle" { 0.4 } else { 0.0 }
 }

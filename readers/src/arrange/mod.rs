@@ -1,10 +1,11 @@
 //! Arranges a plan before it is drawn: scales, turns, cuts, joins and hatches its strokes.
 //!
-//! [`PLAN_OPTIONS`] has one row for each option, from which the help of the command line is made. An
-//! [`Arrangement`] holds their values. The steps come in a fixed order: layers are chosen; the plan
-//! is scaled and turned, hatched, laid in the middle of the page, and cropped; then strokes are
-//! joined and simplified; and last the layers are given their pens. Where a closed stroke begins is
-//! nothing to choose here: the plotter begins it where that makes the moves between strokes short.
+//! [`PLAN_OPTIONS`] has one row for each option, from which the help of the command line is made.
+//! An [`Arrangement`] holds their values. The steps come in a fixed order: layers are chosen; the
+//! plan is scaled and turned, hatched, laid in the middle of the page, and cropped; then strokes
+//! are joined and simplified; and last the layers are given their pens. Where a closed stroke
+//! begins is nothing to choose here: the plotter begins it where that makes the moves between
+//! strokes short.
 //!
 //! A file that is no plan is refused if any of the options is given, and so is a value that leaves
 //! nothing to draw.
@@ -73,9 +74,9 @@ pub struct Arrangement {
 }
 
 impl Arrangement {
-    /// Nothing is done with a plan but to lay it on `page`, turned by `turn`, with this `margin` in mm.
-    /// Where there is no page, the file's own serves, or else A4; where there is no margin, nothing
-    /// stays free on the page of the file, and 10 mm on any other.
+    /// Nothing is done with a plan but to lay it on `page`, turned by `turn`, with this `margin` in
+    /// mm. Where there is no page, the file's own serves, or else A4; where there is no margin,
+    /// nothing stays free on the page of the file, and 10 mm on any other.
     pub fn on(page: Option<Page>, turn: Turn, margin: Option<f64>) -> Self {
         Self { page, turn, margin, ..Self::default() }
     }

@@ -1,5 +1,5 @@
-//! The names of layers by which AxiDraw is controlled: `%` first for a layer that is not plotted, `!`
-//! for a pause before it, a number, and then `+S`, `+H` and `+D` with numbers of their own
+//! The names of layers by which AxiDraw is controlled: `%` first for a layer that is not plotted,
+//! `!` for a pause before it, a number, and then `+S`, `+H` and `+D` with numbers of their own
 //! (<https://wiki.evilmadscientist.com/AxiDraw_Layer_Control>).
 
 /// What the name of a layer asks of an AxiDraw.
@@ -20,7 +20,8 @@ pub(super) struct Control {
 }
 
 impl Control {
-    /// Reads the name of a layer. What is no code of AxiDraw, and all behind it, is the user's text.
+    /// Reads the name of a layer. What is no code of AxiDraw, and all behind it, is the user's
+    /// text.
     pub(super) fn of(name: &str) -> Self {
         let mut control = Self::default();
         let mut rest = name.trim_start();

@@ -26,8 +26,8 @@ use super::{BOOT_2, ROW, critical, emergency};
 
 /// The address at which the flash is mapped to memory, so that it can be read.
 const MAPPED_AT: usize = ROW.flash.start as usize;
-/// The memory map reserves the flash from here on for this module. What lies below, from 640 KiB on,
-/// is to stay free for a stored model.
+/// The memory map reserves the flash from here on for this module. What lies below, from 640 KiB
+/// on, is to stay free for a stored model.
 const START: u32 = ROW.budget.flash as u32;
 /// The number of bytes in the flash chip, and so the offset at which it ends.
 const END: u32 = ROW.flash.size as u32;

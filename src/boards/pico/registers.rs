@@ -44,9 +44,9 @@ impl<B> Guarded<B> {
     /// Gives access to all registers.
     ///
     /// # Safety
-    /// The registers are only read, or what is written to them makes the chip read and write nothing
-    /// but registers of peripherals and memory that Rust shares with it as atomics, and leaves what
-    /// Rust reads as it is.
+    /// The registers are only read, or what is written to them makes the chip read and write
+    /// nothing but registers of peripherals and memory that Rust shares with it as atomics, and
+    /// leaves what Rust reads as it is.
     #[inline(always)]
     pub unsafe fn registers(&self) -> &B {
         &self.0

@@ -22,8 +22,8 @@ use crate::step::{Arc, Turn};
 use block::{Action, AxisUse, Block, Flow};
 use pen::PenRule;
 
-/// A position of the machine, in millimetres from the page's origin. Z is only counted: the pen has no
-/// other heights than up and down.
+/// A position of the machine, in millimetres from the page's origin. Z is only counted: the pen has
+/// no other heights than up and down.
 pub(super) type MachinePosition = [Millimetres; 3];
 
 /// The modes and the position that the lines so far have set.
