@@ -1,6 +1,6 @@
 //! Jobs that go on where a loss of power, a reset or a fault has stopped them: `$resume`.
 //!
-//! The strokes of a job are kept before the pen moves ([`records`]). While they are drawn, the
+//! The strokes of a job are kept before the pen moves (`records`). While they are drawn, the
 //! board keeps how many are done, and what the drawing depends on: the version of the firmware, the
 //! settings that decide where ink falls, and the model. If one of these has changed, the job is not
 //! continued, because its parts would not fit together.
