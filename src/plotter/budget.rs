@@ -3,7 +3,6 @@
 //! For the largest scene that a board must be able to draw, a [`Budget`] adds up what the stages of
 //! a job need. The library does not compile if that exceeds the board's working memory.
 
-use super::memory::Memory;
 use crate::board_table::{BOARDS, BoardRow};
 use crate::drawing::{PackedLine, PagePoint, Segment};
 use crate::geometry::Vertex;
@@ -48,9 +47,7 @@ impl Budget {
             board: *name,
             vertex_limit: memory.vertices,
             corner_limit: memory.corners,
-            model: size_of::<Memory<0, 0, 0, 0>>()
-                + size_of::<Position>() * memory.vertices
-                + size_of::<Corner>() * memory.corners,
+            model: size_of::<Position>() * memory.vertices + size_of::<Corner>() * memory.corners,
             working: 8 * memory.words,
             view: Scratch::bytes_for::<Vertex>(scene.vertices),
             visibility: visibility::least_bytes::<u16>(scene.vertices, scene.corners, scene.faces),

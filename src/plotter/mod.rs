@@ -71,7 +71,9 @@ pub fn run<B: Board, I: Index>(
     memory: MemorySlices<'_, I>,
     pins: &PulserState,
 ) -> ! {
-    let mut plotter = start(board, memory, pins);
+    // Made here and not in `start`: a returned plotter would be on the stack twice.
+    let mut plotter = Plotter::with_settings(memory, pins, records::load_settings(board));
+    plotter.begin(board);
     loop {
         if !plotter.poll(board) {
             if plotter.inner.is_timing() { board.wait_briefly() } else { board.wait() }
@@ -80,25 +82,14 @@ pub fn run<B: Board, I: Index>(
 }
 
 /// Makes a plotter of what the board has kept, and greets the user, as after every reset.
-#[inline(always)] // Adds no frame to the stack while the stages run.
+#[cfg(any(test, feature = "host"))]
 pub fn start<'m, B: Board, I: Index>(
     board: &mut B,
     memory: MemorySlices<'m, I>,
     pins: &'m PulserState,
 ) -> Plotter<'m, I> {
     let mut plotter = Plotter::with_settings(memory, pins, records::load_settings(board));
-    if board.fault().is_some() {
-        plotter.inner.machine.alarm(Alarm::Restarted);
-    }
-    // A program that opened a port while the board started gets the greeting that goes to all
-    // ports. It needs no second one.
-    let _ = board.take_opened();
-    plotter.inner.parameters = records::load_parameters(board);
-    plotter.inner.find_stopped(board);
-    plotter.greet(board);
-    report::fault(board);
-    plotter.inner.resumption.report(State::Idle, board);
-    plotter.inner.run_startup_lines(board);
+    plotter.begin(board);
     plotter
 }
 
@@ -230,6 +221,23 @@ impl<'m, I: Index> Plotter<'m, I> {
                 hpgl_pen: None,
             },
         }
+    }
+
+    /// Takes what else the board has kept, and greets the user, as after every reset.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn begin<B: Board>(&mut self, board: &mut B) {
+        if board.fault().is_some() {
+            self.inner.machine.alarm(Alarm::Restarted);
+        }
+        // A program that opened a port while the board started gets the greeting that goes to all
+        // ports. It needs no second one.
+        let _ = board.take_opened();
+        self.inner.parameters = records::load_parameters(board);
+        self.inner.find_stopped(board);
+        self.greet(board);
+        report::fault(board);
+        self.inner.resumption.report(State::Idle, board);
+        self.inner.run_startup_lines(board);
     }
 
     /// Returns the same plotter without `$undo`. With it, the time in which a model is received

@@ -78,7 +78,7 @@ impl Default for Settings {
 impl Settings {
     /// The value of a setting, in its unit.
     pub fn get(&self, setting: Setting) -> Value {
-        self.values[setting as usize]
+        self.values.get(setting as usize).copied().unwrap_or_default()
     }
 
     /// Changes a setting.

@@ -298,6 +298,6 @@ impl Setting {
     /// ```
     pub fn numbered(number: u16) -> Option<Self> {
         let index = SETTINGS.binary_search_by_key(&number, |info| info.number);
-        index.ok().map(|index| SETTINGS[index].setting)
+        Some(SETTINGS.get(index.ok()?)?.setting)
     }
 }
