@@ -35,10 +35,12 @@ static FAULT: Mutex<String> = Mutex::new(String::new());
 pub(crate) fn note_faults() {
     static ONCE: Once = Once::new();
     ONCE.call_once(|| {
-        std::panic::set_hook(Box::new(|panic| {
+        let print = std::panic::take_hook();
+        std::panic::set_hook(Box::new(move |panic| {
             if let Ok(mut fault) = FAULT.lock() {
                 *fault = panic.to_string();
             }
+            print(panic);
         }));
     });
 }

@@ -345,7 +345,9 @@ impl Session {
             Outcome::Refused(line, error) => {
                 let text = refusal(line.as_ref(), error, &self.messages);
                 self.fail(text);
-                return self.enter(Phase::Ready);
+                // Until lines are numbered anew, the plotter repeats the refusal.
+                self.enter(Phase::Numbering);
+                return self.begin_numbers();
             }
             Outcome::Restarted => return self.restarted(),
             Outcome::Lost(line) => {

@@ -45,7 +45,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 /// use penup::stage::{Scratch, NeverCancel};
 ///
 /// #[derive(Default)]
-/// struct Hidden(Vec<(I, I)>);
+/// struct Hidden(Vec<(u16, u16)>);
 /// impl SolidSink for Hidden {
 ///     fn face(&mut self, _: &[Corner], _: bool) -> Result<(), SinkFull> {
 ///         Ok(())
@@ -60,7 +60,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, heap_sort_by_key};
 /// // A pyramid seen from below a side: the apex, 4, is hidden.
 /// let pyramid = [[0, 0, 0], [4, 0, 0], [4, 4, 0], [0, 4, 0], [2, 2, 3]];
 /// let edges = [[0, 1], [1, 2], [2, 3], [3, 0], [0, 4], [1, 4], [2, 4], [3, 4]];
-/// let mut words = vec![0; scratch_bytes_from_edges(5, 8) / 8];
+/// let mut words = vec![0; scratch_bytes_from_edges::<u16>(5, 8) / 8];
 /// let mut hidden = Hidden::default();
 /// let eye = Eye::At([2, 2, -9]);
 /// let scratch = Scratch::new(&mut words);

@@ -90,7 +90,7 @@ pub(super) type FaceCorners<I> = [I; 3];
 /// impl SolidSink for Count {
 ///     fn face(&mut self, corners: &[Corner], visible: bool) -> Result<(), SinkFull> {
 ///         assert_eq!(corners.len(), 4);
-///         self.visible_faces += visible.get();
+///         self.visible_faces += usize::from(visible);
 ///         Ok(())
 ///     }
 ///     fn edge(&mut self, edge: SolidEdge) -> Result<(), SinkFull> {
@@ -99,7 +99,7 @@ pub(super) type FaceCorners<I> = [I; 3];
 ///     }
 /// }
 /// let cube = [0, 1, 2, 3, 4, 5, 6, 7].map(|i| [i & 1, i >> 1 & 1, i >> 2]);
-/// let mut words = vec![0; scratch_bytes_from_vertices(8) / 8];
+/// let mut words = vec![0; scratch_bytes_from_vertices::<u16>(8) / 8];
 /// let mut count = Count::default();
 /// let eye = Eye::At([5, 4, 3]);
 /// let (exact, scratch) = (Precision::default(), Scratch::new(&mut words));

@@ -172,7 +172,7 @@ impl Parameter {
 /// use penup::curve::{Knots, Spline};
 /// // The curve of section 2.4, order 3, in tenths; the first and last points have multiplicity 2.
 /// let points = [[0, 0, 0], [30, 90, 0], [60, 30, 0], [90, 60, 0]];
-/// let curve = Spline::new(&points, &[0, 0, 1, 2, 3, 3], 3, Knots::Uniform)?;
+/// let curve = Spline::<u16>::new(&points, &[0, 0, 1, 2, 3, 3], 3, Knots::Uniform)?;
 /// // The paper's t = 2 is knot 3 here: halfway between two points (equation 25).
 /// assert_eq!(curve.at(curve.parameter(3, 0)), [15, 45, 0]);
 /// # Ok::<(), penup::curve::CurveError>(())

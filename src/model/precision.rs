@@ -98,7 +98,7 @@ impl<I: Index> Model<'_, I> {
     ///
     /// ```
     /// use penup::fixed::Decimal;
-    /// use penup::model::{Model, no_undo};
+    /// use penup::model::{Model, Position, no_undo};
     /// let (mut vertices, mut corners) = ([Position::ORIGIN; 2], []);
     /// let mut model: Model = Model::new(&mut vertices, &mut corners);
     /// let decimals = |texts: [&str; 3]| texts.map(|text| Decimal::parse(text).unwrap());

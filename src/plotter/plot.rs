@@ -8,7 +8,7 @@ use super::{Board, Cursor, Inner, Job, Observer, Unobserved, records};
 use crate::index::Index;
 use crate::machine::State;
 use crate::protocol::{CommandError, RealTime};
-use crate::stage::{Cancel, Stage};
+use crate::stage::{Aborted, Cancel, Stage};
 
 /// Which job is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,6 +48,7 @@ impl<I: Index> Inner<'_, I> {
         let requests = RealTime::default();
         let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
         let begun = match drawing {
+            _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
             Drawing::Model => self.compute(&mut listener, &mut Unobserved).and_then(|()| {
                 let is_kept = self.save(listener.board);
                 self.begin(&mut listener)?;
@@ -74,6 +75,17 @@ impl<I: Index> Inner<'_, I> {
         begun?;
         self.report_degenerate(board);
         self.act(requests);
+        Ok(())
+    }
+
+    /// Waits until the last moves are made: their plan may be complete before, and a sector of flash
+    /// must not be erased while something moves.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn settle<B: Board>(&mut self, listener: &mut Listener<'_, B>) -> Result<(), Aborted> {
+        while !self.machine.is_stopped() {
+            listener.check()?;
+            listener.board.wait_briefly();
+        }
         Ok(())
     }
 
