@@ -108,8 +108,8 @@ impl ViewArgs {
         let (direction, own_up) = match (self.viewpoint, fixed) {
             (Some(_), Some(_)) => {
                 return Err(format!(
-                    "--{PROJECTION} {projection} has a direction of its own: choose orthographic, or \
-                     leave --{VIEW}, --{AZIMUTH} and --{ELEVATION} out"
+                    "--{PROJECTION} {projection} has a direction of its own: choose \
+                     orthographic, or leave --{VIEW}, --{AZIMUTH} and --{ELEVATION} out"
                 ));
             }
             (Some(view), None) | (None, Some(view)) => (view.direction(), view.up()),
@@ -164,8 +164,8 @@ impl Args for ViewArgs {
                 Arg::new(LANDSCAPE)
                     .long(LANDSCAPE)
                     .help(
-                        "Lay the page on its long side; --landscape=auto does so if a plan is wider \
-                         than high",
+                        "Lay the page on its long side; --landscape=auto does so if a plan \
+                         is wider than high",
                     )
                     .help_heading(flag.heading)
                     .value_name("WHEN")
