@@ -23,6 +23,8 @@ use core::ops::{Add, AddAssign, BitAnd, BitOr, BitXor, BitXorAssign, Shl, Shr, S
 /// ```
 pub trait Index:
     Pod
+    + Send
+    + Sync
     + Ord
     + Hash
     + Default
@@ -40,7 +42,7 @@ pub trait Index:
     + Shr<u32, Output = Self>
 {
     /// Two numbers in one, which sorts by the first and then by the second.
-    type Pair: Pod + Ord + Debug + From<u32> + Into<u64>;
+    type Pair: Pod + Send + Sync + Ord + Debug + From<u32> + Into<u64>;
 
     /// The number 0.
     const ZERO: Self;

@@ -1,6 +1,6 @@
 //! Times of the search for hidden lines as meshes grow, with the numbers of a computer:
 //! `hidden_growth [KIND FACES [seams]]`, KIND being `icosphere` or `terrain`. Without arguments,
-//! both kinds from 5,000 to 1.3 million faces, without and with seams.
+//! both kinds from 5,000 to 1.3 million faces, without and with seams, each on one core and on all.
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*find_stretches*'` counts the instructions of one.
 
@@ -9,7 +9,7 @@ use penup::geometry::Projection;
 use penup::model::{Corner, Elements};
 use penup::stage::{NeverCancel, Scratch, SinkFull};
 use penup::visibility::{
-    Options, Scene, Stretch, StretchSink, Unrounded, find_stretches, scratch_bytes,
+    Options, Scene, Stretch, StretchSink, Unrounded, find_stretches, scratch_bytes, threads,
 };
 use penup_host_tests::scene_files::{Model, Vector, View};
 use std::collections::HashMap;
@@ -96,7 +96,7 @@ impl StretchSink<u32> for Count {
     }
 }
 
-fn run(kind: &str, faces: usize, with_seams: bool) {
+fn run(kind: &str, faces: usize, with_seams: bool, on_all_cores: bool) {
     let make = match kind {
         "icosphere" => icosphere,
         "terrain" => terrain,
@@ -119,22 +119,25 @@ fn run(kind: &str, faces: usize, with_seams: bool) {
     let mut count = Count(0);
     let start = Instant::now();
     let scratch = Scratch::new(&mut words);
-    find_stretches(&scene, options, scratch, &mut NeverCancel, &mut count).expect("stretches");
+    let find = if on_all_cores { threads::find_stretches } else { find_stretches };
+    find(&scene, options, scratch, &mut NeverCancel, &mut count).expect("stretches");
     let (seconds, faces) = (start.elapsed().as_secs_f64(), triangles.len());
     let seams = if with_seams { ", with seams" } else { "" };
-    println!("{kind}, {faces} faces{seams}: {seconds:.3} s, {} stretches", count.0);
+    let cores = if on_all_cores { ", on all cores" } else { "" };
+    println!("{kind}, {faces} faces{seams}{cores}: {seconds:.3} s, {} stretches", count.0);
 }
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [kind, faces, rest @ ..] = &arguments[..] {
-        run(kind, faces.parse().expect("a number of faces"), !rest.is_empty());
+        run(kind, faces.parse().expect("a number of faces"), !rest.is_empty(), false);
         return;
     }
     for kind in ["icosphere", "terrain"] {
         for faces in [5_000, 20_000, 80_000, 320_000, 1_300_000] {
             for with_seams in [false, true] {
-                run(kind, faces, with_seams);
+                run(kind, faces, with_seams, false);
+                run(kind, faces, with_seams, true);
             }
         }
     }

@@ -8,6 +8,7 @@ use crate::geometry::{Projection, Vertex};
 use crate::index::Index;
 use crate::model::{Corner, Elements, Pens};
 use crate::stage::Scratch;
+use core::ops::Range;
 
 /// The corners of the elements. An element is addressed by the number of its first corner.
 #[derive(Debug, Clone, Copy)]
@@ -34,8 +35,17 @@ impl<'a, I: Index> Outlines<'a, I> {
 
     /// Iterates over the elements, each with the number of its first corner.
     pub fn elements(&self) -> impl Iterator<Item = (usize, &'a [Corner<I>])> + use<'a, I> {
-        let mut next = 0;
-        self.corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
+        self.elements_in(0..self.corners.len())
+    }
+
+    /// Iterates over the elements of a range of corners, which begins and ends with an element, each
+    /// with the number of its first corner.
+    pub fn elements_in(
+        &self,
+        range: Range<usize>,
+    ) -> impl Iterator<Item = (usize, &'a [Corner<I>])> + use<'a, I> {
+        let mut next = range.start;
+        self.corners[range].split_inclusive(|corner| corner.is_last()).map(move |corners| {
             let first = next;
             next += corners.len();
             (first, corners)

@@ -7,10 +7,9 @@
 //! path is hidden without a further test.
 
 use super::VisibilityError;
-use super::coarse_projection::{CoarsePoint, CoarseProjection};
-use super::edges::Outlines;
-use super::faces::Faces;
+use super::coarse_projection::CoarsePoint;
 use super::raster::{Bounds, Raster, Shape};
+use super::scene_index::SceneIndex;
 use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
 use crate::geometry::COORDINATE_LIMIT;
@@ -109,12 +108,12 @@ impl<'a, I: Index> Grid<'a, I> {
     /// Returns an error if the memory is too small or the user cancels.
     #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn new(
-        coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_, I>,
-        faces: &Faces<'_, I>,
+        around: &SceneIndex<'_, I>,
         mut scratch: Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
+        let SceneIndex { coarse_projection, outlines, faces, .. } = around;
+        let outlines = *outlines;
         let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(I::NONE.get());
         let mut shape = Shape::finest(coarse_projection);
         while shape.cells() > 1 {

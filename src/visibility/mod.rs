@@ -63,6 +63,8 @@ mod raster;
 mod seams;
 mod scene_index;
 mod search;
+#[cfg(feature = "threads")]
+pub mod threads;
 mod edge_query;
 mod triangles;
 mod unrounded;
@@ -76,8 +78,9 @@ use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch};
 use coarse_projection::{CoarsePoint, CoarseProjection};
 use edges::{ChosenSides, Outlines, most_corners};
 use faces::Faces;
+use grid::Grid;
 use scene_index::SceneIndex;
-use search::StretchFinder;
+use search::{Marks, StretchFinder};
 use triangles::Ears;
 use yield_counter::YieldCounter;
 
@@ -222,28 +225,42 @@ pub const fn least_bytes<I: Index>(vertices: usize, corners: usize, faces: usize
 pub fn find_stretches<I: Index>(
     scene: &Scene<'_, I>,
     options: Options,
-    mut scratch: Scratch<'_>,
+    scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
     sink: &mut dyn StretchSink<I>,
 ) -> Result<Report, VisibilityError> {
+    let mut scratch = scratch; // It lives no longer than the scene.
+    let yield_counter = &mut YieldCounter::new(cancel);
+    let around = &index(scene, options, &mut scratch, yield_counter)?;
+    let faces = around.faces.len();
+    let marks = Marks::new(faces, StretchFinder::<I>::least_bytes(faces), &mut scratch)?;
+    let grid = &Grid::new(around, scratch, yield_counter)?;
+    let mut search = StretchFinder::new(around, grid, marks, options);
+    search.follow_edges(0..around.outlines.corners.len(), yield_counter, sink)?;
+    if options.with_seams {
+        search.follow_seams(0..faces, yield_counter, sink)?;
+    }
+    Ok(around.report())
+}
+
+/// Finds out what the search needs to know about a scene: chooses the edges, cuts the faces into
+/// triangles, and sorts them by depth.
+fn index<'a, I: Index>(
+    scene: &Scene<'a, I>,
+    options: Options,
+    scratch: &mut Scratch<'a>,
+    yield_counter: &mut YieldCounter<'_>,
+) -> Result<SceneIndex<'a, I>, VisibilityError> {
     check(scene)?;
     let outlines = Outlines::of(scene.elements);
     let (vertices, projection) = (scene.vertices, scene.projection);
-    let yield_counter = &mut YieldCounter::new(cancel);
-    let memory = &mut scratch;
     let creases = (options.crease, scene.unrounded);
     let chosen =
-        ChosenSides::choose(outlines, projection, vertices, creases, memory, yield_counter)?;
-    let ears = Ears::cut(outlines, vertices, memory, yield_counter)?;
-    let coarse_projection = CoarseProjection::new(scene, memory, yield_counter)?;
-    let faces = Faces::sort(outlines, vertices, memory, yield_counter)?;
-    let around = SceneIndex { coarse_projection, outlines, ears, chosen, faces };
-    let mut search = StretchFinder::new(around, options, scratch, yield_counter)?;
-    search.follow_edges(yield_counter, sink)?;
-    if options.with_seams {
-        search.follow_seams(yield_counter, sink)?;
-    }
-    Ok(Report { degenerate_faces: search.degenerate_faces() })
+        ChosenSides::choose(outlines, projection, vertices, creases, scratch, yield_counter)?;
+    let ears = Ears::cut(outlines, vertices, scratch, yield_counter)?;
+    let coarse_projection = CoarseProjection::new(scene, scratch, yield_counter)?;
+    let faces = Faces::sort(outlines, vertices, scratch, yield_counter)?;
+    Ok(SceneIndex { coarse_projection, outlines, ears, chosen, faces })
 }
 
 /// Refuses a scene whose numbers would overflow the arithmetic or that refers to unknown vertices.

@@ -1,5 +1,6 @@
 //! What the search for visible stretches knows about a scene, and what it asks of its faces.
 
+use super::Report;
 use super::coarse_projection::CoarseProjection;
 use super::edges::{ChosenSides, Outlines};
 use super::faces::{Face, Faces};
@@ -26,6 +27,11 @@ pub struct SceneIndex<'a, I: Index> {
 }
 
 impl<I: Index> SceneIndex<'_, I> {
+    /// Returns what was noticed about the scene, for the user to be told.
+    pub fn report(&self) -> Report {
+        Report { degenerate_faces: self.faces.degenerate() }
+    }
+
     /// Returns the triangle with this number, counted from 0, of a face. Returns `None` if the face
     /// has fewer.
     pub fn triangle(&self, face: Face, number: usize) -> Option<[I; 3]> {

@@ -1,6 +1,9 @@
 //! Follows each edge and each seam through the cells of the page and tests it against the faces
 //! there.
 //!
+//! What is known about the scene does not change meanwhile, so several finders, each with marks of
+//! its own, may follow different edges at the same time.
+//!
 //! The tests leave marks on the profile of the edge. Runs of pieces with the same outcome become
 //! the stretches that the sink receives.
 
@@ -18,6 +21,7 @@ use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, EdgeParameter};
 use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
+use core::ops::Range;
 
 /// The most pieces that the profile of an edge may have. An edge that needs more is processed in
 /// several parts.
@@ -26,70 +30,90 @@ const MOST_PIECES: usize = 24;
 /// The average number of instructions for testing an edge against one face.
 const FACE_TEST: usize = 1000;
 
-/// Finds which stretches of each edge are visible, one edge after the other.
-pub struct StretchFinder<'a, I: Index> {
-    /// The scene: its vertices, its faces in the order of their depth, and its edges.
-    around: SceneIndex<'a, I>,
-    /// The faces on each cell of the page.
-    grid: Grid<'a, I>,
+/// What a [`StretchFinder`] notes about the edge, the seam or the face that it is working on.
+pub struct Marks<'m, I> {
     /// The faces against which the current edge has been tested.
-    seen: FaceSet<'a, I>,
+    seen: FaceSet<'m, I>,
     /// The faces that share a cell with the face whose seams (lines where faces pass through each
     /// other) are being found.
-    met: FaceSet<'a, I>,
+    met: FaceSet<'m, I>,
     /// Which parts of the current edge are hidden, as far as it has been tested.
-    profile: Profile<'a>,
+    profile: Profile<'m>,
+}
+
+impl<'m, I: Index> Marks<'m, I> {
+    /// Returns the least number of bytes of working memory that are enough.
+    pub const fn least_bytes(faces: usize) -> usize {
+        2 * FaceSet::<I>::bytes(faces) + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
+    }
+
+    /// Returns the number of bytes of working memory beyond which more is no gain, because an eighth
+    /// of what lies beyond the least is all the pieces that a profile may have.
+    #[cfg(feature = "threads")]
+    pub const fn most_bytes(faces: usize) -> usize {
+        2 * FaceSet::<I>::bytes(faces) + 8 * Scratch::bytes_for::<ProfilePiece>(MOST_PIECES)
+    }
+
+    /// Takes memory for the marks. Of what `scratch` has beyond `least` bytes, an eighth at most is
+    /// taken for longer profiles.
+    ///
+    /// # Errors
+    /// Returns an error if the memory is too small.
+    pub fn new(
+        faces: usize,
+        least: usize,
+        scratch: &mut Scratch<'m>,
+    ) -> Result<Self, VisibilityError> {
+        let seen = FaceSet::new(faces, scratch)?;
+        let met = FaceSet::new(faces, scratch)?;
+        let spare = scratch.available_bytes().saturating_sub(least);
+        let more_pieces = spare / 8 / size_of::<ProfilePiece>();
+        let pieces = scratch.take(MOST_PIECES.min(FEWEST_PIECES + more_pieces))?;
+        Ok(Self { seen, met, profile: Profile::new(pieces) })
+    }
+}
+
+/// Finds which stretches of each edge are visible, one edge after the other.
+pub struct StretchFinder<'s, I: Index> {
+    /// The scene: its vertices, its faces in the order of their depth, and its edges.
+    around: &'s SceneIndex<'s, I>,
+    /// The faces on each cell of the page.
+    grid: &'s Grid<'s, I>,
+    /// What is known about the edge in work.
+    marks: Marks<'s, I>,
     /// Which kinds of stretches the user wants to see.
     options: Options,
 }
 
-impl<'a, I: Index> StretchFinder<'a, I> {
-    /// Returns the least number of bytes of working memory that are enough. The search is then
-    /// slow.
+impl<'s, I: Index> StretchFinder<'s, I> {
+    /// Returns the least number of bytes of working memory that are enough for the marks and the
+    /// grid. The search is then slow.
     pub const fn least_bytes(faces: usize) -> usize {
-        2 * FaceSet::<I>::bytes(faces)
-            + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
-            + Grid::<I>::least_bytes(faces)
+        Marks::<I>::least_bytes(faces) + Grid::<I>::least_bytes(faces)
     }
 
-    /// Prepares the search. It uses as much of `scratch` as is useful.
+    /// Prepares the search of a scene.
     pub fn new(
-        around: SceneIndex<'a, I>,
+        around: &'s SceneIndex<'s, I>,
+        grid: &'s Grid<'s, I>,
+        marks: Marks<'s, I>,
         options: Options,
-        mut scratch: Scratch<'a>,
-        yield_counter: &mut YieldCounter<'_>,
-    ) -> Result<Self, VisibilityError> {
-        let faces = around.faces.len();
-        let seen = FaceSet::new(faces, &mut scratch)?;
-        let met = FaceSet::new(faces, &mut scratch)?;
-        let spare = scratch.available_bytes().saturating_sub(Self::least_bytes(faces));
-        let more_pieces = spare / 8 / size_of::<ProfilePiece>();
-        let pieces = scratch.take(MOST_PIECES.min(FEWEST_PIECES + more_pieces))?;
-        let grid = Grid::new(
-            &around.coarse_projection,
-            around.outlines,
-            &around.faces,
-            scratch,
-            yield_counter,
-        )?;
-        Ok(Self { around, grid, seen, met, profile: Profile::new(pieces), options })
+    ) -> Self {
+        Self { around, grid, marks, options }
     }
 
-    /// Returns the number of faces that have no area.
-    pub fn degenerate_faces(&self) -> u32 {
-        self.around.faces.degenerate()
-    }
-
-    /// Finds the stretches of every edge, in the order of the model.
+    /// Finds the stretches of the edges of a range of elements, in the order of the model. The range
+    /// is one of corners, which begins and ends with an element.
     ///
     /// # Errors
     /// Returns an error if the sink is full or the user cancels.
     pub fn follow_edges(
         &mut self,
+        corners: Range<usize>,
         yield_counter: &mut YieldCounter<'_>,
         sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
-        for (first, element) in self.around.outlines.elements() {
+        for (first, element) in self.around.outlines.elements_in(corners) {
             for (number, p, q) in sides(element) {
                 let side = first + number;
                 if self.around.chosen.contains(side) {
@@ -103,22 +127,24 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         Ok(())
     }
 
-    /// Finds the seams and hands over their visible stretches.
+    /// Finds the seams of the faces with a range of ranks, each with the faces of higher rank, and
+    /// hands over their visible stretches.
     ///
     /// # Errors
     /// Returns an error if the sink is full or the user cancels.
     #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn follow_seams(
         &mut self,
+        ranks: Range<usize>,
         yield_counter: &mut YieldCounter<'_>,
         sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
-        for one in 0..self.around.faces.len() {
+        for one in ranks {
             self.meet(one);
             let extent = self.around.extent(one);
             // Most faces near a triangle lie on one side of it.
             let plane = self.around.plane(self.around.faces.get(one));
-            let mut met = core::mem::take(&mut self.met);
+            let mut met = core::mem::take(&mut self.marks.met);
             let outcome = met.each(&mut |other| {
                 let may_pass =
                     plane.as_ref().is_none_or(|plane| self.around.is_on_both_sides(plane, other));
@@ -127,7 +153,7 @@ impl<'a, I: Index> StretchFinder<'a, I> {
                 }
                 yield_counter.spend(200).map_err(VisibilityError::from)
             });
-            self.met = met;
+            self.marks.met = met;
             outcome?;
             yield_counter.spend(1000)?;
         }
@@ -180,7 +206,7 @@ impl<'a, I: Index> StretchFinder<'a, I> {
     /// Puts the faces with a higher rank than `one` that may pass through it, so that there is a
     /// seam, into `met`.
     fn meet(&mut self, one: usize) {
-        let Self { around, grid, met, .. } = self;
+        let Self { around, grid, marks: Marks { met, .. }, .. } = self;
         met.clear();
         let corners = around.outlines.element(around.faces.get(one).first);
         let bounds = Bounds::of(&around.coarse_projection, corners);
@@ -219,17 +245,17 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         let mut pending: Option<Stretch<I>> = None;
         let mut start = EdgeParameter::START;
         while start < EdgeParameter::END {
-            self.profile.open(start);
+            self.marks.profile.open(start);
             self.test_faces(edge_query, seam_of, yield_counter)?;
-            let end = self.profile.end();
-            let pieces = self.profile.pieces();
+            let end = self.marks.profile.end();
+            let pieces = self.marks.profile.pieces();
             let next = pieces.iter().skip(1).map(|piece| piece.from).chain([end]);
             for (piece, to) in pieces.iter().zip(next) {
                 let visible = piece.marks & mark::HIDDEN != mark::HIDDEN;
                 let handed = if visible {
                     piece.marks & mark::ENCLOSED == 0
                         && !(self.options.merged_blocks
-                            && edge_query.is_within_plane(&self.around, piece.marks))
+                            && edge_query.is_within_plane(self.around, piece.marks))
                 } else {
                     self.options.with_hidden && edge.is_some()
                 };
@@ -264,7 +290,7 @@ impl<'a, I: Index> StretchFinder<'a, I> {
         seam_of: [Option<usize>; 2],
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
-        let Self { around, grid, seen, profile, options, .. } = self;
+        let Self { around, grid, marks: Marks { seen, profile, .. }, options } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(edge_query.near);
         let cells_along = grid.cells_along(edge_query.p.position, edge_query.q.position, near);

@@ -10,6 +10,10 @@ use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
 use crate::stage::{OutOfScratch, Scratch, Stage};
 use crate::view::{Flattening, Seen, project_scene};
+#[cfg(not(feature = "threads"))]
+use crate::visibility::find_stretches;
+#[cfg(feature = "threads")]
+use crate::visibility::threads::find_stretches;
 use crate::visibility::{self, Scene, Unrounded, VisibilityError};
 
 /// Expected bytes of lines for each corner. A lattice of cubes shows half of its edges and has two
@@ -78,8 +82,7 @@ impl<I: Index> Pipeline<'_, I> {
             let found = if options.see == VisibilityMode::Wire {
                 visibility::follow_wire(&scene, wanted, stage_memory, cancel, &mut sink)
             } else {
-                visibility::find_stretches(&scene, wanted, stage_memory, cancel, &mut sink)
-                    .map(|_| ())
+                find_stretches(&scene, wanted, stage_memory, cancel, &mut sink).map(|_| ())
             };
             lines = match found {
                 Ok(()) => Ok((lines_at, sink.collector.count)),
