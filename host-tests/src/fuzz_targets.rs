@@ -5,12 +5,18 @@
 //! Rust. The test `fuzz_corpus` replays the inputs that it kept, and random ones, on every run. The
 //! tests are built with checks for overflow, so a value that wraps is found, too.
 
+mod drawing;
 mod files;
-mod session;
+mod hpgl;
+mod scene;
 mod sender;
+mod session;
 mod stored;
 
+pub use drawing::fuzz as drawing;
 pub use files::fuzz as files;
+pub use hpgl::fuzz as hpgl;
+pub use scene::fuzz as scene;
 pub use sender::fuzz as sender;
 pub use session::fuzz as session;
 pub use stored::fuzz as stored;
@@ -19,5 +25,12 @@ pub use stored::fuzz as stored;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 4] =
-    [("session", session), ("files", files), ("stored", stored), ("sender", sender)];
+pub const TARGETS: [Target; 7] = [
+    ("session", session),
+    ("hpgl", hpgl),
+    ("files", files),
+    ("stored", stored),
+    ("sender", sender),
+    ("scene", scene),
+    ("drawing", drawing),
+];

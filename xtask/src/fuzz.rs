@@ -13,7 +13,7 @@ const PATIENCE: u32 = 60;
 
 /// Fuzzes each target for this many seconds, or only the target with the name `only`. New inputs
 /// that reach new code stay in `fuzz/corpus`; an input that breaks a promise is written to
-/// `fuzz/artifacts`, and ends the run.
+/// `fuzz/artifacts`, and ends the run. `fuzz/dictionaries` has the words that a target understands.
 ///
 /// # Errors
 /// Nightly Rust or `cargo-fuzz` is missing, there is no such target, or a promise is broken.
@@ -37,12 +37,18 @@ pub fn fuzz(seconds: u32, only: Option<&str>) -> Result<()> {
     }
     for target in &targets {
         say!("penup: fuzzing {target} for {seconds} s")?;
-        run(cargo_fuzz().args(["run", target, "--"]).args([
+        let mut command = cargo_fuzz();
+        command.args(["run", target, "--"]).args([
             format!("-max_total_time={seconds}"),
             format!("-max_len={LONGEST}"),
             format!("-timeout={PATIENCE}"),
             "-print_final_stats=1".to_owned(),
-        ]))?;
+        ]);
+        let words = crate::root().join("fuzz/dictionaries").join(format!("{target}.dict"));
+        if words.exists() {
+            command.arg(format!("-dict={}", words.display()));
+        }
+        run(&mut command)?;
     }
     Ok(())
 }
