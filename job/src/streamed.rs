@@ -70,11 +70,7 @@ impl StreamedJob {
     ///
     /// # Errors
     /// See [`StreamError`].
-    pub fn new(
-        settings: &Settings,
-        path: &mut dyn Path,
-        form: Form,
-    ) -> Result<Self, StreamError> {
+    pub fn new(settings: &Settings, path: &mut dyn Path, form: Form) -> Result<Self, StreamError> {
         let size = measure(settings, path).map_err(StreamError::Machine)?;
         let (least, greatest) = (PagePoint { x: i32::MAX, y: i32::MAX }, PagePoint { x: 0, y: 0 });
         let steps = settings.page_steps().map(|steps| steps.to_bits());

@@ -523,7 +523,11 @@ impl<I: Index> Inner<'_, I> {
                 self.report_build(board);
             }
             Command::Settings => {
-                if !matches!(self.machine.state(), State::Check | State::Jog) {
+                #[cfg(feature = "stream")]
+                let may_run = self.is_streamed();
+                #[cfg(not(feature = "stream"))]
+                let may_run = false;
+                if !may_run && !matches!(self.machine.state(), State::Check | State::Jog) {
                     self.check_idle()?;
                 }
                 self.task = Some(Task::List(Listing::Settings, 0));

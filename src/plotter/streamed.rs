@@ -10,9 +10,7 @@ use super::{Board, Cursor, Inner, Job, Strokes};
 use crate::drawing::{LineType, PagePoint};
 use crate::index::Index;
 use crate::machine::{Late, State, Target};
-use crate::protocol::{
-    CommandError, MOST_TARGETS, StreamHeader, StreamedTarget, StreamedTargets,
-};
+use crate::protocol::{CommandError, MOST_TARGETS, StreamHeader, StreamedTarget, StreamedTargets};
 
 /// The number of bits of a coordinate, which is at most [`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT).
 const COORDINATE_BITS: u32 = 21;
@@ -90,8 +88,16 @@ impl<I: Index> Strokes<'_, I> {
 }
 
 impl<I: Index> Inner<'_, I> {
+    /// Of strokes that are being sent: how many targets have come, how many there are, and how many
+    /// more there is room for.
+    pub(super) fn streamed_targets(&self) -> Option<[u32; 3]> {
+        let Streamed { header, taken, .. } = self.streamed;
+        let room = self.streamed.room(self.words.len(), self.cursor.leg);
+        self.is_streamed().then_some([taken, header.targets, room as u32])
+    }
+
     /// Whether strokes are being sent that the machine draws.
-    fn is_streamed(&self) -> bool {
+    pub(super) fn is_streamed(&self) -> bool {
         self.streamed.header.targets > 0
             && matches!(self.machine.state(), State::Run | State::Hold { .. })
             && !self.machine.is_streaming()

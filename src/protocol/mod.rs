@@ -40,8 +40,6 @@ pub use receiver::{DAMAGED, Receiver};
 #[cfg(all(feature = "stream", any(test, feature = "host")))]
 pub use streamed::StrokeWriter;
 #[cfg(feature = "stream")]
-pub use streamed::{
-    MOST_TARGETS, STROKES_KEYWORD, StreamHeader, StreamedTarget, StreamedTargets,
-};
+pub use streamed::{MOST_TARGETS, STROKES_KEYWORD, StreamHeader, StreamedTarget, StreamedTargets};
 pub use values::{Decimals, Numbers};
 pub(crate) use values::{PENS, choice, length, number, numbers, positive, trim, whole};

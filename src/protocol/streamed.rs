@@ -339,7 +339,8 @@ mod tests {
     fn what_is_no_target_is_refused() {
         // An odd number of coordinates, an unknown digit, pen or line type, two commas, a number
         // that is too long, a point below the page and one beyond it, and a mark at the end.
-        for text in ["0", "0=", "/W00", ":300", ",,00", "zzzzz000", "10", "zzzz1zzzz1zzzz1", "00,", "00/1"]
+        for text in
+            ["0", "0=", "/W00", ":300", ",,00", "zzzzz000", "10", "zzzz1zzzz1zzzz1", "00,", "00/1"]
         {
             let read: Result<Vec<_>, _> = StreamedTargets::new(text).collect();
             assert_eq!(read, Err(CommandError::NotStrokes), "{text}");
