@@ -12,6 +12,7 @@ pub use page::PageArgs;
 pub use view::ViewArgs;
 
 use crate::board;
+use crate::compute::Compute;
 use crate::error::{EXIT_CODES, ExitCode};
 use crate::files::STANDARD_INPUT;
 use crate::fit::{FitError, TOLERANCES};
@@ -243,6 +244,25 @@ pub struct PlotArgs {
         help_heading = "Plotter"
     )]
     pub port: Option<String>,
+    /// Where the drawing is computed
+    #[arg(
+        long,
+        value_enum,
+        value_name = "WHERE",
+        default_value = "auto",
+        help_heading = "Plotter"
+    )]
+    pub compute: Compute,
+    /// Leave out so many strokes, which were drawn before; this computer computes the drawing then
+    #[arg(
+        long,
+        value_name = "STROKES",
+        default_value = "0",
+        hide_default_value = true,
+        allow_hyphen_values = true,
+        help_heading = "Plotter"
+    )]
+    pub from: u32,
     /// The camera, the page and the order of the strokes.
     #[command(flatten)]
     pub view: ViewArgs,

@@ -102,6 +102,12 @@ pub enum Error {
         /// How many the plotter takes.
         limit: usize,
     },
+    /// The drawing cannot be computed by this computer and sent while it is drawn.
+    #[error("cannot compute it here: {reason}")]
+    NotStreamed {
+        /// The reason, and what to do.
+        reason: String,
+    },
     /// The motion of a machine that is not Cartesian is not plotted.
     #[error("the motion is plotted for machines with setting 230=0 only: leave out --motion")]
     MotionOfOtherMachine,
@@ -360,6 +366,7 @@ impl Error {
             | Self::SettingsFile { .. }
             | Self::NotDrawn { .. }
             | Self::TooLarge { .. }
+            | Self::NotStreamed { .. }
             | Self::NoSuchMachine(_)
             | Self::MotionOfOtherMachine
             | Self::Board { .. }

@@ -17,6 +17,7 @@
 
 pub mod board;
 pub mod cli;
+pub mod compute;
 pub mod emulator;
 pub mod error;
 pub mod fake;

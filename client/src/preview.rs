@@ -12,15 +12,16 @@ use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
 use penup::machine::{EventRing, PulserState, Setting, Settings};
 use penup::motion::TICKS_PER_SECOND;
-use penup::plotter::{Observer, Plotter};
+use penup::plotter::{Observer, Plotter, Unobserved};
 use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
 use penup::view::View;
 use penup::visibility::{EdgeParameter, Stretch};
 use penup_job::path::{PagePoint, PenRuns, Run};
-use penup_job::protocol::PLOT;
-use penup_job::results::{JobResult, Lengths, Timings};
+use penup_job::protocol::{MODEL, PLOT};
+use penup_job::results::{JobReport, JobResult, Lengths, Timings};
 use penup_job::room::Room;
+use penup_job::streamed::{Form, StreamError, StreamedJob};
 use penup_job::strokes::strokes_of;
 use penup_job::watch::PenWatch;
 use penup_readers::lines::Lines;
@@ -29,6 +30,21 @@ use std::time::{Duration, Instant};
 
 /// The number of ticks in a second.
 const SECOND: f64 = TICKS_PER_SECOND as f64;
+
+/// The size of a model.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct ModelSize {
+    /// The number of vertices.
+    pub vertices: usize,
+    /// The number of corners of faces, ends of bars and the like, as a board counts them.
+    pub corners: usize,
+    /// The number of faces.
+    pub faces: usize,
+    /// The number of bars.
+    pub bars: usize,
+    /// The number of curves.
+    pub curves: usize,
+}
 
 /// A plotter in this process, with numbers of 32 bits, or of 16 as on a board.
 pub struct InMemory<I: Index = u32> {
@@ -110,10 +126,56 @@ impl<I: Index> InMemory<I> {
         })
     }
 
-    /// The number of vertices of the model that was sent, and the number of its corners on a board.
-    pub fn model_size(&self) -> (usize, usize) {
+    /// The size of the model that was sent.
+    pub fn model_size(&self) -> ModelSize {
         let model = self.plotter.model();
-        (model.vertices().len(), model.corner_count_of::<u16>())
+        ModelSize {
+            vertices: model.vertices().len(),
+            corners: model.corner_count_of::<u16>(),
+            faces: model.face_count(),
+            bars: model.bar_count(),
+            curves: model.curve_count(),
+        }
+    }
+
+    /// Computes the drawing of the model that was sent, as lines that a plotter draws while they
+    /// come, without its first `from` strokes, and the report on all of it.
+    ///
+    /// # Errors
+    /// The drawing is refused, does not fit the machine, or has no such form.
+    pub fn streamed(
+        &mut self,
+        form: Form,
+        from: u32,
+    ) -> Result<(StreamedJob, Option<JobReport>), Error> {
+        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Unobserved);
+        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        let settings = *self.plotter.machine().settings();
+        let mut strokes = self.plotter.strokes();
+        if from > 0 && !strokes.begin_at(from) {
+            let reason = format!("it has no more than {from} strokes: nothing is left to draw");
+            return Err(Error::NotStreamed { reason });
+        }
+        let job = StreamedJob::new(&settings, &mut strokes, form).map_err(|error| match error {
+            StreamError::Machine(error) => {
+                Error::NotDrawn { refusal: CommandError::Machine(error) }
+            }
+            StreamError::LineType => Error::NotStreamed {
+                reason: "this plotter takes G-code, which has no dotted or dashed lines: choose \
+                         others by --hidden"
+                    .to_owned(),
+            },
+            StreamError::TooLong => {
+                Error::NotStreamed { reason: "it has more lines than can be numbered".to_owned() }
+            }
+        })?;
+        self.board.take_sent();
+        self.board.receive(format!("{MODEL}\n").as_bytes());
+        self.answer();
+        let sent = String::from_utf8_lossy(&self.board.take_sent()).into_owned();
+        let strokes = job.size().strokes.into();
+        let report = sent.lines().find_map(|line| JobReport::parse(strokes, line.trim()));
+        Ok((job, report))
     }
 
     /// Computes the drawing and measures its moves, as the plotter does before the first move.

@@ -5,6 +5,7 @@ use crate::cli::{
     Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, SettingsCommand, TapeCommand,
     TapeEncodeArgs, TapeShowArgs, ViewArgs,
 };
+use crate::compute::{self, Capacity, Compute, Known};
 use crate::error::Error;
 use crate::files;
 use crate::fit::fit_obj;
@@ -25,11 +26,13 @@ use crate::sender::{Patience, Sender};
 use crate::tape;
 use crate::workspace;
 use penup::index::Index;
-use penup::machine::Setting;
+use penup::machine::{self, Setting};
 use penup::step::tape::BadCode;
 use penup_job::picture::Picture;
+use penup_job::protocol::Status;
 use penup_job::results::JobReport;
 use penup_job::room::Room;
+use penup_job::streamed::{Form, StreamedJob};
 use penup_job::{Job, Settings};
 use penup_readers::lines::Lines;
 use penup_readers::{Arrangement, ReadError, SourceFile};
@@ -92,7 +95,7 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
         output::check(&file, &outputs.files())?;
     }
     let source = read(&file, &args.view, quiet)?;
-    let (job, settings) = (&source.job, &source.settings);
+    let settings = &source.settings;
     let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
         let mut link = ports::open(device)?;
@@ -100,11 +103,18 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
         if link.obey_keys() && !quiet {
             note_keys();
         }
-        let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
-        let drawn =
-            operate::rehearse(&mut sender, job).and_then(|()| draw_by(&mut sender, job, &mut bar));
-        sender.end();
-        let report = drawn?;
+        let plot = Plot { args, source: &source, file: &file, quiet };
+        let rejoined = plot.rejoin(&mut link, interrupt, &mut bar)?;
+        let report = match rejoined {
+            Some(report) => report,
+            None => {
+                let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+                let drawn = operate::limits(&mut sender)
+                    .and_then(|known| plot.draw(&mut sender, &known, &mut bar));
+                sender.end();
+                drawn?
+            }
+        };
         drop(bar);
         let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
         let json = json!({ "file": file.display().to_string(), "drawn": report });
@@ -117,7 +127,19 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    let drawn = draw(board.as_mut(), job, interrupt, &mut bar);
+    let memory = args.board.memory;
+    let known = Known {
+        capacity: Capacity { vertices: memory.vertices, corners: memory.corners },
+        board: Some(args.board),
+        settings: Some(machine::Settings::default()),
+    };
+    let plot = Plot { args, source: &source, file: &file, quiet };
+    let drawn =
+        Sender::open(board.as_mut(), Patience::default(), interrupt).and_then(|mut sender| {
+            let drawn = plot.draw(&mut sender, &known, &mut bar);
+            sender.end();
+            drawn
+        });
     let report = drawn.map_err(|error| board.explain(error))?;
     let pen = board.pen_runs()?;
     drop(board);
@@ -188,6 +210,130 @@ fn show<I: Index>(
     let time = duration(result.duration_s.round() as u64);
     outcome.text += &format!(", {time} to draw");
     Ok(outcome)
+}
+
+/// A drawing that is to be plotted.
+struct Plot<'p> {
+    args: &'p PlotArgs,
+    source: &'p Source,
+    file: &'p Path,
+    quiet: bool,
+}
+
+impl Plot<'_> {
+    fn note(&self, notes: &[String]) {
+        if !self.quiet {
+            note(self.file, notes);
+        }
+    }
+
+    /// Draws it by a plotter that is idle and of which so much is `known`.
+    fn draw(
+        &self,
+        sender: &mut Sender<'_>,
+        known: &Known,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<JobReport>, Error> {
+        let job = &self.source.job;
+        let compute = if self.args.from > 0 { Compute::Host } else { self.args.compute };
+        let choice = compute::choose(known, job, compute)?;
+        let notes = [choice.totals].into_iter().filter(|totals| !totals.is_empty());
+        self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
+        if !choice.by_host {
+            return draw_by(sender, job, progress);
+        }
+        let Some(settings) = known.settings else {
+            return Err(Error::NotStreamed {
+                reason: "this program does not know all settings of the plotter's firmware"
+                    .to_owned(),
+            });
+        };
+        let form = sender.form()?;
+        let shows_pen = settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser);
+        if form == Form::GCode && !shows_pen {
+            let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
+            return Err(Error::NotStreamed { reason: reason.to_owned() });
+        }
+        let (streamed, report) = compute::compute(settings, job, form, self.args.from)?;
+        let (strokes, points) = (streamed.size().strokes, streamed.targets());
+        self.note(&[format!(
+            "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
+            streamed.bytes() as f64 / f64::from(points.max(1))
+        )]);
+        self.send(sender, &streamed, progress)?;
+        Ok(report)
+    }
+
+    /// Sends strokes while they are drawn.
+    fn send(
+        &self,
+        sender: &mut Sender<'_>,
+        streamed: &StreamedJob,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        let mut followed = Followed { progress, begun: 0 };
+        let sent = sender.draw_streamed(streamed, &mut followed);
+        let begun = followed.begun;
+        if sent.is_err() && begun > 0 {
+            // The last stroke that was begun may not be whole.
+            let left_out = u64::from(self.args.from) + begun - 1;
+            self.note(&[format!(
+                "to go on at the stroke that was begun last, add --from {left_out}"
+            )]);
+        }
+        sent
+    }
+
+    /// If the plotter waits for more strokes of this drawing, sends them. `None` if it does
+    /// something else.
+    fn rejoin(
+        &self,
+        link: &mut dyn Link,
+        interrupt: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<Option<JobReport>>, Error> {
+        let Some((mut sender, taken)) = Sender::rejoin(link, Patience::default(), interrupt)?
+        else {
+            return Ok(None);
+        };
+        let busy = || Error::NotReady { state: "Run".to_owned() };
+        let settings = simulated(&operate::read_settings(&mut sender)?).map_err(|_| busy())?;
+        let (mut streamed, report) =
+            compute::compute(settings, &self.source.job, Form::Strokes, self.args.from)?;
+        if streamed.id() != taken.id || !streamed.skip(taken.targets) {
+            return Err(busy());
+        }
+        let left = streamed.targets() - taken.targets;
+        self.note(&[format!("the plotter draws this already: the last {left} points are sent")]);
+        let sent = self.send(&mut sender, &streamed, progress);
+        sender.end();
+        sent.map(|()| Some(report))
+    }
+}
+
+/// Notes how many strokes were begun while it passes reports on.
+struct Followed<'p> {
+    progress: &'p mut dyn Progress,
+    begun: u64,
+}
+
+impl Progress for Followed<'_> {
+    fn lines_sent(&mut self, done: usize, all: usize) {
+        self.progress.lines_sent(done, all);
+    }
+
+    fn drawn(&mut self, status: &Status) {
+        self.begun = status.strokes.map_or(self.begun, |(done, _)| done);
+        self.progress.drawn(status);
+    }
+
+    fn state(&mut self, state: &str) {
+        self.progress.state(state);
+    }
+
+    fn note(&mut self, note: &str) {
+        self.progress.note(note);
+    }
 }
 
 /// Says which keys act from now on.

@@ -17,8 +17,10 @@ mod delivery;
 mod drawing;
 mod orders;
 mod patience;
+mod streaming;
 
 pub use patience::Patience;
+pub use streaming::Taken;
 
 use crate::error::Error;
 use crate::link::{Link, Order};

@@ -19,6 +19,8 @@ pub const AGAIN: &str = "$again";
 pub const GO_ON: &str = "$resume";
 /// Does the same as [`GO_ON`], where the user has put the pen at the origin by hand.
 pub const GO_ON_AT_ORIGIN: &str = "$resume=origin";
+/// Queries how much of a drawing has come that a computer sends while it is drawn.
+pub const STREAM: &str = "$stream";
 /// Queries version, board and limits.
 pub const BUILD: &str = "$I";
 /// Lists the settings of the machine.
@@ -127,6 +129,9 @@ pub struct Status {
     pub stopped: Option<(u64, u64)>,
     /// The lengths of `Ink:done/all`, drawn and to draw, in whole mm.
     pub ink: Option<(u64, u64)>,
+    /// The numbers of `Stream:taken/all,room`, if strokes are drawn while they are sent: the targets
+    /// that have come, all of them, and for how many more there is room.
+    pub stream: Option<[u32; 3]>,
     /// The seconds of `Left:seconds` until the end of the job.
     pub seconds_left: Option<u64>,
     /// The stage that the plotter computes: view, visibility or order.
@@ -235,6 +240,11 @@ fn parse_status(report: &str) -> Option<Status> {
         let (done, all): (&str, &str) = field(name)?.split_once('/')?;
         Some((done.parse().ok()?, all.parse().ok()?))
     };
+    let stream = || -> Option<[u32; 3]> {
+        let (counts, room) = field("Stream:")?.split_once(',')?;
+        let (taken, all) = counts.split_once('/')?;
+        Some([taken.parse().ok()?, all.parse().ok()?, room.parse().ok()?])
+    };
     let percent = field("Ov:").and_then(|percents| percents.split(',').next()?.parse().ok());
     let is_standing = full_state == "Hold:0";
     let pen_wanted = field("Pen:").filter(|_| is_standing);
@@ -244,6 +254,7 @@ fn parse_status(report: &str) -> Option<Status> {
         is_standing,
         strokes: done_of_all("Strokes:"),
         stopped: done_of_all("Stopped:"),
+        stream: stream(),
         ink: done_of_all("Ink:"),
         seconds_left: field("Left:").and_then(|seconds| seconds.parse().ok()),
         stage: stage.map(str::to_owned),

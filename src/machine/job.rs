@@ -56,6 +56,75 @@ impl Machine<'_> {
         self.measure(path)
     }
 
+    /// Begins a job whose targets will come while it is drawn. It has this size, and all targets
+    /// lie between these least and greatest coordinates, in steps of the page.
+    ///
+    /// # Errors
+    /// See [`MachineError`]. On an error nothing moves.
+    #[cfg(feature = "stream")]
+    pub fn start_streamed(
+        &mut self,
+        size: JobSize,
+        [least, greatest]: [PagePoint; 2],
+    ) -> Result<(), MachineError> {
+        let Activity::Idle = self.activity else { return Err(self.refusal()) };
+        self.check_travel(0, least)?;
+        self.check_travel(0, greatest)?;
+        // No move is longer than the diagonal of where the pen is and where it will go.
+        let at = self.runner.page_end();
+        let (dx, dy) =
+            (greatest.x.max(at.x) - least.x.min(at.x), greatest.y.max(at.y) - least.y.min(at.y));
+        let length = self.runner.limits().length(dx, dy);
+        length.ok_or(MachineError::MoveTooLong { target: 0 })?;
+        self.begin_job(size, Source::Path);
+        Ok(())
+    }
+
+    /// Whether the machine, which has drawn all targets that have come, has to wait for others. It
+    /// stands with the pen raised then.
+    #[cfg(feature = "stream")]
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn stands_for_late_path(&mut self, path: &dyn Path, progress: RunnerProgress) -> bool {
+        let (Activity::Run(Source::Path) | Activity::Hold { source: Source::Path, .. }, Some(late)) =
+            (self.activity, path.late())
+        else {
+            return false;
+        };
+        // After a hold the machine stands for that.
+        if progress != RunnerProgress::Done {
+            return false;
+        }
+        self.activity.set_source(Source::Late(late));
+        true
+    }
+
+    /// Whether the machine still waits for a path that is late.
+    #[cfg(feature = "stream")]
+    fn waits_for_path(&mut self, path: &mut dyn Path) -> bool {
+        let Activity::Run(Source::Late(late)) = self.activity else { return false };
+        self.waits_for_late(path, late)
+    }
+
+    /// Goes on if the next targets have come. Returns whether they have not.
+    #[cfg(feature = "stream")]
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn waits_for_late(&mut self, path: &mut dyn Path, late: super::Late) -> bool {
+        if path.late().is_some() {
+            return true;
+        }
+        let mut draws = false;
+        path.look_ahead(&mut |next| {
+            draws = next.ink.is_some();
+            false
+        });
+        if late.within_stroke && draws {
+            // The motion planner will count the rest of the stroke as another one.
+            self.progress.go_on_with_stroke();
+        }
+        self.activity.set_source(Source::Path);
+        false
+    }
+
     /// Begins a job of this size, whose moves come from `source`.
     pub(super) fn begin_job(&mut self, size: JobSize, source: Source) {
         self.end_log();
@@ -82,6 +151,10 @@ impl Machine<'_> {
         {
             self.alarm(Alarm::Queue);
         }
+        #[cfg(feature = "stream")]
+        if self.waits_for_path(path) {
+            return;
+        }
         while self.activity.is_moving() {
             self.read_targets(path);
             if self.waits_for_log() {
@@ -94,6 +167,10 @@ impl Machine<'_> {
             match self.runner.produce(queue) {
                 Ok(RunnerProgress::More) => {}
                 Ok(progress) => {
+                    #[cfg(feature = "stream")]
+                    if self.stands_for_late_path(path, progress) {
+                        return;
+                    }
                     self.after_stop(progress);
                     self.pause_at_switch(queue);
                 }
@@ -200,6 +277,8 @@ impl Machine<'_> {
                         self.abort();
                     }
                 }
+                #[cfg(feature = "stream")]
+                None if path.late().is_some() => return,
                 None => {
                     self.activity.set_source(Source::PathEnd);
                     self.runner.end_path();

@@ -31,6 +31,8 @@ mod travel;
 
 pub use homing::{Axis, Contacts, Switches};
 pub use kinematics::{Anchors, CutPositions, Kinematics, SegmentEnd};
+#[cfg(feature = "stream")]
+pub use path::Late;
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue, Tick};
 pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};

@@ -13,6 +13,14 @@ pub struct Target {
     pub ink: Option<LineType>,
 }
 
+/// A path whose next target has not come yet.
+#[cfg(feature = "stream")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Late {
+    /// Whether the pen was down before.
+    pub within_stroke: bool,
+}
+
 /// An ordered drawing. The machine reads it twice: once to measure it and once to draw it.
 pub trait Path {
     /// Returns the next target, or `None` at the end.
@@ -23,6 +31,12 @@ pub trait Path {
     /// is. A path that is not known ahead shows none.
     fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {
         let _ = visit;
+    }
+    /// Whether the next target has not come yet, so that the machine waits for it with the pen
+    /// raised. It is asked when there is no next target.
+    #[cfg(feature = "stream")]
+    fn late(&self) -> Option<Late> {
+        None
     }
     /// The number of the pen, from 0, for the target that was returned last. Where the number
     /// changes, the machine stops and waits for [`Machine::resume`](super::Machine::resume).

@@ -34,6 +34,12 @@ impl Progress {
         Self { size: whole, begun_at, is_inked: false }
     }
 
+    /// The pen was raised within a stroke and goes on with it, which counts as no other stroke.
+    #[cfg(feature = "stream")]
+    pub(super) const fn go_on_with_stroke(&mut self) {
+        self.begun_at.strokes = self.begun_at.strokes.wrapping_add(1);
+    }
+
     /// Adds a move that was sent alone and is `length` long, in 2^-18 mm.
     pub(super) fn add_move(&mut self, target: Target, length: u64) {
         if target.ink.is_some() {

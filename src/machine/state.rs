@@ -116,6 +116,9 @@ pub(super) enum Source {
         /// The first target to which the new pen draws.
         first: Target,
     },
+    /// From a path whose next targets have not come yet. The machine stands with the pen raised.
+    #[cfg(feature = "stream")]
+    Late(super::Late),
     /// The moves come from a path that was read to its end.
     PathEnd,
     /// The moves are sent one by one.

@@ -28,6 +28,8 @@ mod resume;
 #[cfg(feature = "convex")]
 mod solid;
 mod stream;
+#[cfg(feature = "stream")]
+mod streamed;
 mod title;
 
 pub use board::{Board, NotStored, REPLY_BYTES, Record, Replies, Stored};
@@ -51,6 +53,9 @@ use crate::protocol::{
     next_number,
 };
 use crate::stage::Cancel;
+#[cfg(any(test, feature = "host"))]
+pub use program::to_steps;
+
 use plot::Drawing as DrawnJob;
 use program::{Parameters, Program};
 use reply::Reply;
@@ -154,6 +159,9 @@ struct Inner<'m, I> {
     copy_words: usize,
     /// Whether the model is copied before each change.
     can_undo: bool,
+    /// How far the strokes of a job have come that are sent while they are drawn.
+    #[cfg(feature = "stream")]
+    streamed: streamed::Streamed,
     /// The modes that lines of G-code have set.
     program: Program,
     /// What stays when a program ends.
@@ -208,6 +216,8 @@ impl<'m, I: Index> Plotter<'m, I> {
                 job: Job::default(),
                 cursor: Cursor::default(),
                 copy_words: 0,
+                #[cfg(feature = "stream")]
+                streamed: streamed::Streamed::default(),
                 can_undo: true,
                 program: Program::default(),
                 parameters: Parameters::default(),
@@ -446,6 +456,10 @@ impl<I: Index> Inner<'_, I> {
         let before = self.machine.planned_position();
         let ends = self.machine.stroke_ends();
         let mut strokes = self.job.strokes(self.words, &mut self.cursor, ends);
+        #[cfg(feature = "stream")]
+        {
+            strokes.streamed = Some(&self.streamed);
+        }
         self.machine.fill(&mut strokes, board.queue());
         self.machine.planned_position() != before
     }
@@ -509,7 +523,11 @@ impl<I: Index> Inner<'_, I> {
                 self.report_build(board);
             }
             Command::Settings => {
-                if !matches!(self.machine.state(), State::Check | State::Jog) {
+                #[cfg(feature = "stream")]
+                let may_run = self.is_streamed();
+                #[cfg(not(feature = "stream"))]
+                let may_run = false;
+                if !may_run && !matches!(self.machine.state(), State::Check | State::Jog) {
                     self.check_idle()?;
                 }
                 self.task = Some(Task::List(Listing::Settings, 0));
@@ -560,6 +578,12 @@ impl<I: Index> Inner<'_, I> {
             // The receive interrupt does not know it in this form.
             #[cfg(feature = "hpgl")]
             Command::HpGl => return Err(CommandError::UnknownSystemCommand),
+            #[cfg(feature = "stream")]
+            Command::BeginStream(header) => self.begin_streamed(header)?,
+            #[cfg(feature = "stream")]
+            Command::Strokes(strokes) => self.take_strokes(strokes)?,
+            #[cfg(feature = "stream")]
+            Command::Stream => self.report_streamed(board)?,
             Command::Unlock => self.unlock(board)?,
             Command::Home => self.home()?,
             Command::Check => {

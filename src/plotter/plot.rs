@@ -43,6 +43,10 @@ impl<I: Index> Inner<'_, I> {
                 _ => CommandError::Busy,
             });
         }
+        #[cfg(feature = "stream")]
+        {
+            self.streamed = Default::default();
+        }
         let [x, y] = self.machine.position_mm();
         let (position, inches) = ([x, y, self.program.z()], self.in_inches());
         let requests = RealTime::default();

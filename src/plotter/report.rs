@@ -154,6 +154,8 @@ impl<I: Index> Inner<'_, I> {
         }
         let (blocks, bytes) = (self.machine.free_moves(), board.receive_room());
         let stopped = self.resumption.stopped(status.state);
+        #[cfg(feature = "stream")]
+        let streamed = self.streamed_targets();
         let mut reply = Reply(board);
         reply.part(format_args!("<{state}|{name}:"));
         reply.coordinates(position, inches);
@@ -210,6 +212,10 @@ impl<I: Index> Inner<'_, I> {
         }
         if let Some([done, all]) = stopped {
             reply.part(format_args!("|Stopped:{done}/{all}"));
+        }
+        #[cfg(feature = "stream")]
+        if let Some([taken, all, room]) = streamed {
+            reply.part(format_args!("|Stream:{taken}/{all},{room}"));
         }
         let (done, all) = (status.done, status.job);
         reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));

@@ -363,6 +363,10 @@ impl<I: Index> Inner<'_, I> {
     /// Whether the next line must wait, because a line is being carried out or there is no room for
     /// a move.
     pub(super) fn must_wait(&self) -> bool {
+        #[cfg(feature = "stream")]
+        if self.waits_for_targets() {
+            return true;
+        }
         self.task.is_some() || (self.machine.is_streaming() && !self.machine.has_room())
     }
 }

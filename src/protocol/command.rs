@@ -99,6 +99,15 @@ pub enum Command<'a> {
         /// Whether the user has put the pen at the origin by hand: `$resume=origin`.
         at_origin: bool,
     },
+    /// `$stream=…`: begins a job whose strokes will be sent.
+    #[cfg(feature = "stream")]
+    BeginStream(&'a str),
+    /// `$s=…`: strokes of such a job.
+    #[cfg(feature = "stream")]
+    Strokes(&'a str),
+    /// `$stream`: reports how much of such a job has come.
+    #[cfg(feature = "stream")]
+    Stream,
     /// `$X`: unlocks the plotter after an alarm, or wakes it.
     Unlock,
     /// `$H`: looks for the limit switches.
@@ -155,6 +164,8 @@ pub const HELP: [&[(&str, &str)]; 2] = [
         ("$again", "draw the last job again, also after a loss of power"),
         ("$resume", "go on with the job that a loss of power or a reset stopped, after $H"),
         ("$resume=origin", "the same where you have put the pen at the origin by hand"),
+        #[cfg(feature = "stream")]
+        ("$stream=…", "draw strokes that a computer sends by $s=…; $stream tells how many came"),
         ("$X", "unlock after an alarm"),
         ("$H", "find the limit switches"),
         ("$J=G91 X.. Y.. F..", "move by hand with the pen up, F is needed; byte 0x85 ends it"),
@@ -193,6 +204,10 @@ impl<'a> Command<'a> {
     /// ```
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn parse(line: &'a str) -> Result<Self, CommandError> {
+        #[cfg(feature = "stream")]
+        if let Some(strokes) = line.strip_prefix(super::STROKES_KEYWORD) {
+            return Ok(Self::Strokes(strokes));
+        }
         if let Some(value) = title(line) {
             return Ok(Self::Assign { name: "title", value });
         }
@@ -251,6 +266,10 @@ impl<'a> Command<'a> {
                     _ => Err(CommandError::NotAChoice { choices: &["origin"] }),
                 };
             }
+            #[cfg(feature = "stream")]
+            if name == "stream" {
+                return Ok(Self::BeginStream(value));
+            }
             if let Some(command) = parse_edit(name, value)? {
                 return Ok(command);
             }
@@ -268,6 +287,8 @@ impl<'a> Command<'a> {
             "plot" => Ok(Self::Plot),
             "again" => Ok(Self::Again),
             "resume" => Ok(Self::Resume { at_origin: false }),
+            #[cfg(feature = "stream")]
+            "stream" => Ok(Self::Stream),
             #[cfg(feature = "hpgl")]
             "hpgl" => Ok(Self::HpGl),
             #[cfg(not(feature = "hpgl"))]

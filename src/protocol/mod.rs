@@ -17,6 +17,8 @@ mod line;
 mod numbering;
 mod realtime;
 mod receiver;
+#[cfg(feature = "stream")]
+mod streamed;
 mod command_error;
 mod values;
 
@@ -35,5 +37,9 @@ pub use line::{LINE_LIMIT, LineReader};
 pub use numbering::{Checksum, Label, Named, Numbering, Received};
 pub use realtime::{RealTime, Sorter};
 pub use receiver::{DAMAGED, Receiver};
+#[cfg(all(feature = "stream", any(test, feature = "host")))]
+pub use streamed::StrokeWriter;
+#[cfg(feature = "stream")]
+pub use streamed::{MOST_TARGETS, STROKES_KEYWORD, StreamHeader, StreamedTarget, StreamedTargets};
 pub use values::{Decimals, Numbers};
 pub(crate) use values::{PENS, choice, length, number, numbers, positive, trim, whole};

@@ -9,7 +9,8 @@ mod status;
 
 pub use console::console;
 pub use orders::{abort, again, home, jog, pause, pen, resume, unlock, watch};
-pub use rehearsal::rehearse;
+pub use rehearsal::limits;
+pub(crate) use settings::read as read_settings;
 pub use settings::{restore, save, set, show};
 pub use settings_file::{SavedSettings, SettingsFileError};
 pub use status::{ports, status};

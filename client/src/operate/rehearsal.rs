@@ -1,45 +1,30 @@
-//! Rehearses a job before its first line is sent: the library on this computer draws it as the
-//! plotter would, with the plotter's settings, and what the plotter would refuse at the end of a
-//! long transfer is refused at once.
+//! Asks a plotter for all that decides whether a drawing fits, before its first line is sent.
 
-use super::settings::{agreed, read};
+use super::settings::{agreed, firmware, read};
+use crate::compute::{Capacity, Known};
 use crate::error::Error;
 use crate::machine_settings::simulated;
-use crate::preview::InMemory;
 use crate::sender::Sender;
+use crate::table::BoardRow;
 use penup_job::protocol::{MODEL, Reply};
-use penup_job::room::Room;
-use penup_readers::lines::Lines;
 
-/// How much a plotter holds, and how much a model takes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Capacity {
-    vertices: usize,
-    corners: usize,
-}
-
-/// Checks that the plotter at the other end can hold the job and draw it. The machine must be idle.
+/// What decides whether a drawing fits the plotter at the other end. The machine must be idle.
 ///
 /// # Errors
-/// The model is too large for the plotter, or the drawing does not fit the machine.
-pub fn rehearse(sender: &mut Sender<'_>, job: &dyn Lines) -> Result<(), Error> {
+/// As [`Sender::stream`].
+pub fn limits(sender: &mut Sender<'_>) -> Result<Known, Error> {
     let capacity = agreed(sender, |sender| Ok(capacity_in(&sender.ask(MODEL)?)))?;
-    // Settings of a newer firmware are not known here. Then the plotter itself decides.
-    let Ok(machine) = simulated(&read(sender)?) else { return Ok(()) };
-    let mut plotter = InMemory::<u32>::new(Room::for_job(job), machine);
-    if !plotter.take(job) {
-        // The plotter names the line that it refuses.
-        return Ok(());
-    }
-    let (vertices, corners) = plotter.model_size();
-    for (what, count, limit) in
-        [("vertices", vertices, capacity.vertices), ("corners", corners, capacity.corners)]
-    {
-        if count > limit {
-            return Err(Error::TooLarge { what, count, limit });
-        }
-    }
-    plotter.rehearse()
+    let settings = simulated(&read(sender)?).ok();
+    let version = firmware(sender)?;
+    // The text after the colon is the user's own.
+    let version = version.split(':').next().unwrap_or_default();
+    let board = version.rsplit(' ').next().and_then(BoardRow::named);
+    // A board of the name that was built with other limits is another board.
+    let is_same = |board: &&BoardRow| {
+        let memory = board.memory;
+        capacity == Capacity { vertices: memory.vertices, corners: memory.corners }
+    };
+    Ok(Known { capacity, board: board.filter(is_same), settings })
 }
 
 /// The limits in the answer to `$model`: `[MODEL:vertices 0 of 4000]` and

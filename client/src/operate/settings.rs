@@ -143,7 +143,7 @@ fn is_same(a: &str, b: &str) -> bool {
 }
 
 /// Reads all settings.
-pub(super) fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Error> {
+pub(crate) fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Error> {
     agreed(sender, |sender| {
         let replies = sender.ask(SETTINGS)?;
         let settings: Vec<_> = replies.iter().filter_map(setting_in).collect();
@@ -159,7 +159,7 @@ fn setting_in(reply: &Reply) -> Option<AssignedSetting> {
 }
 
 /// The version of the firmware and the board that it runs on.
-fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
+pub(super) fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
     agreed(sender, |sender| {
         let version = |reply: &Reply| match reply {
             Reply::Other(line) => Some(line.strip_prefix("[VER:")?.strip_suffix(']')?.to_owned()),

@@ -1,6 +1,7 @@
 //! Delivers lines: sends them with numbers and checksums until the plotter has accepted each.
 
 use super::Sender;
+use super::streaming::Streaming;
 use crate::error::Error;
 use crate::progress::Progress;
 use penup_job::protocol::{LAST_NUMBER, RECEIVE_WINDOW, RESUME, Reply, Status, numbered};
@@ -29,8 +30,11 @@ struct Delivery<'l> {
     last_progress: Instant,
     resends: u32,
     /// Whether the plotter computes a picture or homes, according to its last status report. It
-    /// then reads no lines, so it is asked for none.
+    /// then reads no lines, so it is asked for none. Nor is it while the pen must move on before
+    /// there is room for another line.
     reads_no_lines: bool,
+    /// Whether the lines are drawn while they are sent, and how.
+    streaming: Option<Streaming<'l>>,
 }
 
 impl Delivery<'_> {
@@ -69,6 +73,18 @@ impl Sender<'_> {
         progress: &mut dyn Progress,
         watch: &mut dyn FnMut(&Reply),
     ) -> Result<(), Error> {
+        self.deliver_as(lines, None, progress, watch)
+    }
+
+    /// Sends `lines` as [`Sender::deliver_watching`] does; if they are drawn meanwhile, lets the
+    /// machine go on after pauses.
+    pub(super) fn deliver_as(
+        &mut self,
+        lines: &dyn Lines,
+        streaming: Option<Streaming<'_>>,
+        progress: &mut dyn Progress,
+        watch: &mut dyn FnMut(&Reply),
+    ) -> Result<(), Error> {
         let now = self.link.now();
         self.last_heard = now;
         let mut delivery = Delivery {
@@ -81,6 +97,7 @@ impl Sender<'_> {
             last_progress: now,
             resends: 0,
             reads_no_lines: false,
+            streaming,
         };
         // The number of lines cannot overflow in practice: no plotter can hold the model of so many
         // lines.
@@ -88,6 +105,9 @@ impl Sender<'_> {
         while self.done < end {
             self.fill_queue(&mut delivery)?;
             self.stop_if_interrupted()?;
+            if let Some(streaming) = &mut delivery.streaming {
+                self.obey(&mut streaming.followed)?;
+            }
             let reply = self.listen()?;
             if let Some(reply) = &reply {
                 watch(reply);
@@ -172,7 +192,9 @@ impl Sender<'_> {
             delivery.last_event = delivery.last_progress;
             delivery.resends = 0;
             self.messages.clear();
-            progress.lines_sent((number - delivery.base) as usize, delivery.lines.count());
+            if delivery.streaming.is_none() {
+                progress.lines_sent((number - delivery.base) as usize, delivery.lines.count());
+            }
         }
     }
 
@@ -196,12 +218,22 @@ impl Sender<'_> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         progress.state(&status.state);
-        delivery.reads_no_lines = status.is_computing || status.state == "Home";
+        let waits = |streaming: &Streaming<'_>| streaming.waits(status);
+        delivery.reads_no_lines = status.is_computing
+            || status.state == "Home"
+            || delivery.streaming.as_ref().is_some_and(waits);
         if delivery.reads_no_lines {
             // The plotter reads no line until it has computed the picture or is homed.
             delivery.last_progress = self.link.now();
             delivery.last_event = delivery.last_progress;
             delivery.requested_at = delivery.requested_at.map(|_| delivery.last_progress);
+        }
+        if let Some(streaming) = &mut delivery.streaming {
+            let done = usize::try_from(self.done - delivery.base).unwrap_or(0);
+            let status = streaming.told(status.clone(), done);
+            progress.drawn(&status);
+            self.fail_if_alarm(&status)?;
+            return self.wait_or_resume(&status, &mut streaming.followed);
         }
         // No user asks for a feed hold before anything is drawn, so the machine is resumed.
         let nothing_drawn = status.strokes.is_none_or(|(done, _)| done == 0);

@@ -40,7 +40,7 @@ impl Standstill {
 
 /// What is known of a drawing that is followed.
 #[derive(Debug, Default)]
-struct Followed {
+pub(super) struct Followed {
     standstill: Standstill,
     held_since: Option<Instant>,
     is_holding: bool,
@@ -137,7 +137,7 @@ impl Sender<'_> {
     }
 
     /// Does what the user of this program asked for by keys.
-    fn obey(&mut self, followed: &mut Followed) -> Result<(), Error> {
+    pub(super) fn obey(&mut self, followed: &mut Followed) -> Result<(), Error> {
         while let Some(order) = self.orders.pop_front() {
             let byte = match order {
                 Order::Pause if followed.is_holding => {
@@ -160,7 +160,11 @@ impl Sender<'_> {
     }
 
     /// Lets a machine that stands go on if it waits for a pen that is in, or if the user allows it.
-    fn wait_or_resume(&mut self, status: &Status, followed: &mut Followed) -> Result<(), Error> {
+    pub(super) fn wait_or_resume(
+        &mut self,
+        status: &Status,
+        followed: &mut Followed,
+    ) -> Result<(), Error> {
         followed.is_holding = status.is_holding() && status.pen_wanted.is_none();
         let holds = followed.standstill.holds(status);
         if !status.is_holding() {

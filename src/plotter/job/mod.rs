@@ -169,6 +169,15 @@ impl<I: Index> Job<I> {
         let tour =
             words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, self.legs)).unwrap_or(&[]);
         let drawing = self.stored.drawing(words).unwrap_or(nothing);
-        Strokes { drawing, tour, cursor, ends }
+        Strokes {
+            drawing,
+            tour,
+            cursor,
+            ends,
+            #[cfg(feature = "stream")]
+            streamed: None,
+            #[cfg(feature = "stream")]
+            ring: words,
+        }
     }
 }

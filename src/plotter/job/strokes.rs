@@ -2,20 +2,25 @@
 
 use crate::drawing::{Drawing, LineType, PagePoint, Segment};
 use crate::index::Index;
+#[cfg(feature = "stream")]
+use crate::machine::Late;
 use crate::machine::{Path, StrokeEnds, Target};
 use crate::motion::PathLength;
 use crate::order::Leg;
+#[cfg(feature = "stream")]
+use crate::plotter::streamed::Streamed;
 
 /// Position in the strokes of a job: how far they have been handed to the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cursor<I = u16> {
-    /// Index in the tour of the segment that is being handed over.
-    leg: usize,
+    /// Index in the tour of the segment that is being handed over. Of strokes that are sent while
+    /// they are drawn, the number of targets that were handed over.
+    pub(in crate::plotter) leg: usize,
     /// Number of the point at which the pen is, or `None` before the first move, and behind a
     /// stroke that went on beyond its end.
     at: Option<I>,
     /// The pen of the segment that is being handed over, from 0.
-    pen: u8,
+    pub(in crate::plotter) pen: u8,
     /// Index in the tour of the segment with which the path begins.
     #[cfg(feature = "resume")]
     path_start: usize,
@@ -35,9 +40,15 @@ pub struct Strokes<'a, I = u16> {
     /// The segments in the order in which they are drawn, each with its direction.
     pub(super) tour: &'a [Leg<I>],
     /// How far the strokes have been handed over.
-    pub(super) cursor: &'a mut Cursor<I>,
+    pub(in crate::plotter) cursor: &'a mut Cursor<I>,
     /// By how much the strokes are made longer, if they are.
     pub(super) ends: Option<StrokeEnds>,
+    /// How far the strokes have come, if they are sent while they are drawn.
+    #[cfg(feature = "stream")]
+    pub(in crate::plotter) streamed: Option<&'a Streamed>,
+    /// The working memory, where they lie.
+    #[cfg(feature = "stream")]
+    pub(in crate::plotter) ring: &'a [u64],
 }
 
 impl<'a, I: Index> Strokes<'a, I> {
@@ -131,7 +142,10 @@ impl<I: Index> Path for Strokes<'_, I> {
             return Some(target);
         }
         let index = self.cursor.leg;
+        #[cfg(not(feature = "stream"))]
         let (segment, [from, to]) = self.leg(index)?;
+        #[cfg(feature = "stream")]
+        let Some((segment, [from, to])) = self.leg(index) else { return self.next_streamed() };
         let begins_here = self.cursor.at == Some(from);
         let number = if begins_here { to } else { from };
         let mut point = *self.drawing.points.get(number.get())?;
@@ -159,6 +173,11 @@ impl<I: Index> Path for Strokes<'_, I> {
             path_start: self.cursor.path_start,
             ..Cursor::default()
         };
+    }
+
+    #[cfg(feature = "stream")]
+    fn late(&self) -> Option<Late> {
+        self.lateness()
     }
 
     fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {

@@ -485,7 +485,7 @@ fn inverse_feed(from: [Millimetres; 2], to: [Millimetres; 2], feed: Millimetres)
 
 /// The length in steps from the page's origin, clamped to a value that still lies beyond every
 /// page.
-fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
+pub fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
     let exact = i64::from(length.to_bits()) * i64::from(per_mm.to_bits());
     let steps = divide_rounding(exact.into(), 1 << 32);
     steps.clamp((-2 * PAGE_LIMIT).into(), (2 * PAGE_LIMIT).into()) as i32

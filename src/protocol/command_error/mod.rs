@@ -145,6 +145,15 @@ pub enum CommandError {
     },
     /// The model is not that of the job that has stopped.
     OtherModel,
+    /// A line of strokes is not written as one.
+    #[cfg(feature = "stream")]
+    NotStrokes,
+    /// No strokes are expected, or not so many.
+    #[cfg(feature = "stream")]
+    NoStream,
+    /// A stroke leads beyond the bounds that were said before.
+    #[cfg(feature = "stream")]
+    BeyondBounds,
     /// The line's checksum does not match its bytes.
     Damaged,
     /// Another line must come first.
@@ -428,6 +437,24 @@ impl CommandError {
             | Self::OtherVersion
             | Self::OtherSetting { .. }
             | Self::OtherModel => Self::NoJobKept.explain(row),
+            #[cfg(feature = "stream")]
+            Self::NotStrokes => row(
+                error(180, "not a line of strokes"),
+                format_args!("a program writes such a line: docs/protocol.md tells how"),
+            ),
+            #[cfg(feature = "stream")]
+            Self::NoStream => row(
+                error(181, "no strokes are expected").client(
+                    "the plotter draws no strokes of this program: the job was given up, or \
+                     another program has begun one",
+                ),
+                format_args!("$stream=… comes first, and says how many targets follow"),
+            ),
+            #[cfg(feature = "stream")]
+            Self::BeyondBounds => row(
+                error(182, "a stroke leads beyond the bounds of its job"),
+                format_args!("$stream=… has said that all strokes lie elsewhere: begin anew"),
+            ),
             Self::Damaged => row(
                 error(170, "checksum does not match").client(
                     "a line was damaged on its way: check the cable, and keep it away from the \

@@ -1,0 +1,141 @@
+//! Decides whether the plotter computes a drawing or this computer does, and computes it here.
+//!
+//! What fits in the plotter's memory is sent as a model, and the plotter computes the drawing. What
+//! does not fit is computed here by the same library, and its strokes are sent while they are
+//! drawn.
+
+use crate::error::Error;
+use crate::preview::InMemory;
+use crate::table::BoardRow;
+use clap::ValueEnum;
+use penup::machine::Settings;
+use penup::protocol::CommandError;
+use penup_job::results::JobReport;
+use penup_job::room::Room;
+use penup_job::streamed::{Form, StreamedJob};
+use penup_readers::lines::Lines;
+
+/// Where a drawing is computed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum Compute {
+    /// By the plotter if it fits in its memory, else by this computer
+    #[default]
+    Auto,
+    /// By the plotter
+    Board,
+    /// By this computer, which sends the strokes while they are drawn
+    Host,
+}
+
+/// How much a plotter holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Capacity {
+    /// The number of vertices.
+    pub vertices: usize,
+    /// The number of corners of faces and ends of bars.
+    pub corners: usize,
+}
+
+/// What is known of a plotter before a drawing is sent to it.
+#[derive(Debug, Clone)]
+pub struct Known {
+    /// How much it holds.
+    pub capacity: Capacity,
+    /// Its board, if this program knows it.
+    pub board: Option<&'static BoardRow>,
+    /// Its settings. `None` if its firmware has settings that this program does not know.
+    pub settings: Option<Settings>,
+}
+
+/// Where a drawing is computed, and why.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Choice {
+    /// Whether this computer computes it.
+    pub by_host: bool,
+    /// What the file and the drawing have, for the user.
+    pub totals: String,
+    /// A sentence for the user, if this program has chosen.
+    pub reason: Option<String>,
+}
+
+/// Chooses where a drawing is computed, and checks all that can be checked before it is sent.
+///
+/// # Errors
+/// The drawing does not fit the machine, or it does not fit the plotter that is to compute it.
+pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice, Error> {
+    let Capacity { vertices, corners } = known.capacity;
+    // Settings of a newer firmware are not known here. Then the plotter itself decides.
+    let Some(settings) = known.settings else {
+        let by_host = compute == Compute::Host;
+        return Ok(Choice { by_host, totals: String::new(), reason: None });
+    };
+    let mut plotter = InMemory::<u32>::new(Room::for_job(job), settings);
+    if !plotter.take(job) {
+        // The plotter names the line that it refuses.
+        return Ok(Choice { by_host: false, totals: String::new(), reason: None });
+    }
+    let size = plotter.model_size();
+    let totals = format!(
+        "the file has {} vertices, {} faces, {} edges and {} curves; the board holds {vertices} \
+         vertices and {corners} corners",
+        size.vertices, size.faces, size.bars, size.curves,
+    );
+    let choice = |by_host, reason| Ok(Choice { by_host, totals: totals.clone(), reason });
+    if compute == Compute::Host {
+        return choice(true, None);
+    }
+    let is_too_large = [("vertices", size.vertices, vertices), ("corners", size.corners, corners)]
+        .into_iter()
+        .find(|(_, count, limit)| count > limit);
+    if let Some((what, count, limit)) = is_too_large {
+        if compute == Compute::Board {
+            return Err(Error::TooLarge { what, count, limit });
+        }
+        return choice(true, Some(because(&format!("it has {count} {what} of {limit}"))));
+    }
+    let rehearsed = match known.board {
+        // With the memory and the numbers of that board.
+        Some(board) => {
+            let mut plotter = InMemory::<u16>::new(Room::of_board(board), settings);
+            if plotter.take(job) { plotter.rehearse() } else { Ok(()) }
+        }
+        None => plotter.rehearse(),
+    };
+    match rehearsed {
+        Err(Error::NotDrawn { refusal }) if compute == Compute::Auto && is_for_memory(&refusal) => {
+            choice(true, Some(because(&refusal.to_string())))
+        }
+        rehearsed => rehearsed.and_then(|()| choice(false, None)),
+    }
+}
+
+/// Says that this computer computes, and why.
+fn because(reason: &str) -> String {
+    format!(
+        "the drawing is too large for the board's memory ({reason}), so this computer computes it \
+         and sends the strokes while they are drawn"
+    )
+}
+
+/// Whether a plotter with more memory would not refuse the drawing so.
+fn is_for_memory(refusal: &CommandError) -> bool {
+    matches!(refusal, CommandError::DrawingTooLarge(_) | CommandError::TooManyLines)
+}
+
+/// Computes a drawing by this computer, without its first `from` strokes. Returns its lines and the
+/// report on it.
+///
+/// # Errors
+/// The drawing is refused, does not fit the machine, or has no such form.
+pub fn compute(
+    settings: Settings,
+    job: &dyn Lines,
+    form: Form,
+    from: u32,
+) -> Result<(StreamedJob, Option<JobReport>), Error> {
+    let mut plotter = InMemory::<u32>::new(Room::for_job(job), settings);
+    if !plotter.take(job) {
+        return Err(Error::NotStreamed { reason: "the file is refused".to_owned() });
+    }
+    plotter.streamed(form, from)
+}

@@ -1,0 +1,134 @@
+//! Sends a drawing that this computer has computed, while it is drawn.
+
+use super::drawing::Followed;
+use super::{Patience, Sender};
+use crate::error::Error;
+use crate::link::Link;
+use crate::progress::{Progress, Quiet};
+use penup::protocol::{CommandError, MOST_TARGETS};
+use penup_job::protocol::{Reply, STREAM, Status};
+use penup_job::streamed::{Form, StreamedJob};
+use std::sync::atomic::AtomicBool;
+
+/// A drawing whose strokes a plotter has taken in part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Taken {
+    /// The number by which the plotter knows it: [`StreamedJob::id`].
+    pub id: u32,
+    /// How many of its targets have come.
+    pub targets: u32,
+}
+
+/// What is known of a drawing while its lines are sent.
+pub(super) struct Streaming<'j> {
+    /// Its lines.
+    pub job: &'j StreamedJob,
+    /// How far it is followed.
+    pub followed: Followed,
+}
+
+impl Streaming<'_> {
+    /// Whether the plotter, which has this status, cannot take a line before the pen has moved on.
+    pub fn waits(&self, status: &Status) -> bool {
+        match (self.job.form(), status.stream) {
+            (Form::Strokes, Some([_, _, room])) => (room as usize) < MOST_TARGETS,
+            (Form::Strokes, None) => false,
+            // A move waits for room among those that are planned.
+            (Form::GCode, _) => matches!(status.state.as_str(), "Run" | "Hold"),
+        }
+    }
+
+    /// The status with what a plotter that draws G-code cannot know: how much there is in all once
+    /// it has taken the first `done` lines, and which pen comes next.
+    pub fn told(&self, mut status: Status, done: usize) -> Status {
+        if self.job.form() == Form::Strokes {
+            return status;
+        }
+        let size = self.job.size();
+        let share = self.job.share(done);
+        let part = |all: u64| ((all as f64 * share) as u64, all);
+        let seconds = size.milliseconds as f64 * (1.0 - share) / 1000.0;
+        status.strokes = Some(part(size.strokes.into()));
+        status.ink = Some(part(size.drawn >> 18));
+        status.seconds_left = Some(seconds as u64);
+        if status.is_standing && done > 0 {
+            status.pen_wanted = self.job.pen_behind(done - 1);
+        }
+        status
+    }
+}
+
+impl<'a> Sender<'a> {
+    /// Joins a plotter that draws strokes while they are sent, to send it the rest. `None` if it
+    /// does something else. Nothing changes on the plotter but the numbers of lines.
+    ///
+    /// # Errors
+    /// As [`Sender::open`].
+    pub fn rejoin(
+        link: &'a mut dyn Link,
+        patience: Patience,
+        interrupt: &'a AtomicBool,
+    ) -> Result<Option<(Self, Taken)>, Error> {
+        let mut sender = Self::new(link, patience, interrupt);
+        let status = sender.find_state()?;
+        if status.stream.is_none() {
+            return Ok(None);
+        }
+        sender.begin_numbers(None)?;
+        for _ in 0..super::MOST_QUESTIONS {
+            let replies = match sender.ask(STREAM) {
+                Ok(replies) => replies,
+                // It has ended meanwhile.
+                Err(Error::Refused { .. }) => return Ok(None),
+                Err(error) => return Err(error),
+            };
+            if let Some(taken) = replies.iter().find_map(taken_in) {
+                return Ok(Some((sender, taken)));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Whether the plotter takes strokes, or only G-code.
+    ///
+    /// # Errors
+    /// As [`Sender::stream`].
+    pub fn form(&mut self) -> Result<Form, Error> {
+        match self.ask(STREAM) {
+            Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
+                Ok(Form::Strokes)
+            }
+            Err(Error::Refused { .. }) => Ok(Form::GCode),
+            other => other.map(|_| Form::Strokes),
+        }
+    }
+
+    /// Sends a drawing while it is drawn, and waits until the machine is idle again.
+    ///
+    /// # Errors
+    /// The plotter refuses the drawing, stops with an alarm, stays in feed hold, or falls silent.
+    pub fn draw_streamed(
+        &mut self,
+        job: &StreamedJob,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        self.strokes = job.size().strokes.into();
+        let streaming = Streaming { job, followed: Followed::default() };
+        self.deliver_as(job, Some(streaming), progress, &mut |_| {})?;
+        match job.form() {
+            Form::Strokes => self.watch(progress)?,
+            // The plotter knows only of what it has not drawn yet.
+            Form::GCode => self.watch(&mut Quiet)?,
+        };
+        Ok(())
+    }
+}
+
+/// The answer to `$stream`: `[STREAM:id,taken,all]`.
+fn taken_in(reply: &Reply) -> Option<Taken> {
+    let Reply::Other(line) = reply else { return None };
+    let mut numbers = line.strip_prefix("[STREAM:")?.strip_suffix(']')?.split(',');
+    let mut next = || numbers.next()?.parse::<u32>().ok();
+    let (id, targets, _) = (next()?, next()?, next()?);
+    Some(Taken { id, targets })
+}

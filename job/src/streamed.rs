@@ -1,0 +1,250 @@
+//! A drawing that this computer has computed, as lines that a plotter draws while they come.
+//!
+//! The strokes are those that the same library computes on a board, in whole steps of the page.
+//! They become lines of strokes (see `docs/protocol.md`), or lines of G-code for a plotter whose
+//! firmware knows no others. Either way the lines are made once and lie in one text, which takes
+//! some five bytes a point as strokes.
+
+use penup::checksum::Crc32;
+use penup::drawing::{LineType, PagePoint};
+use penup::fixed::Decimal;
+use penup::machine::{JobSize, Machine, MachineError, Path, PulserState, Settings};
+use penup::motion::Block;
+use penup::plotter::to_steps;
+use penup::protocol::{StreamHeader, StreamedTarget, StrokeWriter};
+use penup_readers::lines::{JobLine, Lines};
+use std::fmt::Write as _;
+
+/// The length after which a line of strokes ends. Two such lines with their numbers and checksums
+/// fit in the receive window, so that one arrives while the other is carried out.
+const LINE_BYTES: usize = 92;
+
+/// How strokes are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Form {
+    /// As lines of strokes.
+    Strokes,
+    /// As G-code, a move in each line.
+    GCode,
+}
+
+/// Why a drawing cannot be sent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum StreamError {
+    /// The machine refuses it.
+    Machine(MachineError),
+    /// G-code has no dotted or dashed lines.
+    LineType,
+    /// It has more targets than lines can be numbered.
+    TooLong,
+}
+
+/// A drawing as lines, of which the first begins it.
+#[derive(Debug)]
+pub struct StreamedJob {
+    /// How the strokes are written.
+    form: Form,
+    /// All lines, one behind the other.
+    text: String,
+    /// Where each line begins in the text, and the number of targets before it.
+    begins: Vec<(usize, u32)>,
+    /// The lines behind which the machine waits for a pen, and that pen, counted from 1.
+    pens: Vec<(usize, u8)>,
+    /// What is known of the drawing before its strokes come.
+    header: StreamHeader,
+    /// The number of lines that are not sent, behind the first one, because the plotter has them.
+    skipped: usize,
+}
+
+/// Reads a path and the pen of each of its targets.
+fn for_each(path: &mut dyn Path, visit: &mut dyn FnMut(StreamedTarget)) {
+    path.rewind();
+    while let Some(target) = path.next_target() {
+        visit(StreamedTarget { target, pen: path.pen() });
+    }
+    path.rewind();
+}
+
+impl StreamedJob {
+    /// The lines by which a machine with these `settings` draws `path`.
+    ///
+    /// # Errors
+    /// See [`StreamError`].
+    pub fn new(settings: &Settings, path: &mut dyn Path, form: Form) -> Result<Self, StreamError> {
+        let size = measure(settings, path).map_err(StreamError::Machine)?;
+        let (least, greatest) = (PagePoint { x: i32::MAX, y: i32::MAX }, PagePoint { x: 0, y: 0 });
+        let steps = settings.page_steps().map(|steps| steps.to_bits());
+        let mut header = StreamHeader { steps, id: 0, targets: 0, least, greatest, size };
+        for_each(path, &mut |StreamedTarget { target, .. }| {
+            let PagePoint { x, y } = target.point;
+            let StreamHeader { least, greatest, targets, .. } = &mut header;
+            (least.x, least.y) = (least.x.min(x), least.y.min(y));
+            (greatest.x, greatest.y) = (greatest.x.max(x), greatest.y.max(y));
+            *targets = targets.saturating_add(1);
+        });
+        if header.targets == 0 {
+            header.least = header.greatest;
+        }
+        let pens = Vec::new();
+        let (text, begins) = (String::new(), Vec::new());
+        let mut job = Self { form, text, begins, pens, header, skipped: 0 };
+        match form {
+            Form::Strokes => job.write_strokes(path),
+            Form::GCode => job.write_gcode(settings, path)?,
+        }
+        // An i32 of nine digits numbers the lines.
+        if job.begins.len() > 999_999_000 {
+            return Err(StreamError::TooLong);
+        }
+        Ok(job)
+    }
+
+    fn push_line(&mut self, line: &str, targets_before: u32) {
+        self.begins.push((self.text.len(), targets_before));
+        self.text.push_str(line);
+    }
+
+    fn write_strokes(&mut self, path: &mut dyn Path) {
+        let (mut writer, mut count, mut before) = (StrokeWriter::default(), 0, 0);
+        for_each(path, &mut |target| {
+            writer.push(target);
+            count += 1;
+            if writer.bytes() >= LINE_BYTES {
+                self.push_line(&writer.end_line(), before);
+                before = count;
+            }
+        });
+        if before < count {
+            self.push_line(&writer.end_line(), before);
+        }
+        // The number does not depend on where the pen is when it begins.
+        let mut sum = Crc32::new();
+        sum.update(self.text.as_bytes());
+        self.header.steps.iter().for_each(|steps| sum.update(&steps.to_le_bytes()));
+        self.header.id = sum.finalize();
+        let header = self.header.line();
+        // The first line is the header.
+        self.text.insert_str(0, &header);
+        self.begins.iter_mut().for_each(|(begin, _)| *begin += header.len());
+        self.begins.insert(0, (0, 0));
+    }
+
+    fn write_gcode(&mut self, settings: &Settings, path: &mut dyn Path) -> Result<(), StreamError> {
+        let steps = settings.page_steps();
+        let mut failure = None;
+        let (mut pen, mut motion, mut count) = (None, "", 0);
+        // Millimetres, absolute, without the arcs' planes and times of others.
+        self.push_line("G21G90G94G17", 0);
+        for_each(path, &mut |StreamedTarget { target, pen: number }| {
+            if pen.is_some_and(|pen| pen != number) {
+                self.push_line(&format!("T{}M6", number + 1), count);
+                self.pens.push((self.begins.len() - 1, number + 1));
+            }
+            pen = Some(number);
+            match target.ink {
+                None | Some(LineType::Full) => {}
+                Some(_) => failure = Some(StreamError::LineType),
+            }
+            let next = if target.ink.is_some() { "G1" } else { "G0" };
+            // A block in the machine's own coordinates, whatever the others are.
+            let mut line = String::from("G53");
+            if next != motion {
+                line += next;
+                motion = next;
+            }
+            let [x, y] = steps;
+            for (letter, step, steps) in [('X', target.point.x, x), ('Y', target.point.y, y)] {
+                line.push(letter);
+                let exact = f64::from(step) / steps.to_num::<f64>();
+                let written = (0..8).map(|decimals| format!("{exact:.decimals$}")).find(|text| {
+                    let read = Decimal::parse(text).ok().and_then(|mm| mm.to_millimetres().ok());
+                    read.is_some_and(|mm| to_steps(mm, steps) == step)
+                });
+                // Steps are no finer than 1/4000 mm, of which five decimals name each.
+                let _ = write!(line, "{}", written.unwrap_or_else(|| format!("{exact:.6}")));
+            }
+            self.push_line(&line, count);
+            count += 1;
+        });
+        self.push_line("M2", count);
+        failure.map_or(Ok(()), Err)
+    }
+
+    /// How the strokes are written.
+    pub fn form(&self) -> Form {
+        self.form
+    }
+
+    /// The strokes, lengths and time of the whole drawing.
+    pub fn size(&self) -> JobSize {
+        self.header.size
+    }
+
+    /// The number by which a plotter knows the drawing again.
+    pub fn id(&self) -> u32 {
+        self.header.id
+    }
+
+    /// The number of targets: of points, those to which the pen moves without drawing among them.
+    pub fn targets(&self) -> u32 {
+        self.header.targets
+    }
+
+    /// The number of bytes of all lines, without numbers and checksums.
+    pub fn bytes(&self) -> usize {
+        self.text.len()
+    }
+
+    /// The pen, counted from 1, that the machine waits for behind the line with this index.
+    pub fn pen_behind(&self, index: usize) -> Option<u8> {
+        let index = index + self.skipped;
+        let found = self.pens.binary_search_by_key(&index, |(line, _)| *line).ok()?;
+        self.pens.get(found).map(|(_, pen)| *pen)
+    }
+
+    /// How much of the drawing the first `lines` lines that are sent bring, as strokes of all.
+    pub fn share(&self, lines: usize) -> f64 {
+        let targets = self.begins.get(lines + self.skipped).map_or(self.targets(), |(_, n)| *n);
+        f64::from(targets) / f64::from(self.targets().max(1))
+    }
+
+    /// Leaves out the header and the lines with the first `targets` targets, which the plotter has.
+    /// Returns whether these are whole lines.
+    #[must_use]
+    pub fn skip(&mut self, targets: u32) -> bool {
+        if self.form != Form::Strokes {
+            return false;
+        }
+        let is_all = targets == self.targets();
+        // The header has no targets either.
+        let found = self.begins.iter().skip(1).position(|(_, before)| *before == targets);
+        match found {
+            Some(line) => self.skipped = line + 1,
+            None if is_all => self.skipped = self.begins.len(),
+            None => return false,
+        }
+        true
+    }
+}
+
+impl Lines for StreamedJob {
+    fn count(&self) -> usize {
+        self.begins.len() - self.skipped
+    }
+
+    fn line(&self, index: usize) -> Option<JobLine> {
+        let index = index.checked_add(self.skipped)?;
+        let (begin, _) = *self.begins.get(index)?;
+        let end = self.begins.get(index + 1).map_or(self.text.len(), |(end, _)| *end);
+        self.text.get(begin..end).map(JobLine::command)
+    }
+}
+
+/// Measures a path that begins at the page's origin, and checks all of it.
+fn measure(settings: &Settings, path: &mut dyn Path) -> Result<JobSize, MachineError> {
+    let (pins, mut blocks) = (PulserState::new(), [Block::EMPTY; 4]);
+    let mut machine = Machine::new(*settings, &mut blocks, &pins, u32::MAX);
+    // A machine that must be homed first is measured all the same.
+    let _ = machine.unlock();
+    machine.start(path)
+}

@@ -1,0 +1,196 @@
+//! A job whose strokes a computer has computed and sends while they are drawn.
+//!
+//! The working memory is a ring of targets. The machine reads a stroke once all of it has come, so
+//! that a line that is slower than the pen lets the pen wait between strokes, where it is raised. A
+//! stroke longer than the ring is read once the ring is full. If its rest is late, the pen is
+//! raised where it stands, and goes down there again when the ring is full again.
+
+use super::reply::Reply;
+use super::{Board, Cursor, Inner, Job, Strokes};
+use crate::drawing::{LineType, PagePoint};
+use crate::index::Index;
+use crate::machine::{Late, State, Target};
+use crate::protocol::{CommandError, MOST_TARGETS, StreamHeader, StreamedTarget, StreamedTargets};
+
+/// The number of bits of a coordinate, which is at most [`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT).
+const COORDINATE_BITS: u32 = 21;
+
+/// The number of bits of a pen's number.
+const PEN_BITS: u32 = 5;
+
+/// How far the strokes have come.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Streamed {
+    /// What was said of the job before its strokes; without targets if there is no such job.
+    header: StreamHeader,
+    /// The number of targets that have come.
+    taken: u32,
+    /// The number of targets that the machine may read.
+    released: u32,
+}
+
+impl Streamed {
+    /// Whether there are targets that have not come yet.
+    fn is_open(&self) -> bool {
+        self.taken < self.header.targets
+    }
+
+    /// The number of targets for which a ring of `length` has room once so many have been `read`.
+    fn room(&self, length: usize, read: usize) -> usize {
+        length.saturating_sub((self.taken as usize).saturating_sub(read))
+    }
+
+    /// The target with this index, if the machine may read it.
+    fn target(&self, ring: &[u64], index: usize) -> Option<StreamedTarget> {
+        if index >= self.released as usize { None } else { unpacked(ring, index) }
+    }
+}
+
+/// A target in a word of the ring.
+fn packed(StreamedTarget { target: Target { point, ink }, pen }: StreamedTarget) -> u64 {
+    let ink = ink.map_or(0, |line_type| u64::from(line_type.code()) + 1);
+    let above = ink << PEN_BITS | u64::from(pen);
+    (above << COORDINATE_BITS | u64::from(point.y.cast_unsigned())) << COORDINATE_BITS
+        | u64::from(point.x.cast_unsigned())
+}
+
+/// The target with this index, as it lies in the ring.
+fn unpacked(ring: &[u64], index: usize) -> Option<StreamedTarget> {
+    let word = *ring.get(index.checked_rem(ring.len())?)?;
+    let part = |shift: u32, bits: u32| (word >> shift) as u32 & ((1 << bits) - 1);
+    let x = part(0, COORDINATE_BITS).cast_signed();
+    let y = part(COORDINATE_BITS, COORDINATE_BITS).cast_signed();
+    let pen = part(2 * COORDINATE_BITS, PEN_BITS) as u8;
+    let ink = part(2 * COORDINATE_BITS + PEN_BITS, 8) as u8;
+    let ink = ink.checked_sub(1).map(LineType::from_code);
+    Some(StreamedTarget { target: Target { point: PagePoint { x, y }, ink }, pen })
+}
+
+impl<I: Index> Strokes<'_, I> {
+    /// The next target that was sent, behind the strokes of the job, of which such a job has none.
+    #[inline(never)] // Other jobs come here once, at their end.
+    pub(super) fn next_streamed(&mut self) -> Option<Target> {
+        let StreamedTarget { target, pen } = self.streamed?.target(self.ring, self.cursor.leg)?;
+        self.cursor.leg += 1;
+        self.cursor.pen = pen;
+        Some(target)
+    }
+
+    /// Whether the next target has not come yet, or not all of its stroke.
+    pub(super) fn lateness(&self) -> Option<Late> {
+        let (streamed, read) = (self.streamed?, self.cursor.leg);
+        if read < streamed.released as usize || read >= streamed.header.targets as usize {
+            return None;
+        }
+        let last = read.checked_sub(1).and_then(|last| unpacked(self.ring, last));
+        Some(Late { within_stroke: last.is_some_and(|last| last.target.ink.is_some()) })
+    }
+}
+
+impl<I: Index> Inner<'_, I> {
+    /// Of strokes that are being sent: how many targets have come, how many there are, and how many
+    /// more there is room for.
+    pub(super) fn streamed_targets(&self) -> Option<[u32; 3]> {
+        let Streamed { header, taken, .. } = self.streamed;
+        let room = self.streamed.room(self.words.len(), self.cursor.leg);
+        self.is_streamed().then_some([taken, header.targets, room as u32])
+    }
+
+    /// Whether strokes are being sent that the machine draws.
+    pub(super) fn is_streamed(&self) -> bool {
+        self.streamed.header.targets > 0
+            && matches!(self.machine.state(), State::Run | State::Hold { .. })
+            && !self.machine.is_streaming()
+    }
+
+    /// Whether the next line must wait until the machine has read targets.
+    pub(super) fn waits_for_targets(&self) -> bool {
+        self.streamed.is_open()
+            && self.is_streamed()
+            && self.streamed.room(self.words.len(), self.cursor.leg) < MOST_TARGETS
+    }
+
+    /// Begins a job whose strokes will be sent.
+    ///
+    /// # Errors
+    /// [`CommandError::Busy`] or [`CommandError::Locked`] if the state does not allow it,
+    /// [`CommandError::OtherSteps`] if it was computed for other steps, or the machine's refusal of
+    /// its bounds. Nothing moves then.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn begin_streamed(&mut self, text: &str) -> Result<(), CommandError> {
+        let header = StreamHeader::parse(text)?;
+        let steps = self.machine.settings().page_steps().map(|steps| steps.to_bits());
+        if self.machine.state() == State::Idle && steps != header.steps {
+            return Err(CommandError::OtherSteps);
+        }
+        self.machine.start_streamed(header.size, [header.least, header.greatest])?;
+        self.copy_words = 0;
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        self.streamed = Streamed { header, taken: 0, released: 0 };
+        Ok(())
+    }
+
+    /// Takes a line of strokes: all of it or nothing.
+    ///
+    /// # Errors
+    /// [`CommandError::NoStream`] if no such line is expected, [`CommandError::NotStrokes`], or
+    /// [`CommandError::BeyondBounds`] if a target lies elsewhere than was said.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn take_strokes(&mut self, text: &str) -> Result<(), CommandError> {
+        if !self.is_streamed() {
+            return Err(match self.machine.state() {
+                State::Alarm(_) | State::Sleep => CommandError::Locked,
+                _ => CommandError::NoStream,
+            });
+        }
+        let Streamed { header, taken, mut released } = self.streamed;
+        let mut count = 0;
+        for target in StreamedTargets::new(text) {
+            if !header.holds(target?.target.point) {
+                return Err(CommandError::BeyondBounds);
+            }
+            count += 1;
+        }
+        let room = self.streamed.room(self.words.len(), self.cursor.leg);
+        if count as usize > room || header.targets - taken < count {
+            return Err(CommandError::NoStream);
+        }
+        let mut end = taken;
+        let before = (taken as usize).checked_sub(1).and_then(|last| unpacked(self.words, last));
+        let mut pen = before.map(|before| before.pen);
+        let length = self.words.len();
+        for target in StreamedTargets::new(text).map_while(Result::ok) {
+            let place = (end as usize).checked_rem(length);
+            let Some(word) = place.and_then(|place| self.words.get_mut(place)) else { break };
+            *word = packed(target);
+            // What comes before a move with the pen up, or before another pen, is whole strokes.
+            if target.target.ink.is_none() {
+                released = end + 1;
+            } else if pen.is_some_and(|pen| pen != target.pen) {
+                released = end;
+            }
+            pen = Some(target.pen);
+            end += 1;
+        }
+        self.streamed = Streamed { header, taken: end, released };
+        let is_full = self.streamed.room(length, self.cursor.leg) < MOST_TARGETS;
+        if is_full || !self.streamed.is_open() {
+            self.streamed.released = end;
+        }
+        Ok(())
+    }
+
+    /// Says how much of the job has come, so that its sender can go on.
+    ///
+    /// # Errors
+    /// [`CommandError::NoStream`].
+    pub(super) fn report_streamed<B: Board>(&self, board: &mut B) -> Result<(), CommandError> {
+        if !self.is_streamed() {
+            return Err(CommandError::NoStream);
+        }
+        let Streamed { header, taken, .. } = self.streamed;
+        Reply(board).line(format_args!("[STREAM:{},{taken},{}]", header.id, header.targets));
+        Ok(())
+    }
+}
