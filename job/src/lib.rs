@@ -3,9 +3,10 @@
 //!
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
 //! has the words of the serial line, and reads the replies. [`view`] says from where a model is
-//! seen. [`twin`] computes what the plotter must then
-//! contain, and [`room`] the memory that takes. [`pins`] and [`watch`] follow the pen to its
-//! [`path`], [`strokes`] and [`results`] tell what was drawn, and [`picture`] shows it.
+//! seen. [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
+//! [`pins`] and [`watch`] follow the pen to its
+//! [`path`], of which [`sampled`] keeps what a page shows; [`strokes`] and [`results`] tell what was
+//! drawn, and [`picture`] shows it.
 //!
 //! Nothing here opens a file or a port, starts a thread, or reads a clock.
 
@@ -16,6 +17,7 @@ pub mod pins;
 pub mod protocol;
 pub mod results;
 pub mod room;
+pub mod sampled;
 pub mod strokes;
 pub mod twin;
 pub mod view;

@@ -134,7 +134,7 @@ impl Session {
         let file = source::read(name, bytes)?;
         let settings = NamedValues::parse(options)?.settings();
         let job: Rc<dyn Lines> = Rc::new(Job::new(Shared(file), &settings));
-        self.expected = twin::contents(&*job, job.count());
+        self.expected = twin::contents_of::<u16>(&*job, job.count());
         self.job = Some(job);
         self.begin_job();
         Ok(())
