@@ -2,8 +2,8 @@
 //! plotter, what the plotter answers, and what it then draws.
 //!
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
-//! has the words of the serial line, and reads the replies. [`view`] says from where a model is
-//! seen. [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
+//! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a user
+//! wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
 //! [`pins`] and [`watch`] follow the pen to its
 //! [`path`], of which [`sampled`] keeps what a page shows; [`strokes`] and [`results`] tell what was
 //! drawn, and [`picture`] shows it.
@@ -22,5 +22,6 @@ pub mod strokes;
 pub mod twin;
 pub mod view;
 pub mod watch;
+pub mod wishes;
 
 pub use job::{Job, Settings};

@@ -7,9 +7,10 @@ use penup::index::Index;
 use penup::plotter::EMPTY_LOOKAHEAD;
 use penup::plotter::MemorySlices;
 use penup_readers::lines::Lines;
+use serde::{Deserialize, Serialize};
 
 /// The capacities of a plotter's memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Room {
     /// The number of vertices.
     pub vertices: usize,
@@ -54,6 +55,14 @@ impl Room {
             + Self::BYTES_A_VERTEX * (vertices + chords)
             + Self::BYTES_A_CORNER * (corners + 2 * chords);
         Self { vertices, corners, words: bytes / 8, blocks: EMPTY_LOOKAHEAD.len() }
+    }
+
+    /// Whether this fits in `other`.
+    pub fn fits(self, other: Self) -> bool {
+        self.vertices <= other.vertices
+            && self.corners <= other.corners
+            && self.words <= other.words
+            && self.blocks <= other.blocks
     }
 
     /// Returns what a board has.

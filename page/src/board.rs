@@ -1,15 +1,14 @@
 //! An emulated plotter: the firmware's session on a board of plain memory, with a pipe of bytes to
 //! it, and a record of what its pins do.
 
+use crate::number::{Number, memory};
 use crate::options::text_of;
-use penup::board_table::{BOARDS, BoardRow, Capacities};
-use penup::boards::host::{HostBoard, PORTS, lend_memory};
+use penup::board_table::{BOARDS, BoardRow};
+use penup::boards::host::HostBoard;
 use penup::machine::{EventRing, PulserState};
-use penup::model::{Corner, Position};
-use penup::motion::Block;
-use penup::plotter::{Board as _, MemorySlices, Plotter};
-use penup::protocol::LineReader;
+use penup::plotter::{Board as _, Plotter};
 use penup_job::picture::Picture;
+use penup_job::room::Room;
 use penup_job::sampled::SampledPath;
 use penup_job::strokes::{Stroke, strokes_of};
 use penup_job::watch::PenWatch;
@@ -22,7 +21,7 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 pub struct Board {
     board: HostBoard<'static>,
-    plotter: Plotter<'static>,
+    plotter: Plotter<'static, Number>,
     pen: PenWatch,
     /// Steps per mm, of x and of y.
     steps: [f64; 2],
@@ -38,16 +37,21 @@ impl fmt::Debug for Board {
 #[wasm_bindgen]
 impl Board {
     /// Starts the plotter, at the page's origin with the pen up. It has the memory of the board of
-    /// the name `limits`, or as much as a computer lends if there is none.
+    /// the name `limits`, or if there is none, enough for a model that needs the `room`, which
+    /// [`Sheet`](crate::Sheet) tells of a file.
     #[wasm_bindgen(constructor)]
-    pub fn new(limits: &str) -> Self {
+    pub fn new(limits: &str, room: &str) -> Self {
         crate::note_faults();
+        let room = serde_json::from_str(room).unwrap_or_else(|_| Room::for_job(&Vec::new()));
+        let room = BoardRow::named(limits).map_or(room, Room::of_board);
+        let is_of_board = BoardRow::named(limits).is_some();
         // The memory is leaked because the plotter and the board borrow from it; a worker makes
         // one board and keeps it.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
-        let plotter = Plotter::new(memory_of(limits), pins);
+        let lent = if is_of_board { room.lend() } else { memory(room) };
+        let plotter = Plotter::new(lent, pins);
         plotter.greet(&mut board);
         let steps = plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>());
         let pen = PenWatch::new(1.0 / steps[0]);
@@ -135,18 +139,4 @@ struct BoardLimits {
     about: &'static str,
     vertices: usize,
     corners: usize,
-}
-
-/// Memory with the capacities of a board. It is leaked, so it lasts as long as the worker.
-fn memory_of(board: &str) -> MemorySlices<'static> {
-    let Some(row) = BoardRow::named(board) else { return lend_memory() };
-    let Capacities { vertices, corners, words, blocks, .. } = row.memory;
-    MemorySlices {
-        vertices: vec![Position::ORIGIN; vertices].leak(),
-        corners: vec![<Corner>::ZERO; corners].leak(),
-        blocks: vec![Block::EMPTY; blocks].leak(),
-        words: vec![0; words].leak(),
-        readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
-        hpgl: Box::leak(Box::new(penup::hpgl::Session::new())),
-    }
 }

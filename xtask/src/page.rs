@@ -1,6 +1,7 @@
 //! Builds the page as static files, and tests it in a browser.
 
 use std::env;
+use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -12,12 +13,30 @@ use crate::set_up;
 /// The target that a browser runs.
 const TARGET: &str = "wasm32-unknown-unknown";
 
+/// The programs of the page: the name by which the page loads each, and what builds it. The first
+/// is loaded with the page, the others when they are needed.
+const PROGRAMS: [(&str, &[&str]); 3] = [
+    ("penup_page", &["--package=penup-page"]),
+    ("penup_wide", &["--package=penup-page", "--features=wide"]),
+    ("penup_files", &["--package=penup-page-files"]),
+];
+
 /// Builds the page into `target/page`.
 pub fn build() -> Result<()> {
     set_up::target(TARGET)?;
     let root = crate::root();
-    let options = ["--package=penup-page", "--profile=browser", "--target", TARGET];
-    run(cargo().current_dir(&root).args(["build", "--quiet"]).args(options))?;
+    let built = root.join("target").join(TARGET).join("browser");
+    let programs = root.join("target/page-programs");
+    fs::create_dir_all(&programs)?;
+    for (name, options) in PROGRAMS {
+        run(cargo()
+            .current_dir(&root)
+            .args(["build", "--quiet", "--profile=browser", "--target", TARGET])
+            .args(options))?;
+        // Two of them are the same package, so each is taken away before the next is built.
+        let image = options[0].trim_start_matches("--package=").replace('-', "_");
+        fs::copy(built.join(image + ".wasm"), programs.join(name).with_extension("wasm"))?;
+    }
     // What builds the page is a workspace of its own, so that no other build compiles it.
     let builder = root.join("page/builder/Cargo.toml");
     if !root.join("target/page-builder").exists() {
@@ -29,9 +48,9 @@ pub fn build() -> Result<()> {
         .arg("--target-dir")
         .arg(root.join("target/page-builder"))
         .arg("--")
-        .arg(root.join("target").join(TARGET).join("browser/penup_page.wasm"))
         .arg(&root)
-        .arg(folder()))
+        .arg(folder())
+        .args(PROGRAMS.map(|(name, _)| programs.join(name).with_extension("wasm"))))
 }
 
 /// The folder of the page that was built.
