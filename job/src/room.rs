@@ -33,6 +33,11 @@ impl Room {
     /// The number of chords into which the piece of a curve at one control point may be divided.
     const CHORDS: usize = 64;
 
+    /// Returns what is enough for any model that a board holds in its working memory.
+    pub fn usual() -> Self {
+        Self { vertices: 1 << 15, corners: 1 << 16, words: 1 << 19, blocks: EMPTY_LOOKAHEAD.len() }
+    }
+
     /// Returns what is enough for the model that `lines` send.
     pub fn for_job(lines: &dyn Lines) -> Self {
         let (mut vertices, mut corners, mut chords) = (0, 0, 0);
@@ -55,6 +60,12 @@ impl Room {
             + Self::BYTES_A_VERTEX * (vertices + chords)
             + Self::BYTES_A_CORNER * (corners + 2 * chords);
         Self { vertices, corners, words: bytes / 8, blocks: EMPTY_LOOKAHEAD.len() }
+    }
+
+    /// The same with so many times the memory to work in, for numbers that are so much wider.
+    #[must_use]
+    pub fn with_words(self, times: usize) -> Self {
+        Self { words: times * self.words, ..self }
     }
 
     /// Whether this fits in `other`.

@@ -1,7 +1,7 @@
 //! An emulated plotter: the firmware's session on a board of plain memory, with a pipe of bytes to
 //! it, and a record of what its pins do.
 
-use crate::number::{Number, memory};
+use crate::number::Number;
 use crate::options::text_of;
 use penup::board_table::{BOARDS, BoardRow};
 use penup::boards::host::HostBoard;
@@ -38,20 +38,20 @@ impl fmt::Debug for Board {
 impl Board {
     /// Starts the plotter, at the page's origin with the pen up. It has the memory of the board of
     /// the name `limits`, or if there is none, enough for a model that needs the `room`, which
-    /// [`Sheet`](crate::Sheet) tells of a file.
+    /// [`Sheet`](crate::Sheet) tells of a file (without it, for one that is not very large).
     #[wasm_bindgen(constructor)]
     pub fn new(limits: &str, room: &str) -> Self {
         crate::note_faults();
-        let room = serde_json::from_str(room).unwrap_or_else(|_| Room::for_job(&Vec::new()));
-        let room = BoardRow::named(limits).map_or(room, Room::of_board);
-        let is_of_board = BoardRow::named(limits).is_some();
+        let room = serde_json::from_str(room).unwrap_or_else(|_| Room::usual());
+        // The numbers here are twice as wide as those of a board.
+        let of_board = |board| Room::of_board(board).with_words(2);
+        let room = BoardRow::named(limits).map_or(room, of_board);
         // The memory is leaked because the plotter and the board borrow from it; a worker makes
         // one board and keeps it.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
-        let lent = if is_of_board { room.lend() } else { memory(room) };
-        let plotter = Plotter::new(lent, pins);
+        let plotter = Plotter::new(room.lend(), pins);
         plotter.greet(&mut board);
         let steps = plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>());
         let pen = PenWatch::new(1.0 / steps[0]);

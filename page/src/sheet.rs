@@ -1,6 +1,6 @@
 //! What a camera sees of a model, drawn on the sheet by the plotter's own code.
 
-use crate::number::{Number, is_wide, memory};
+use crate::number::Number;
 use crate::options::{NamedValues, text_of};
 use crate::source::Source;
 use crate::words::{for_page, refusal, sentence};
@@ -59,8 +59,6 @@ struct Scene {
     notes: Vec<String>,
     /// The room that a plotter needs for it, for [`Board`](crate::Board).
     room: Room,
-    /// Whether it takes the program with wider numbers. Then nothing is open yet.
-    is_wide: bool,
 }
 
 /// Where the camera stands.
@@ -99,15 +97,12 @@ impl Sheet {
         self.take(&JobLine::command("$clear"))?;
         let source = Source::read(name, bytes, is_read)?;
         let room = Room::for_job(&*source.lines);
-        let is_wide = is_wide(room) && !cfg!(feature = "wide");
-        if cfg!(feature = "wide") && !room.fits(self.room) {
+        if !room.fits(self.room) {
             (self.board, self.plotter) = started(room);
             self.room = room;
         }
         self.source = source;
-        if !is_wide {
-            self.set(options)?;
-        }
+        self.set(options)?;
         let model = self.plotter.model();
         let bounds = model.bounds().map(|(low, high)| {
             let unit = (0.5f64).powi(model.fraction_bits() as i32);
@@ -126,7 +121,6 @@ impl Sheet {
             bounds,
             notes: notes.map(|note| format!("{}.", sentence(&for_page(note)))).collect(),
             room,
-            is_wide,
         }))
     }
 
@@ -232,11 +226,11 @@ impl Sheet {
 
 /// A plotter with this room, and its board.
 fn started(room: Room) -> (HostBoard<'static>, Plotter<'static, Number>) {
-    // The memory is leaked because the plotter and the board borrow from it; a worker makes one
-    // sheet and keeps it.
+    // The memory is leaked because the plotter and the board borrow from it. A worker makes one
+    // sheet and keeps it; only a larger model takes more.
     let ring = Box::leak(Box::new(EventRing::new()));
     let pins = Box::leak(Box::new(PulserState::new()));
-    (HostBoard::new(ring, pins), Plotter::new(memory(room), pins))
+    (HostBoard::new(ring, pins), Plotter::new(room.lend(), pins))
 }
 
 impl Default for Sheet {

@@ -200,10 +200,16 @@ fn speeds_follow_the_buttons() {
     pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
     pipe.until_state("Run");
     let until_percent = |pipe: &mut Pipe, percent: u64| {
-        while pipe.until("status")["percent"] != percent {}
+        for _ in 0..1000 {
+            if pipe.until("status")["percent"] == percent {
+                return;
+            }
+        }
+        panic!("the speeds are never at {percent} %");
     };
     until_percent(&mut pipe, 100);
     pipe.session.override_speed(1);
+    until_percent(&mut pipe, 110);
     pipe.session.override_speed(1);
     until_percent(&mut pipe, 120);
     pipe.session.override_speed(-1);

@@ -5,6 +5,10 @@ import { indexAt, penAt } from "./sheet.js";
 
 const $ = (id) => document.getElementById(id);
 const SAMPLE = 4;
+const EXPORTS = ["export-svg", "export-png"];
+/** Dots of a PNG in a mm, and the most on a side: as of the program's. */
+const DOTS = 8,
+  MOST_DOTS = 4096;
 
 /** A time in seconds as h:mm:ss or m:ss. */
 export function clock(seconds) {
@@ -40,7 +44,8 @@ export class Drawing {
     $("stroke-next").addEventListener("click", () => this.stroke(1));
     $("stroke-back").addEventListener("click", () => this.stroke(-1));
     $("show-up").addEventListener("change", () => view.draw());
-    $("export-svg").addEventListener("click", () => this.save());
+    $("export-svg").addEventListener("click", () => this.save("svg"));
+    $("export-png").addEventListener("click", () => this.savePng());
   }
 
   /** What was computed is not what is shown any more. */
@@ -50,7 +55,7 @@ export class Drawing {
     this.stop();
     this.computed = null;
     $("check-state").textContent = "…";
-    $("export-svg").disabled = true;
+    for (const button of EXPORTS) $(button).disabled = true;
   }
 
   /** Computes the drawing, by a session with an emulated plotter that runs ahead of time. */
@@ -101,7 +106,7 @@ export class Drawing {
       );
     }
     const seconds = path.length ? path[path.length - SAMPLE] : 0;
-    this.computed = { path, strokes, pens, svg, report, seconds, name: job.name };
+    this.computed = { path, strokes, pens, svg, report, seconds, name: job.name, page: job.page };
     // Where each stroke begins in time: the pen comes down there, dashes not counted.
     this.begins = starts(path, strokes);
     const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
@@ -124,7 +129,7 @@ export class Drawing {
     $("check-problem").textContent = notes.join(" ");
     $("check-problem").hidden = !notes.length;
     $("at").max = String(seconds);
-    $("export-svg").disabled = false;
+    for (const button of EXPORTS) $(button).disabled = false;
     this.seek(seconds);
   }
 
@@ -205,15 +210,36 @@ export class Drawing {
     this.view.pen(brush, [x, y], pen);
   }
 
-  save() {
-    const { svg, name } = this.computed;
-    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  /** Saves the picture of what the pins draw. */
+  save(kind, blob = new Blob([this.computed.svg], { type: "image/svg+xml" })) {
+    const address = URL.createObjectURL(blob);
     const link = Object.assign(document.createElement("a"), {
       href: address,
-      download: name.replace(/\.\w+$/, "") + ".svg",
+      download: this.computed.name.replace(/\.\w+$/, "") + `.${kind}`,
     });
     link.click();
     setTimeout(() => URL.revokeObjectURL(address), 10_000);
+  }
+
+  /** Saves the same picture in dots. */
+  async savePng() {
+    const { svg, page } = this.computed;
+    const dots = Math.min(DOTS, MOST_DOTS / Math.max(...page));
+    const [width, height] = page.map((side) => Math.max(1, Math.round(side * dots)));
+    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+    try {
+      const picture = Object.assign(new Image(), { src: address });
+      await picture.decode();
+      const canvas = Object.assign(document.createElement("canvas"), { width, height });
+      canvas.getContext("2d").drawImage(picture, 0, 0, width, height);
+      const blob = await new Promise((done) => canvas.toBlob(done, "image/png"));
+      if (!blob) throw new Error("the picture is too large for this browser");
+      this.save("png", blob);
+    } catch (error) {
+      this.problem(`The PNG cannot be made: ${error.message}. Save the SVG instead.`);
+    } finally {
+      URL.revokeObjectURL(address);
+    }
   }
 }
 

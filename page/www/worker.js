@@ -6,7 +6,7 @@
 import init, { Board, Session, Sheet, fault } from "./penup_page.js";
 
 /** The time in ms after which a session gives up a plotter that says nothing. */
-const SILENCE = { emulated: 120_000, serial: 5_000 };
+const SILENCE = { emulated: 120_000, serial: 5_000, program: 20_000 };
 /** How much of the plotter's time passes between two looks at the session, in ms. */
 const REPLAY_STEP = 200;
 
@@ -18,25 +18,26 @@ const calls = {
   },
 
   /** Opens a file and tells what is in it. */
-  open({ name, bytes, options }) {
+  open({ name, bytes, isRead, options }) {
     sheet ??= new Sheet();
-    const scene = JSON.parse(sheet.open(name, bytes, options));
+    const scene = JSON.parse(sheet.open(name, bytes, isRead, options));
     return { scene, camera: JSON.parse(sheet.camera()) };
   },
 
-  /** Sets options, and draws. `reads` tells that the file must be read again. */
+  /** Sets options, and draws. `reads` tells that the lines of the file must be sent again. */
   draw({ options, reads }) {
     const began = performance.now();
     if (reads) sheet.set(options);
     else sheet.turn(options);
     const lines = sheet.draw();
-    const value = { lines, camera: JSON.parse(sheet.camera()), ms: performance.now() - began };
+    const [page, camera] = [[...sheet.page()], JSON.parse(sheet.camera())];
+    const value = { lines, page, camera, ms: performance.now() - began };
     return [value, [lines.buffer]];
   },
 
   /** Computes the whole drawing ahead, by a session with an emulated plotter. */
-  async compute({ name, bytes, options, page, memory }) {
-    board = new Board(memory);
+  async compute({ name, bytes, isRead, options, page, room, memory }) {
+    board = new Board(memory, JSON.stringify(room));
     session = new Session(1e12);
     const paths = [];
     const notes = [];
@@ -45,7 +46,7 @@ const calls = {
       reported = 0,
       begun = false;
     session.connect(now);
-    session.plot(name, bytes, options);
+    session.plot(name, bytes, isRead, options);
     for (;;) {
       const out = session.take_out();
       if (out.length) board.receive(out);
@@ -108,8 +109,17 @@ const calls = {
       20,
     );
   },
-  plot({ name, bytes, options }) {
-    session.plot(name, bytes, options);
+  plot({ name, bytes, isRead, options }) {
+    session.plot(name, bytes, isRead, options);
+  },
+  override({ by }) {
+    session.override_speed(by);
+  },
+  goOn({ isAtOrigin }) {
+    session.go_on(isAtOrigin);
+  },
+  testSquare({ mm }) {
+    session.test_square(mm);
   },
   hold() {
     session.hold();
@@ -125,8 +135,8 @@ const calls = {
   },
 
   /** Is the emulated plotter, at the other end of such a pipe. */
-  board({ pipe, pace }) {
-    board = new Board("");
+  board({ pipe, pace, room }) {
+    board = new Board("", JSON.stringify(room ?? null));
     calls.pace({ pace });
     pipe.onmessage = ({ data }) => guarded(() => board.receive(data.bytes));
     let last = performance.now();

@@ -1,7 +1,6 @@
 //! Builds the page as static files, and tests it in a browser.
 
 use std::env;
-use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
@@ -13,29 +12,21 @@ use crate::set_up;
 /// The target that a browser runs.
 const TARGET: &str = "wasm32-unknown-unknown";
 
-/// The programs of the page: the name by which the page loads each, and what builds it. The first
-/// is loaded with the page, the others when they are needed.
-const PROGRAMS: [(&str, &[&str]); 3] = [
-    ("penup_page", &["--package=penup-page"]),
-    ("penup_wide", &["--package=penup-page", "--features=wide"]),
-    ("penup_files", &["--package=penup-page-files"]),
-];
+/// The packages of the page's programs. The first is loaded with the page, the other when it is
+/// needed.
+const PROGRAMS: [&str; 2] = ["penup-page", "penup-page-files"];
 
 /// Builds the page into `target/page`.
 pub fn build() -> Result<()> {
     set_up::target(TARGET)?;
     let root = crate::root();
     let built = root.join("target").join(TARGET).join("browser");
-    let programs = root.join("target/page-programs");
-    fs::create_dir_all(&programs)?;
-    for (name, options) in PROGRAMS {
+    for package in PROGRAMS {
+        // Together, the first would have the features of the second.
         run(cargo()
             .current_dir(&root)
             .args(["build", "--quiet", "--profile=browser", "--target", TARGET])
-            .args(options))?;
-        // Two of them are the same package, so each is taken away before the next is built.
-        let image = options[0].trim_start_matches("--package=").replace('-', "_");
-        fs::copy(built.join(image + ".wasm"), programs.join(name).with_extension("wasm"))?;
+            .args(["--package", package]))?;
     }
     // What builds the page is a workspace of its own, so that no other build compiles it.
     let builder = root.join("page/builder/Cargo.toml");
@@ -50,7 +41,7 @@ pub fn build() -> Result<()> {
         .arg("--")
         .arg(&root)
         .arg(folder())
-        .args(PROGRAMS.map(|(name, _)| programs.join(name).with_extension("wasm"))))
+        .args(PROGRAMS.map(|package| built.join(package.replace('-', "_") + ".wasm"))))
 }
 
 /// The folder of the page that was built.
