@@ -180,32 +180,28 @@ export class Drawing {
     $("play").textContent = "Play";
   }
 
-  /** Draws the computed drawing. Returns whether there is one. */
+  /** What draws the computed drawing; null if there is none. */
   paint(brush) {
-    if (!this.computed) return false;
+    return this.computed && this.pieces(brush);
+  }
+
+  *pieces(brush) {
     const { path, strokes, seconds } = this.computed;
-    const end = indexAt(path, this.time);
-    if (this.time < seconds)
-      this.view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
-    if ($("show-up").checked) this.view.moves(brush, strokes);
-    this.view.path(brush, path, end);
-    const now = penAt(path, this.time);
-    if (this.time < seconds && now) this.inkTo(brush, path, end, now);
-    this.view.marks(brush, strokes);
-    return true;
+    const { time, view } = this;
+    const end = indexAt(path, time);
+    if (time < seconds) yield* view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
+    if ($("show-up").checked) yield* view.moves(brush, strokes);
+    yield* view.path(brush, path, end);
+    const now = penAt(path, time);
+    if (time < seconds && now) yield* this.inkTo(brush, path, end, now);
+    view.marks(brush, strokes);
   }
 
   /** Draws the ink from the last sample to where the pen is now, and the pen. */
-  inkTo(brush, path, end, [x, y, pen]) {
+  *inkTo(brush, path, end, [x, y, pen]) {
     if (pen && end > 0) {
-      const last = new Float32Array([
-        ...path.subarray((end - 1) * SAMPLE, end * SAMPLE),
-        this.time,
-        x,
-        y,
-        pen,
-      ]);
-      this.view.path(brush, last, 2);
+      const before = path.subarray((end - 1) * SAMPLE, end * SAMPLE);
+      yield* this.view.path(brush, new Float32Array([...before, this.time, x, y, pen]), 2);
     }
     this.view.pen(brush, [x, y], pen);
   }

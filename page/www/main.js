@@ -67,7 +67,7 @@ async function main() {
   drawing = new Drawing(view, JSON.parse(library.boards()), { job, announce });
   plotting = new Plotting(view, { job, announce, lines: () => lines, program: await joined() });
   for (const name of EXAMPLES) $("example").append(new Option(name, `${name}.obj`));
-  window.penup = { frames, drawing, plotting };
+  window.penup = { frames, drawing, plotting, view };
   listenToPage();
   const link = new Map(fromLink(location.hash));
   const given = link.get("given"),
@@ -311,9 +311,9 @@ function upwards() {
 }
 
 function paint(brush) {
-  if (tab === "draw" && plotting.paint(brush)) return;
-  if (tab === "check" && drawing.paint(brush)) return;
-  view.lines(brush, lines);
+  const picture =
+    (tab === "draw" && plotting.paint(brush)) || (tab === "check" && drawing.paint(brush));
+  return picture || view.lines(brush, lines);
 }
 
 // The page itself.

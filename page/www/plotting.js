@@ -26,6 +26,8 @@ const HINTS = {
   serial: "Chromium, Chrome or Edge, and a plotter that runs penup. The page talks to it by itself.",
   program: "The program penup has its line, so any browser will do. One page at a time holds it.",
 };
+/** How dark the lines are that are still to be drawn. */
+const PLANNED = 0.28;
 /** The side of the test square in mm. */
 const SQUARE = 20;
 
@@ -372,19 +374,19 @@ export class Plotting {
     while ($("log").children.length > 100) $("log").firstChild.remove();
   }
 
-  /** Draws what the plotter has drawn over what it will draw. Returns whether it has begun. */
+  /** What draws what the plotter has drawn over what it will draw; null before it has begun. */
   paint(brush) {
-    const planned = this.planned;
-    if (!this.count && !(this.isFar && this.phase === "drawing")) return false;
+    return this.count || (this.isFar && this.phase === "drawing") ? this.pieces(brush) : null;
+  }
+
+  *pieces(brush) {
+    const { count, path, planned, view } = this;
     if (planned) {
-      brush.globalAlpha = 0.28;
-      this.view.lines(brush, planned);
-      brush.globalAlpha = 1;
+      yield* view.lines(brush, planned, PLANNED);
     }
-    this.view.path(brush, this.path, this.count / SAMPLE);
-    const last = this.path.subarray(this.count - SAMPLE, this.count);
+    yield* view.path(brush, path, count / SAMPLE);
+    const last = path.subarray(count - SAMPLE, count);
     const place = this.hasPins ? [last[1], last[2]] : this.place;
-    if (place && this.phase === "drawing") this.view.pen(brush, place, this.hasPins ? last[3] : 0);
-    return true;
+    if (place && this.phase === "drawing") view.pen(brush, place, this.hasPins ? last[3] : 0);
   }
 }

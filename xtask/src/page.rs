@@ -7,7 +7,9 @@ use std::process::Command;
 use anyhow::Result;
 
 use crate::command::{cargo, run};
+use crate::firmware;
 use crate::set_up;
+use crate::table::LM3S6965;
 
 /// The target that a browser runs.
 const TARGET: &str = "wasm32-unknown-unknown";
@@ -64,6 +66,9 @@ pub struct TestArguments {
 pub fn test(arguments: &TestArguments) -> Result<()> {
     let installed = set_up::browser()?;
     build()?;
+    // The page is joined to this board by the client.
+    set_up::emulator(&LM3S6965)?;
+    firmware::check(&LM3S6965, &firmware::build(&LM3S6965)?)?;
     let root = crate::root();
     run(cargo().current_dir(&root).args(["build", "--quiet", "--package", "penup-client"]))?;
     let tests = root.join("page/browser-tests");
