@@ -6,10 +6,11 @@
 //! wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
 //! [`pins`] and [`watch`] follow the pen to its
 //! [`path`], of which [`sampled`] keeps what a page shows; [`strokes`] and [`results`] tell what was
-//! drawn, and [`picture`] shows it.
+//! drawn, [`picture`] shows it, and [`export`] writes it for other machines.
 //!
 //! Nothing here opens a file or a port, starts a thread, or reads a clock.
 
+pub mod export;
 mod job;
 pub mod path;
 pub mod picture;

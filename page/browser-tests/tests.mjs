@@ -52,9 +52,15 @@ const saved = (name) => PENUP_PICTURES && page.screenshot({ path: join(PENUP_PIC
 /** Waits until the whole drawing is computed, and returns its figures. */
 async function computed() {
   await page.waitForFunction(() => window.penup.drawing.computed);
-  return page.evaluate(() => {
-    const { strokes, pens, svg, seconds } = window.penup.drawing.computed;
-    return { strokes, pens, svg, seconds };
+  return page.evaluate(async () => {
+    const { strokes: flat, svg, seconds } = window.penup.drawing.computed;
+    const [strokes, pens] = [[], []];
+    for (let at = 0; at < flat.length; at += 2 + 2 * flat[at + 1]) {
+      pens.push(flat[at]);
+      const points = Array.from({ length: flat[at + 1] }, (_, i) => at + 2 + 2 * i);
+      strokes.push(points.map((point) => [flat[point], flat[point + 1]]));
+    }
+    return { strokes, pens, svg: await svg.text(), seconds };
   });
 }
 
@@ -431,11 +437,19 @@ test("through the client: turn, dash, plot, hold, resume; the ink is the preview
     await state("Held");
     assert.equal(await count(), 0, "nothing moved meanwhile");
     await page.click("#resume");
-    await page.waitForFunction(() => document.getElementById("plot-state").textContent === "Ready.");
+    await page.waitForFunction(
+      () => document.getElementById("plot-state").textContent === "Ready.",
+      undefined,
+      { timeout: 120_000 },
+    );
     assert.ok(held > 0 && (await count()) > 0);
     // Once more, whole: the ink from the pins of the firmware is that of the preview.
     await page.click("#plot");
-    await state("Drawn");
+    await page.waitForFunction(
+      () => document.getElementById("plot-state").textContent.startsWith("Drawn"),
+      undefined,
+      { timeout: 120_000 },
+    );
     const ink = await page.evaluate(() => {
       const { path, count } = window.penup.plotting;
       return [...path.subarray(0, count)];
@@ -593,6 +607,17 @@ test("pictures are saved, as SVG and as PNG", async () => {
   const [picture, dots] = await save("#export-png");
   assert.equal(picture, "notched.png");
   assert.equal(dots.toString("latin1", 1, 4), "PNG");
+  const [program, gcode] = await save("#export-gcode");
+  assert.equal(program, "notched.gcode");
+  const [plot, hpgl] = await save("#export-hpgl");
+  assert.equal(plot, "notched.hpgl");
+  // What was saved draws the same ink when it is opened again.
+  for (const [own, content] of [[program, gcode], [plot, hpgl]]) {
+    const path = join(folder, own);
+    await writeFile(path, content);
+    await run(PENUP, ["preview", path, "--page", "80x60", "--margin", "0", "--svg", `${path}.svg`]);
+    sameInk(await readFile(`${path}.svg`, "utf8"), svg);
+  }
   assert.deepEqual([dots.readUInt32BE(16), dots.readUInt32BE(20)], [640, 480], "8 dots in a mm");
   assert.deepEqual(problems, []);
 });
@@ -604,12 +629,12 @@ test("speeds, heights and a square by hand, and a job that has stopped", async (
   await page.click("#by-hand summary");
   await page.selectOption("#jog-mm", "10");
   await page.click("[data-jog='1,0']");
-  await state("Ready");
+  await page.waitForFunction(() => window.penup.plotting.phase === "ready");
   await page.click("#heights-read");
   await page.waitForFunction(() => document.getElementById("height-down").value === "127");
   await page.fill("#height-down", "90");
   await page.press("#height-down", "Enter");
-  await state("Ready");
+  await page.waitForTimeout(300);
   await page.fill("#height-up", "5");
   await page.press("#height-up", "Enter");
   await page.waitForTimeout(300);

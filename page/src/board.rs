@@ -5,8 +5,9 @@ use crate::number::Number;
 use crate::options::text_of;
 use penup::board_table::{BOARDS, BoardRow};
 use penup::boards::host::HostBoard;
-use penup::machine::{EventRing, PulserState};
+use penup::machine::{EventRing, PulserState, Setting};
 use penup::plotter::{Board as _, Plotter};
+use penup_job::export;
 use penup_job::picture::Picture;
 use penup_job::room::Room;
 use penup_job::sampled::SampledPath;
@@ -107,6 +108,17 @@ impl Board {
         Picture { page: Page { width, height }, runs: runs.runs, step: runs.step }.svg()
     }
 
+    /// What the pins have drawn as G-code for Grbl, as the client writes it.
+    pub fn gcode(&mut self) -> String {
+        let speed = self.plotter.machine().settings().get(Setting::DrawSpeed).to_num();
+        export::gcode(&self.lines(), speed)
+    }
+
+    /// What the pins have drawn as HP-GL, as the client writes it.
+    pub fn hpgl(&mut self) -> String {
+        export::hpgl(&self.lines())
+    }
+
     /// The strokes of the last drawing in their order, in mm on the page: for each the pen, the
     /// number of points, and x and y of each.
     pub fn strokes(&mut self) -> Vec<f64> {
@@ -117,6 +129,14 @@ impl Board {
             numbers.extend(points.into_iter().flatten());
         }
         numbers
+    }
+}
+
+impl Board {
+    /// The lines that the pins have drawn.
+    fn lines(&mut self) -> Vec<export::Line> {
+        let drawn = self.pen.runs();
+        export::lines(&drawn.runs, drawn.step, export::Retracing { passes: 1, reloops: false })
     }
 }
 

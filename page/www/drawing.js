@@ -5,7 +5,7 @@ import { indexAt, penAt } from "./sheet.js";
 
 const $ = (id) => document.getElementById(id);
 const SAMPLE = 4;
-const EXPORTS = ["export-svg", "export-png"];
+const EXPORTS = ["export-svg", "export-png", "export-gcode", "export-hpgl"];
 /** Dots of a PNG in a mm, and the most on a side: as of the program's. */
 const DOTS = 8,
   MOST_DOTS = 4096;
@@ -44,7 +44,8 @@ export class Drawing {
     $("stroke-next").addEventListener("click", () => this.stroke(1));
     $("stroke-back").addEventListener("click", () => this.stroke(-1));
     $("show-up").addEventListener("change", () => view.draw());
-    $("export-svg").addEventListener("click", () => this.save("svg"));
+    for (const kind of ["svg", "gcode", "hpgl"])
+      $(`export-${kind}`).addEventListener("click", () => this.save(kind, this.computed[kind]));
     $("export-png").addEventListener("click", () => this.savePng());
   }
 
@@ -95,37 +96,22 @@ export class Drawing {
     this.view.draw();
   }
 
-  take({ path, strokes: flat, svg, report, notes }, job) {
-    const strokes = [],
-      pens = [];
-    for (let at = 0; at < flat.length; at += 2 + 2 * flat[at + 1]) {
-      const count = flat[at + 1];
-      pens.push(flat[at]);
-      strokes.push(
-        Array.from({ length: count }, (_, i) => [flat[at + 2 + 2 * i], flat[at + 3 + 2 * i]]),
-      );
-    }
+  take(computed, job) {
+    const { path, ends, pens, ink, up, notes } = computed;
     const seconds = path.length ? path[path.length - SAMPLE] : 0;
-    this.computed = { path, strokes, pens, svg, report, seconds, name: job.name, page: job.page };
-    // Where each stroke begins in time: the pen comes down there, dashes not counted.
-    this.begins = starts(path, strokes);
-    const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
-    const ink = strokes.reduce(
-      (sum, s) => sum + s.slice(1).reduce((own, p, i) => own + distance(s[i], p), 0),
-      0,
-    );
-    const up = strokes.slice(1).reduce((sum, s, i) => sum + distance(strokes[i].at(-1), s[0]), 0);
-    const used = [...new Set(pens)].sort((a, b) => a - b);
+    const strokes = ends.length / 4;
+    this.computed = { ...computed, seconds, name: job.name, page: job.page };
+    this.begins = computed.begins;
     figures($("figures"), [
       ["Time", clock(seconds)],
       ["Ink", length(ink)],
       ["Moves with the pen up", length(up)],
-      ["Strokes", String(strokes.length)],
-      ["Lifts between them", String(Math.max(0, strokes.length - 1))],
+      ["Strokes", String(strokes)],
+      ["Lifts between them", String(Math.max(0, strokes - 1))],
       ["Efficiency", `${((100 * ink) / Math.max(ink + up, 1e-9)).toFixed(1)} %`],
-      ["Pens", used.join(", ")],
+      ["Pens", pens.join(", ")],
     ]);
-    $("check-state").textContent = `${clock(seconds)} with ${strokes.length} strokes`;
+    $("check-state").textContent = `${clock(seconds)} with ${strokes} strokes`;
     $("check-problem").textContent = notes.join(" ");
     $("check-problem").hidden = !notes.length;
     $("at").max = String(seconds);
@@ -146,7 +132,15 @@ export class Drawing {
   }
 
   strokeAt() {
-    return this.begins ? this.begins.filter((begin) => begin <= this.time + 1e-3).length : 0;
+    const begins = this.begins ?? [];
+    let low = 0,
+      high = begins.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (begins[middle] <= this.time + 1e-3) low = middle + 1;
+      else high = middle;
+    }
+    return low;
   }
 
   stroke(by) {
@@ -186,15 +180,15 @@ export class Drawing {
   }
 
   *pieces(brush) {
-    const { path, strokes, seconds } = this.computed;
+    const { path, ends, seconds } = this.computed;
     const { time, view } = this;
     const end = indexAt(path, time);
     if (time < seconds) yield* view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
-    if ($("show-up").checked) yield* view.moves(brush, strokes);
+    if ($("show-up").checked) yield* view.moves(brush, ends);
     yield* view.path(brush, path, end);
     const now = penAt(path, time);
     if (time < seconds && now) yield* this.inkTo(brush, path, end, now);
-    view.marks(brush, strokes);
+    view.marks(brush, ends);
   }
 
   /** Draws the ink from the last sample to where the pen is now, and the pen. */
@@ -206,8 +200,8 @@ export class Drawing {
     this.view.pen(brush, [x, y], pen);
   }
 
-  /** Saves the picture of what the pins draw. */
-  save(kind, blob = new Blob([this.computed.svg], { type: "image/svg+xml" })) {
+  /** Saves what the pins draw as a file of this kind. */
+  save(kind, blob) {
     const address = URL.createObjectURL(blob);
     const link = Object.assign(document.createElement("a"), {
       href: address,
@@ -222,7 +216,7 @@ export class Drawing {
     const { svg, page } = this.computed;
     const dots = Math.min(DOTS, MOST_DOTS / Math.max(...page));
     const [width, height] = page.map((side) => Math.max(1, Math.round(side * dots)));
-    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+    const address = URL.createObjectURL(svg);
     try {
       const picture = Object.assign(new Image(), { src: address });
       await picture.decode();
@@ -237,29 +231,4 @@ export class Drawing {
       URL.revokeObjectURL(address);
     }
   }
-}
-
-/** The times at which the strokes begin: the pen is at their first points, in this order. */
-function starts(path, strokes) {
-  const begins = [];
-  let at = 0;
-  const count = path.length / SAMPLE;
-  for (const [[x, y]] of strokes) {
-    let found = at;
-    // The sample before the first with the pen down.
-    while (
-      found + 1 < count &&
-      !(
-        path[(found + 1) * SAMPLE + 3] > 0 &&
-        path[found * SAMPLE + 3] === 0 &&
-        Math.abs(path[found * SAMPLE + 1] - x) < 0.05 &&
-        Math.abs(path[found * SAMPLE + 2] - y) < 0.05
-      )
-    )
-      found++;
-    if (found + 1 >= count) found = at;
-    begins.push(path[found * SAMPLE]);
-    at = found + 1;
-  }
-  return begins;
 }

@@ -3,11 +3,12 @@
 
 import init, { read } from "./penup_page_files.js";
 
-const ready = init();
+let ready = null;
 
 onmessage = async ({ data: { id, call, args } }) => {
   if (call === "start") return postMessage({ id });
   try {
+    ready ??= init({ module_or_path: fetch("penup_page_files_bg.wasm") });
     await ready;
     const bytes = read(args.name, args.bytes, args.options);
     postMessage({ id, value: bytes }, [bytes.buffer]);

@@ -16,7 +16,7 @@ const LINE = 5,
 
 /** How many pieces are drawn at once, and how many in a frame at first and at least. */
 const CHUNK = 500,
-  FIRST_BUDGET = 20_000,
+  FIRST_BUDGET = 6_000,
   LEAST_BUDGET = 2_000;
 /** The times between frames in ms that let the budget of a frame shrink, or grow. */
 const SLOW = 55,
@@ -216,25 +216,29 @@ export class SheetView {
     yield drawn;
   }
 
-  /** Draws the moves with the pen up between strokes, with an arrow at the middle of each. */
-  *moves(brush, strokes) {
+  /**
+   * Draws the moves with the pen up between strokes, with an arrow at the middle of each. `ends` are
+   * x and y where each stroke begins and where it ends.
+   */
+  *moves(brush, ends) {
     const size = Math.max(0.9, 4 * this.pixel);
-    for (let first = 1; first < strokes.length; first += CHUNK) {
-      const end = Math.min(strokes.length, first + CHUNK);
+    const count = ends.length / 4;
+    for (let first = 1; first < count; first += CHUNK) {
+      const end = Math.min(count, first + CHUNK);
       const width = brush.lineWidth;
       brush.strokeStyle = brush.fillStyle = TRAVEL;
       brush.lineWidth = Math.max(0.15, 0.7 * this.pixel);
       brush.beginPath();
       for (let at = first; at < end; at++) {
-        brush.moveTo(...strokes[at - 1].at(-1));
-        brush.lineTo(...strokes[at][0]);
+        brush.moveTo(ends[4 * at - 2], ends[4 * at - 1]);
+        brush.lineTo(ends[4 * at], ends[4 * at + 1]);
       }
       brush.globalAlpha = 0.6;
       brush.stroke();
       brush.globalAlpha = 1;
       brush.beginPath();
       for (let at = first; at < end; at++) {
-        arrow(brush, strokes[at - 1].at(-1), strokes[at][0], size);
+        arrow(brush, ends.subarray(4 * at - 2, 4 * at), ends.subarray(4 * at, 4 * at + 2), size);
       }
       brush.fill();
       brush.lineWidth = width;
@@ -244,16 +248,16 @@ export class SheetView {
   }
 
   /** Marks the start of the first stroke and the end of the last one. */
-  marks(brush, strokes) {
-    if (!strokes.length) return;
+  marks(brush, ends) {
+    if (!ends.length) return;
     const radius = Math.max(0.7, 3.2 * this.pixel);
     brush.fillStyle = START;
-    disc(brush, strokes[0][0], radius);
+    disc(brush, ends.subarray(0, 2), radius);
     brush.fill();
     brush.strokeStyle = END;
     const width = brush.lineWidth;
     brush.lineWidth = Math.max(0.2, 1.4 * this.pixel);
-    disc(brush, strokes.at(-1).at(-1), radius * 1.4);
+    disc(brush, ends.subarray(-2), radius * 1.4);
     brush.stroke();
     brush.lineWidth = width;
   }

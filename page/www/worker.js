@@ -3,6 +3,7 @@
 // or to be the emulated plotter itself. Each message is {id, call, args}; each answer is
 // {id, value} or {id, error}, and what comes without being asked for is {event, …}.
 
+import { summary } from "./strokes.js";
 import init, { Board, Session, Sheet, fault } from "./penup_page.js";
 
 /** The time in ms after which a session gives up a plotter that says nothing. */
@@ -80,8 +81,14 @@ const calls = {
       at += part.length;
     }
     const strokes = board.strokes();
-    const svg = board.svg(page[0], page[1]);
-    return [{ path, strokes, svg, report, notes }, [path.buffer, strokes.buffer]];
+    const more = summary(path, strokes);
+    const { ends, begins } = more;
+    // As a blob it need not be copied.
+    const svg = new Blob([board.svg(page[0], page[1])], { type: "image/svg+xml" });
+    const gcode = new Blob([board.gcode()], { type: "text/plain" });
+    const hpgl = new Blob([board.hpgl()], { type: "text/plain" });
+    const value = { path, strokes, svg, gcode, hpgl, report, notes, ...more };
+    return [value, [path.buffer, strokes.buffer, ends.buffer, begins.buffer]];
   },
 
   /** Begins a session at one end of a pipe of bytes, which is a port. */
