@@ -298,6 +298,20 @@ pub enum Error {
         /// The reason.
         reason: String,
     },
+    /// The file to show is larger than the page opens.
+    #[error(
+        "{file} has {} MB, and the page opens files of up to {} MB, which is more than any plotter \
+         holds",
+        size >> 20, limit >> 20
+    )]
+    PageFileTooLarge {
+        /// The path as the user wrote it.
+        file: String,
+        /// Its size in bytes.
+        size: u64,
+        /// The largest size in bytes.
+        limit: u64,
+    },
     /// The user cancelled the job, and the plotter confirmed that it stopped.
     #[error("given up: the plot was stopped and the pen is up")]
     Interrupted,
@@ -376,6 +390,7 @@ impl Error {
             | Self::OutputTwice { .. }
             | Self::PageNotBuilt { .. }
             | Self::PageNotServed { .. }
+            | Self::PageFileTooLarge { .. }
             | Self::Picture(_) => NOT_DONE,
         }
     }

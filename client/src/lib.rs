@@ -12,10 +12,11 @@
 //! [`operate`] are the commands for the machine itself, [`ports`] finds it, and [`keyboard`] are
 //! the keys that act while it draws. Every command returns an [`outcome`].
 //!
-//! [`serve`] serves the page to a browser. [`tape`] records a job as single motor steps, and
+//! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a job as single motor steps, and
 //! [`motion_plot`] plots its speed.
 
 pub mod board;
+pub mod bridge;
 pub mod cli;
 pub mod compute;
 pub mod emulator;

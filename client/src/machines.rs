@@ -5,6 +5,7 @@ use crate::error::Error;
 use crate::link::Link;
 use crate::table::BoardRow;
 use penup_job::path::PenRuns;
+use penup_job::sampled::SampledPath;
 use penup_job::watch::PenWatch;
 use std::fs;
 use std::io;
@@ -17,6 +18,18 @@ pub trait WatchedPlotter: Link {
     /// # Errors
     /// The emulator ended, or its trace cannot be parsed.
     fn pen_runs(&mut self) -> Result<PenRuns, Error>;
+
+    /// The samples of the path of the pen since the last call ([`SampledPath`]).
+    ///
+    /// # Errors
+    /// As [`WatchedPlotter::pen_runs`].
+    fn take_path(&mut self) -> Result<Vec<f32>, Error>;
+
+    /// Forgets the path, because another drawing begins.
+    ///
+    /// # Errors
+    /// As [`WatchedPlotter::pen_runs`].
+    fn begin_again(&mut self) -> Result<(), Error>;
 
     /// Replaces an error of the link by one that says how the emulator ended. Returns other errors
     /// unchanged.
@@ -36,6 +49,7 @@ struct Emulated {
     board: &'static BoardRow,
     emulator: Box<dyn EmulatedBoard>,
     pen: PenWatch,
+    path: SampledPath,
 }
 
 /// The firmware's default step length in mm; see setting `$100`.
@@ -44,12 +58,14 @@ const STEP: f64 = 1.0 / 80.0;
 impl Emulated {
     fn start(board: &'static BoardRow) -> Result<Self, Error> {
         let emulator = emulator::boot(board).map_err(|error| not_started(board, &error))?;
-        Ok(Self { board, emulator, pen: PenWatch::new(STEP) })
+        let path = SampledPath::new([1.0 / STEP; 2]);
+        Ok(Self { board, emulator, pen: PenWatch::new(STEP), path })
     }
 
     fn follow_pins(&mut self) -> Result<(), EmulatorError> {
         for change in self.emulator.pin_changes()? {
             self.pen.change(change);
+            self.path.change(change);
         }
         Ok(())
     }
@@ -94,6 +110,7 @@ impl Link for Emulated {
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         self.follow_pins().map_err(io::Error::other)?;
         self.pen.change_pen(pen);
+        self.path.change_pen(pen);
         Ok(true)
     }
 }
@@ -102,6 +119,18 @@ impl WatchedPlotter for Emulated {
     fn pen_runs(&mut self) -> Result<PenRuns, Error> {
         self.follow_pins().map_err(|error| not_started(self.board, &error))?;
         Ok(self.pen.runs())
+    }
+
+    fn take_path(&mut self) -> Result<Vec<f32>, Error> {
+        self.follow_pins().map_err(|error| not_started(self.board, &error))?;
+        Ok(self.path.take())
+    }
+
+    fn begin_again(&mut self) -> Result<(), Error> {
+        self.follow_pins().map_err(|error| not_started(self.board, &error))?;
+        self.pen.begin_again();
+        self.path.begin_again();
+        Ok(())
     }
 
     fn explain(&mut self, error: Error) -> Error {

@@ -3,14 +3,17 @@
 //! The server listens on the loopback address alone, and every address of the page begins with a
 //! random token, which only the person who started it knows. A request for another host, as a page
 //! of the web could cause by its own name server, or from another origin, is refused. Nothing but
-//! the files of the page, and the file to draw, can be read.
+//! the files of the page, and the file to draw, can be read. If there is a [`Bridge`], the page may
+//! ask for a WebSocket to the plotter, for which it must say its origin.
 
+use crate::bridge::Bridge;
 use crate::error::Error;
 use std::collections::BTreeMap;
 use std::io::{self, Read as _, Write as _};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
 use std::path::Path;
 use std::time::Duration;
+use tungstenite::handshake::derive_accept_key;
 
 /// What a browser may load and do: everything from this server, and nothing from elsewhere.
 const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; style-src 'self'; \
@@ -24,6 +27,11 @@ const TEXT: &str = "text/plain; charset=utf-8";
 const PATIENCE: Duration = Duration::from_secs(5);
 /// The most bytes of the head of a request.
 const LONGEST_HEAD: usize = 16 << 10;
+/// The most bytes of the file to draw. It is as much as the page opens, which is far more than any
+/// plotter holds.
+const LARGEST_FILE: u64 = 64 << 20;
+/// The path of the WebSocket to the plotter.
+const PLOTTER: &str = "plotter";
 
 /// A served page.
 #[derive(Debug)]
@@ -36,6 +44,18 @@ pub struct PageServer {
     files: BTreeMap<String, Vec<u8>>,
     /// The path of the file to draw, if there is one.
     given: Option<String>,
+    bridge: Option<Bridge>,
+}
+
+/// What a request asks for, and the headers that say where it comes from.
+#[derive(Debug, Clone, Copy, Default)]
+struct Request<'a> {
+    method: &'a str,
+    url: &'a str,
+    host: Option<&'a str>,
+    origin: Option<&'a str>,
+    /// The key with which it asks for a WebSocket.
+    key: Option<&'a str>,
 }
 
 /// An answer: the status, the type of the content, and the content.
@@ -43,11 +63,16 @@ type Answer<'a> = (u16, &'static str, &'a [u8]);
 
 impl PageServer {
     /// Reads the page from `folder`, and the file to draw, and begins to listen at `port`, or at
-    /// any that is free if it is 0.
+    /// any that is free if it is 0. A page may join the plotter of `bridge`, which has a name.
     ///
     /// # Errors
-    /// The page is not built, the file cannot be read, or the port is in use.
-    pub fn new(folder: &Path, given: Option<&Path>, port: u16) -> Result<Self, Error> {
+    /// The page is not built, the file cannot be read or is too large, or the port is in use.
+    pub fn new(
+        folder: &Path,
+        given: Option<&Path>,
+        port: u16,
+        bridge: Option<(String, Bridge)>,
+    ) -> Result<Self, Error> {
         let mut files = BTreeMap::new();
         collect(folder, "", &mut files).ok();
         if !files.contains_key("index.html") {
@@ -57,12 +82,23 @@ impl PageServer {
             None => None,
             Some(path) => {
                 let unreadable = |source| Error::File { file: path.display().to_string(), source };
+                let size = std::fs::metadata(path).map_err(unreadable)?.len();
+                if size > LARGEST_FILE {
+                    return Err(Error::PageFileTooLarge {
+                        file: path.display().to_string(),
+                        size,
+                        limit: LARGEST_FILE,
+                    });
+                }
                 let bytes = std::fs::read(path).map_err(unreadable)?;
                 let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
                 files.insert("given".to_owned(), bytes);
                 Some(name)
             }
         };
+        let (name, bridge) = bridge.unzip();
+        let plotter = serde_json::json!({ "plotter": name });
+        files.insert(format!("{PLOTTER}.json"), plotter.to_string().into_bytes());
         let not_served = |reason: String| Error::PageNotServed { reason };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port));
         let listener = listener.map_err(|error| not_served(error.to_string()))?;
@@ -75,6 +111,7 @@ impl PageServer {
             token: random.iter().map(|byte| format!("{byte:02x}")).collect(),
             files,
             given,
+            bridge,
         })
     }
 
@@ -105,21 +142,23 @@ impl PageServer {
             let count = connection.read(&mut part)?;
             head.extend_from_slice(part.get(..count).unwrap_or_default());
             let mut headers = [httparse::EMPTY_HEADER; 64];
-            let mut request = httparse::Request::new(&mut headers);
-            match request.parse(&head) {
+            let mut parsed = httparse::Request::new(&mut headers);
+            match parsed.parse(&head) {
                 Ok(httparse::Status::Partial) if count > 0 && head.len() < LONGEST_HEAD => {}
-                Ok(httparse::Status::Complete(_)) => {
-                    let value = |name: &str| {
-                        let mut own = request.headers.iter();
-                        let header = own.find(|header| header.name.eq_ignore_ascii_case(name))?;
-                        Some(String::from_utf8_lossy(header.value).into_owned())
-                    };
-                    let (host, origin) = (value("Host"), value("Origin"));
-                    let method = request.method.unwrap_or_default();
-                    let url = request.path.unwrap_or_default();
-                    let (status, kind, content) =
-                        self.answer(method, url, host.as_deref(), origin.as_deref());
-                    break (status, kind, content, method != "HEAD");
+                Ok(httparse::Status::Complete(length)) => {
+                    let request = Request::of(&parsed);
+                    if let Some((bridge, key)) = self.joined(&request) {
+                        let key = derive_accept_key(key.as_bytes());
+                        let tail = head.get(length..).unwrap_or_default().to_vec();
+                        write!(
+                            connection,
+                            "HTTP/1.1 101 Switching Protocols\r\nUpgrade: websocket\r\n\
+                             Connection: Upgrade\r\nSec-WebSocket-Accept: {key}\r\n\r\n"
+                        )?;
+                        return bridge.serve(connection, tail);
+                    }
+                    let (status, kind, content) = self.answer(&request);
+                    break (status, kind, content, request.method != "HEAD");
                 }
                 _ => break (400, TEXT, b"This is no request.\n".as_slice(), true),
             }
@@ -140,35 +179,71 @@ impl PageServer {
         io::copy(&mut connection.take(LONGEST_HEAD as u64), &mut io::sink()).map(drop)
     }
 
-    /// Decides about a request by its method, its path, and the headers that say where it comes
-    /// from.
-    fn answer(
-        &self,
-        method: &str,
-        url: &str,
-        host: Option<&str>,
-        origin: Option<&str>,
-    ) -> Answer<'_> {
+    /// The bridge that a request may use, and the key with which it asks for a WebSocket. `None` if
+    /// it asks for something else, or may not.
+    fn joined<'a>(&self, request: &Request<'a>) -> Option<(&Bridge, &'a str)> {
+        let bridge = self.bridge.as_ref()?;
+        // A browser always says the origin of a WebSocket.
+        let is_own = request.origin.is_some() && self.refusal(request).is_none();
+        let is_plotter = is_own && self.name_of(request) == Some(PLOTTER);
+        Some((bridge, request.key.filter(|_| is_plotter)?))
+    }
+
+    /// Why a request is refused, wherever it leads.
+    fn refusal(&self, request: &Request<'_>) -> Option<Answer<'_>> {
         let is_own = |host: &str| self.hosts.iter().any(|own| own == host);
-        if !host.is_some_and(is_own) {
-            return (403, TEXT, b"This server answers to the address that penup printed alone.\n");
+        if !request.host.is_some_and(is_own) {
+            let said = b"This server answers to the address that penup printed alone.\n";
+            return Some((403, TEXT, said));
         }
         let from_own = |origin: &str| origin.strip_prefix("http://").is_some_and(is_own);
-        if origin.is_some_and(|origin| !from_own(origin)) {
-            return (403, TEXT, b"Pages from elsewhere may not use this server.\n");
+        if request.origin.is_some_and(|origin| !from_own(origin)) {
+            return Some((403, TEXT, b"Pages from elsewhere may not use this server.\n"));
         }
-        if !matches!(method, "GET" | "HEAD") {
-            return (405, TEXT, b"This server only shows a page.\n");
+        if !matches!(request.method, "GET" | "HEAD") {
+            return Some((405, TEXT, b"This server only shows a page.\n"));
         }
-        let path = url.split(['?', '#']).next().unwrap_or_default();
-        let behind = path.strip_prefix('/').and_then(|path| path.strip_prefix(&self.token));
-        let Some(name) = behind.and_then(|rest| rest.strip_prefix('/')) else {
-            return (403, TEXT, b"The address lacks its token: open the one that penup printed.\n");
-        };
+        if self.name_of(request).is_none() {
+            let said = b"The address lacks its token: open the one that penup printed.\n";
+            return Some((403, TEXT, said));
+        }
+        None
+    }
+
+    /// The path of a request behind the token; `None` if it does not begin with the token.
+    fn name_of<'a>(&self, request: &Request<'a>) -> Option<&'a str> {
+        let path = request.url.split(['?', '#']).next().unwrap_or_default();
+        path.strip_prefix('/')?.strip_prefix(&self.token)?.strip_prefix('/')
+    }
+
+    /// Decides about a request.
+    fn answer(&self, request: &Request<'_>) -> Answer<'_> {
+        if let Some(refusal) = self.refusal(request) {
+            return refusal;
+        }
+        let name = self.name_of(request).unwrap_or_default();
         let name = if name.is_empty() { "index.html" } else { name };
         match self.files.get(name) {
             Some(content) => (200, kind_of(name), content),
             None => (404, TEXT, b"The page has no such file.\n"),
+        }
+    }
+}
+
+impl<'a> Request<'a> {
+    fn of(parsed: &httparse::Request<'_, 'a>) -> Self {
+        let value = |name: &str| {
+            let mut own = parsed.headers.iter();
+            let header = own.find(|header| header.name.eq_ignore_ascii_case(name))?;
+            // What is no text is no host and no origin of this server either.
+            Some(std::str::from_utf8(header.value).unwrap_or_default())
+        };
+        Self {
+            method: parsed.method.unwrap_or_default(),
+            url: parsed.path.unwrap_or_default(),
+            host: value("Host"),
+            origin: value("Origin"),
+            key: value("Sec-WebSocket-Key"),
         }
     }
 }
@@ -220,7 +295,7 @@ mod tests {
         std::fs::write(folder.path().join("index.html"), "the page").expect("written");
         std::fs::write(folder.path().join("a b.obj"), "v 0 0 0").expect("written");
         let file = folder.path().join("a b.obj");
-        PageServer::new(folder.path(), Some(&file), 0).expect("a free port")
+        PageServer::new(folder.path(), Some(&file), 0, None).expect("a free port")
     }
 
     #[test]
@@ -237,12 +312,17 @@ mod tests {
         let (host, token) = (server.hosts[0].clone(), server.token.clone());
         let page = format!("/{token}/");
         let own = format!("http://{host}");
+        let answer = |method: &str, url: &str, host: Option<&str>, origin: Option<&str>| {
+            let (status, _, content) =
+                server.answer(&Request { method, url, host, origin, key: None });
+            (status, content.to_vec())
+        };
         let status = |method: &str, url: &str, host: Option<&str>, origin: Option<&str>| {
-            server.answer(method, url, host, origin).0
+            answer(method, url, host, origin).0
         };
         let get = "GET";
-        assert_eq!(server.answer(get, &page, Some(&host), None).2, b"the page");
-        assert_eq!(server.answer(get, &format!("/{token}/given"), Some(&host), None).2, b"v 0 0 0");
+        assert_eq!(answer(get, &page, Some(&host), None).1, b"the page");
+        assert_eq!(answer(get, &format!("/{token}/given"), Some(&host), None).1, b"v 0 0 0");
         assert_eq!(status(get, &page, Some(&host), Some(&own)), 200);
         for (url, host, origin, expected) in [
             // No token, a wrong one, and one that only begins right.
@@ -269,7 +349,7 @@ mod tests {
     #[test]
     fn a_page_that_is_not_built_is_an_error_that_says_so() {
         let folder = tempfile::tempdir().expect("a folder");
-        let error = PageServer::new(folder.path(), None, 0).map(drop).expect_err("refused");
+        let error = PageServer::new(folder.path(), None, 0, None).map(drop).expect_err("refused");
         assert!(error.to_string().contains("cargo xtask page"), "{error}");
     }
 }

@@ -2,13 +2,16 @@
 //! plotter, what the plotter answers, and what it then draws.
 //!
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
-//! has the words of the serial line, and reads the replies. [`view`] says from where a model is
-//! seen. [`twin`] computes what the plotter must then
-//! contain, and [`room`] the memory that takes. [`pins`] and [`watch`] follow the pen to its
-//! [`path`], [`streamed`] makes lines of what this computer has computed, [`strokes`] and [`results`] tell what was drawn, and [`picture`] shows it.
+//! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a user
+//! wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes what the
+//! plotter must then contain, and [`room`] the memory that takes. [`streamed`] makes lines of what
+//! this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], of which
+//! [`sampled`] keeps what a page shows; [`strokes`] and [`results`] tell what was drawn, [`picture`]
+//! shows it, and [`export`] writes it for other machines.
 //!
 //! Nothing here opens a file or a port, starts a thread, or reads a clock.
 
+pub mod export;
 mod job;
 pub mod path;
 pub mod picture;
@@ -16,10 +19,12 @@ pub mod pins;
 pub mod protocol;
 pub mod results;
 pub mod room;
+pub mod sampled;
 pub mod streamed;
 pub mod strokes;
 pub mod twin;
 pub mod view;
 pub mod watch;
+pub mod wishes;
 
 pub use job::{Job, Settings};

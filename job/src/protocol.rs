@@ -73,6 +73,8 @@ pub const RESUME: u8 = b'~';
 pub const SLOWER: u8 = 0x92;
 /// See [`SLOWER`].
 pub const FASTER: u8 = 0x91;
+/// Sets all speeds to those in the settings.
+pub const AS_SET: u8 = 0x90;
 /// Aborts whatever is going on, raises the pen and makes the plotter answer with its greeting.
 pub const ABORT: u8 = 0x18;
 

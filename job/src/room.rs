@@ -7,9 +7,10 @@ use penup::index::Index;
 use penup::plotter::EMPTY_LOOKAHEAD;
 use penup::plotter::MemorySlices;
 use penup_readers::lines::Lines;
+use serde::{Deserialize, Serialize};
 
 /// The capacities of a plotter's memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Room {
     /// The number of vertices.
     pub vertices: usize,
@@ -31,6 +32,11 @@ impl Room {
     const BYTES_A_CORNER: usize = 256;
     /// The number of chords into which the piece of a curve at one control point may be divided.
     const CHORDS: usize = 64;
+
+    /// Returns what is enough for any model that a board holds in its working memory.
+    pub fn usual() -> Self {
+        Self { vertices: 1 << 15, corners: 1 << 16, words: 1 << 19, blocks: EMPTY_LOOKAHEAD.len() }
+    }
 
     /// Returns what is enough for the model that `lines` send.
     pub fn for_job(lines: &dyn Lines) -> Self {
@@ -54,6 +60,20 @@ impl Room {
             + Self::BYTES_A_VERTEX * (vertices + chords)
             + Self::BYTES_A_CORNER * (corners + 2 * chords);
         Self { vertices, corners, words: bytes / 8, blocks: EMPTY_LOOKAHEAD.len() }
+    }
+
+    /// The same with so many times the memory to work in, for numbers that are so much wider.
+    #[must_use]
+    pub fn with_words(self, times: usize) -> Self {
+        Self { words: times * self.words, ..self }
+    }
+
+    /// Whether this fits in `other`.
+    pub fn fits(self, other: Self) -> bool {
+        self.vertices <= other.vertices
+            && self.corners <= other.corners
+            && self.words <= other.words
+            && self.blocks <= other.blocks
     }
 
     /// Returns what a board has.

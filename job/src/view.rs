@@ -22,6 +22,44 @@ pub const NAMED_VIEWS: [(&str, Viewpoint); 6] = [
     ("bottom", Viewpoint { azimuth: -90.0, elevation: -90.0 }),
 ];
 
+/// One of the options that choose the eye by its direction. The flags of the command line and the
+/// controls of the page are made from it.
+#[derive(Debug, Clone, Copy)]
+pub struct ViewOption {
+    /// The name of the option, as in `--name`.
+    pub name: &'static str,
+    /// What stands for the value in the help; empty if the option takes none.
+    pub value: &'static str,
+    /// What the help says.
+    pub help: &'static str,
+}
+
+/// The side from which a model is seen, one of [`NAMED_VIEWS`].
+pub const VIEW: ViewOption =
+    ViewOption { name: "view", value: "SIDE", help: "See the model from this side" };
+/// The angle about the vertical.
+pub const AZIMUTH: ViewOption = ViewOption {
+    name: "azimuth",
+    value: "DEGREES",
+    help: "See the model from this angle about the vertical, with any projection: -90 is in front, \
+           0 on the right [default: -59]",
+};
+/// The angle above the horizontal.
+pub const ELEVATION: ViewOption = ViewOption {
+    name: "elevation",
+    value: "DEGREES",
+    help: "See the model from this angle above the horizontal, with any projection [default: 30]",
+};
+/// What is up in the file.
+pub const Y_UP: ViewOption = ViewOption {
+    name: "y-up",
+    value: "",
+    help: "The file has y up: the model stands upright, and its front is at positive z",
+};
+
+/// The greatest angle about the vertical, and above the horizontal, in degrees.
+pub const MOST_DEGREES: [f64; 2] = [360.0, 90.0];
+
 /// The plotter's own choice, a three-quarter view, as a direction where z is up.
 pub const THREE_QUARTER: Vector = [0.45, -0.75, 0.5];
 
@@ -29,6 +67,25 @@ pub const THREE_QUARTER: Vector = [0.45, -0.75, 0.5];
 const EYE_DISTANCE: f64 = 3.5;
 
 impl Viewpoint {
+    /// The direction that these values of the options choose; `None` if there are none. Where only
+    /// one angle is given, the other is that of the three-quarter view.
+    pub fn chosen(
+        side: Option<&str>,
+        azimuth: Option<f64>,
+        elevation: Option<f64>,
+    ) -> Option<Self> {
+        let named = NAMED_VIEWS.iter().find(|(own, _)| Some(*own) == side);
+        let usual = Self::three_quarter();
+        match (named, azimuth, elevation) {
+            (Some((_, view)), _, _) => Some(*view),
+            (None, None, None) => None,
+            (None, azimuth, elevation) => Some(Self {
+                azimuth: azimuth.unwrap_or(usual.azimuth),
+                elevation: elevation.unwrap_or(usual.elevation),
+            }),
+        }
+    }
+
     /// The three-quarter view.
     pub fn three_quarter() -> Self {
         let [x, y, z] = THREE_QUARTER;

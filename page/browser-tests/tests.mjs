@@ -52,17 +52,23 @@ const saved = (name) => PENUP_PICTURES && page.screenshot({ path: join(PENUP_PIC
 /** Waits until the whole drawing is computed, and returns its figures. */
 async function computed() {
   await page.waitForFunction(() => window.penup.drawing.computed);
-  return page.evaluate(() => {
-    const { strokes, pens, svg, seconds } = window.penup.drawing.computed;
-    return { strokes, pens, svg, seconds };
+  return page.evaluate(async () => {
+    const { strokes: flat, svg, seconds } = window.penup.drawing.computed;
+    const [strokes, pens] = [[], []];
+    for (let at = 0; at < flat.length; at += 2 + 2 * flat[at + 1]) {
+      pens.push(flat[at]);
+      const points = Array.from({ length: flat[at + 1] }, (_, i) => at + 2 + 2 * i);
+      strokes.push(points.map((point) => [flat[point], flat[point + 1]]));
+    }
+    return { strokes, pens, svg: await svg.text(), seconds };
   });
 }
 
 /** What `penup preview` makes of the command that the page shows. */
-async function preview(file) {
+async function preview(file, ...more) {
   const words = (await page.inputValue("#command")).split(" ").slice(3);
   const [svg, json] = [join(folder, "plot.svg"), join(folder, "plot.json")];
-  await run(PENUP, ["preview", file, ...words, "--svg", svg, "--json", json]);
+  await run(PENUP, ["preview", file, ...words, ...more, "--svg", svg, "--json", json]);
   return { svg: await readFile(svg, "utf8"), ...JSON.parse(await readFile(json, "utf8")) };
 }
 
@@ -235,9 +241,7 @@ test("keys, undo, names of controls", async () => {
   const flags = [...stdout.matchAll(/^ +--([a-z-]+)/gm)].map(([, name]) => name);
   const own = new Set(
     (
-      "landscape svg png json motion set repeat board machine quiet " +
-      "view azimuth elevation y-up layer scale rotate hatch center crop linemerge simplify " +
-      "layer-order"
+      "svg png json motion set repeat board machine quiet gcode hpgl"
     ).split(" "),
   );
   for (const name of flags.filter((flag) => !own.has(flag))) {
@@ -300,50 +304,379 @@ test("without a network it works once it was loaded", async () => {
   await page.context().setOffline(false);
 });
 
+/** Starts `penup page` with these arguments. Returns its address, and how to end it. */
+async function program(...more) {
+  const started = spawn(PENUP, ["page", ...more, "--no-browser", "--folder", process.env.PENUP_PAGE]);
+  let said = "";
+  started.stderr.on("data", (text) => (said += text));
+  const address = await new Promise((done, fail) => {
+    started.stdout.once("data", (line) => done(String(line).trim()));
+    started.once("exit", () => fail(new Error(`penup page ended: ${said}`)));
+  });
+  return { ...splitAddress(address), address, end: () => started.kill() };
+}
+
+function splitAddress(address) {
+  const { origin, pathname, port, hash } = new URL(address);
+  return { origin, pathname, port, hash, folder: origin + pathname };
+}
+
+/** Asks a server. Returns the status; 101 if it opens a WebSocket, which then is `socket`. */
+function ask({ port }, path, headers) {
+  return new Promise((done, fail) => {
+    request({ host: "127.0.0.1", port, path, headers })
+      .on("response", (answer) => {
+        answer.resume();
+        done({ status: answer.statusCode });
+      })
+      .on("upgrade", (_, socket, head) => done({ status: 101, socket, head }))
+      .on("error", fail)
+      .end();
+  });
+}
+
+const WEBSOCKET = {
+  Connection: "Upgrade",
+  Upgrade: "websocket",
+  "Sec-WebSocket-Version": "13",
+  "Sec-WebSocket-Key": "dGhlIHNhbXBsZSBub25jZQ==",
+};
+
 test("penup page serves the file to its owner alone", async () => {
-  const program = spawn(PENUP, [
-    "page",
-    scene("notched"),
-    "--no-browser",
-    "--folder",
-    process.env.PENUP_PAGE,
-  ]);
+  const own = await program(scene("notched"));
   try {
-    const address = await new Promise((done) =>
-      program.stdout.once("data", (line) => done(String(line).trim())),
-    );
-    assert.match(address, /^http:\/\/127\.0\.0\.1:\d+\/[0-9a-f]{32}\/#given=notched\.obj$/);
-    const { origin, pathname, port } = new URL(address);
-    await fresh(new URL(address).hash, { address: origin + pathname });
+    assert.match(own.address, /^http:\/\/127\.0\.0\.1:\d+\/[0-9a-f]{32}\/#given=notched\.obj$/);
+    const { pathname } = own;
+    await fresh(own.hash, { address: own.folder });
     assert.match(await text("#file-name"), /^notched\.obj/);
     await computed();
     assert.deepEqual(problems, []);
-    const ask = (path, headers) =>
-      new Promise((done, fail) => {
-        request({ host: "127.0.0.1", port, path, headers }, (answer) => {
-          answer.resume();
-          done(answer.statusCode);
-        })
-          .on("error", fail)
-          .end();
-      });
-    assert.equal(await ask(pathname, {}), 200);
-    assert.equal(await ask("/", {}), 403, "no token");
-    assert.equal(await ask(pathname.replace(/[0-9a-f]/, "x"), {}), 403, "a wrong token");
+    const status = async (path, headers) => (await ask(own, path, headers)).status;
+    assert.equal(await status(pathname, {}), 200);
+    assert.equal(await status("/", {}), 403, "no token");
+    assert.equal(await status(pathname.replace(/[0-9a-f]/, "x"), {}), 403, "a wrong token");
     assert.equal(
-      await ask(pathname, { Host: "evil.example" }),
+      await status(pathname, { Host: "evil.example" }),
       403,
       "another name of this computer",
     );
     assert.equal(
-      await ask(pathname, { Origin: "http://evil.example" }),
+      await status(pathname, { Origin: "http://evil.example" }),
       403,
       "a page from elsewhere",
     );
-    assert.equal(await ask(`${pathname}../../../etc/passwd`, {}), 404);
+    assert.equal(await status(`${pathname}../../../etc/passwd`, {}), 404);
+    const own_origin = { ...WEBSOCKET, Origin: own.origin };
+    assert.equal(await status(`${pathname}plotter`, own_origin), 404, "no plotter is joined");
   } finally {
-    program.kill();
+    own.end();
   }
+  const huge = join(folder, "huge.svg");
+  await writeFile(huge, "");
+  await truncate(huge, 200 << 20);
+  await assert.rejects(program(huge), /200 MB/);
+});
+
+test("through the client: turn, dash, plot, hold, resume; the ink is the preview's", async () => {
+  const own = await program(scene("lattice3"), "--board", "lm3s6965");
+  try {
+    await fresh(own.hash, { address: own.folder });
+    await page.focus("#sheet");
+    for (let at = 0; at < 3; at++) await page.keyboard.press("ArrowLeft");
+    await page.selectOption("#option-hidden", "dashed");
+    const drawn = await computed();
+    const expected = await preview(scene("lattice3"), "--board", "lm3s6965");
+    assert.deepEqual(drawn.strokes, expected.strokes, "page and preview --board");
+    await page.click("#tab-draw");
+    assert.equal(await page.inputValue("#plotter"), "program");
+    await page.click("#connect");
+    await state("Ready");
+    await page.click("#plot");
+    await state("Drawing");
+    await page.click("#hold");
+    await state("Held");
+    assert.equal(await page.locator("#hold").isDisabled(), true);
+    const count = () => page.evaluate(() => window.penup.plotting.count);
+    // It slows down first; then it stands.
+    for (let last = -1, now = await count(); last !== now; [last, now] = [now, await count()])
+      await page.waitForTimeout(400);
+    const held = await count();
+    // Another page, and others than the owner, do the job no harm.
+    const other = await browser.newPage();
+    await other.goto(own.folder + own.hash);
+    await other.waitForSelector("html[data-ready]");
+    await other.click("#tab-draw");
+    await other.click("#connect");
+    await other.waitForFunction(() =>
+      /Another page/.test(document.getElementById("plot-problem").textContent),
+    );
+    await other.close();
+    const path = `${own.pathname}plotter`;
+    const status = async (from, headers) =>
+      (await ask(own, from, { ...WEBSOCKET, ...headers })).status;
+    assert.equal(await status(path, {}), 404, "no origin");
+    assert.equal(await status(path, { Origin: "http://evil.example" }), 403);
+    assert.equal(await status(path, { Origin: own.origin, Host: "evil.example" }), 403);
+    assert.equal(await status("/0123/plotter", { Origin: own.origin }), 403, "a wrong token");
+    // The page goes, and somebody with the token sends 200 MB, and then what is no frame.
+    await page.click("#disconnect");
+    const masked = (size) => {
+      const head = Buffer.alloc(14);
+      head.writeUInt16BE(0x82ff);
+      head.writeBigUInt64BE(BigInt(size), 2);
+      return head;
+    };
+    for (const [bytes, code] of [
+      [masked(200 << 20), 1009],
+      [Buffer.from([0xf3, 0x81, 0, 0, 0, 0, 7]), 1002],
+    ]) {
+      assert.equal(await refusedWith(own, path, bytes), code);
+    }
+    // A page that comes back follows the job.
+    await page.click("#connect");
+    await state("Held");
+    assert.equal(await count(), 0, "nothing moved meanwhile");
+    await page.click("#resume");
+    await page.waitForFunction(
+      () => document.getElementById("plot-state").textContent === "Ready.",
+      undefined,
+      { timeout: 120_000 },
+    );
+    assert.ok(held > 0 && (await count()) > 0);
+    // Once more, whole: the ink from the pins of the firmware is that of the preview.
+    await page.click("#plot");
+    await page.waitForFunction(
+      () => document.getElementById("plot-state").textContent.startsWith("Drawn"),
+      undefined,
+      { timeout: 120_000 },
+    );
+    const ink = await page.evaluate(() => {
+      const { path, count } = window.penup.plotting;
+      return [...path.subarray(0, count)];
+    });
+    sameSegments(segmentsOfPath(ink), segmentsOf(expected.svg));
+    assert.deepEqual(problems, []);
+  } finally {
+    own.end();
+  }
+});
+
+/** The code with which a WebSocket is closed at which somebody with the token sends `bytes`. */
+async function refusedWith(own, path, bytes) {
+  for (let tries = 0; tries < 50; tries++) {
+    const { socket, head } = await ask(own, path, { ...WEBSOCKET, Origin: own.origin });
+    socket.write(bytes);
+    const parts = [head];
+    for await (const part of socket) {
+      parts.push(part);
+      const all = Buffer.concat(parts);
+      const close = all.indexOf(0x88);
+      if (close >= 0 && all.length >= close + 4) {
+        socket.destroy();
+        break;
+      }
+    }
+    const all = Buffer.concat(parts);
+    const code = all.readUInt16BE(all.indexOf(0x88) + 2);
+    // The place of the one before is not free yet.
+    if (code !== 4000) return code;
+    await new Promise((done) => setTimeout(done, 100));
+  }
+  return 4000;
+}
+
+test("SVG and PLY are read when they are opened, and plans are arranged", async () => {
+  await fresh("#file=notched.obj");
+  const asked = () =>
+    page.evaluate(() => performance.getEntriesByType("resource").map((it) => it.name).join());
+  assert.doesNotMatch(await asked(), /reader\.js/, "not before it is needed");
+  const svg = join(folder, "house.svg");
+  await writeFile(
+    svg,
+    `<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">
+    <g id="walls"><path d="M20 50V30L40 15L60 30V50Z" fill="red" stroke="black"/></g>
+    <circle cx="40" cy="38" r="6" fill="none" stroke="blue"/></svg>`,
+  );
+  await page.setInputFiles("#file", svg);
+  await page.waitForFunction(() => /house/.test(document.getElementById("file-name").textContent));
+  const same = async (file) => {
+    const drawn = await computed();
+    const expected = await preview(file);
+    assert.deepEqual(drawn.strokes, expected.strokes);
+    assert.deepEqual(drawn.pens, expected.stroke_pens);
+    assert.equal(drawn.svg, expected.svg);
+  };
+  await same(svg);
+  const set = async (name, value) => {
+    await page.evaluate(() => (window.penup.drawing.computed = null));
+    await page.fill(`#option-${name}`, value);
+    await page.press(`#option-${name}`, "Enter");
+  };
+  await set("hatch", "2,30");
+  await same(svg);
+  await set("scale", "1.25");
+  await page.evaluate(() => (window.penup.drawing.computed = null));
+  await page.check("#option-center");
+  await same(svg);
+  await set("crop", "nowhere");
+  await page.waitForSelector("#option-crop-problem:not([hidden])");
+  await set("crop", "");
+  const ply = join(folder, "square.ply");
+  await writeFile(
+    ply,
+    "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n" +
+      "property float z\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n" +
+      "0 0 0\n1 0 0\n1 1 0.2\n0 1 0.2\n4 0 1 2 3\n",
+  );
+  await page.evaluate(() => (window.penup.drawing.computed = null));
+  await page.setInputFiles("#file", ply);
+  await page.waitForFunction(() => /square/.test(document.getElementById("file-name").textContent));
+  await same(ply);
+  // What cannot be read is an error, and the next file is read all the same.
+  const nested = join(folder, "nested.svg");
+  const depth = 60_000;
+  await writeFile(
+    nested,
+    `<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">${"<g>".repeat(depth)}<path d="M0 0H9"/>` +
+      `${"</g>".repeat(depth)}</svg>`,
+  );
+  await page.setInputFiles("#file", nested);
+  await page.waitForFunction(() => /nested/.test(document.querySelector("#error p").textContent));
+  assert.match(await text("#file-name"), /square/);
+  await page.setInputFiles("#file", svg);
+  await page.waitForFunction(() => /house/.test(document.getElementById("file-name").textContent));
+});
+
+test("a model is seen from a side, upright, and a drag turns it from there", async () => {
+  await fresh("#file=lblock.obj");
+  await page.selectOption("#option-view", "right");
+  await page.check("#option-y-up");
+  const drawn = await computed();
+  assert.deepEqual(drawn.strokes, (await preview(scene("lblock"))).strokes);
+  await page.focus("#sheet");
+  await page.keyboard.press("ArrowLeft");
+  await page.keyboard.press("ArrowUp");
+  assert.match(await page.inputValue("#command"), /--eye/);
+  assert.doesNotMatch(await page.inputValue("#command"), /--view/);
+  assert.match(await page.inputValue("#command"), /--y-up/);
+  await page.waitForFunction(() => window.penup.drawing.computed);
+  assert.deepEqual((await computed()).strokes, (await preview(scene("lblock"))).strokes);
+  assert.deepEqual(problems, []);
+});
+
+test("touch: one finger turns, two zoom and move", async () => {
+  await fresh("#file=notched.obj");
+  const box = await page.locator("#sheet").boundingBox();
+  const [x, y] = [Math.round(box.x + box.width / 2), Math.round(box.y + box.height / 2)];
+  const session = await page.context().newCDPSession(page);
+  const touch = (type, ...points) =>
+    session.send("Input.dispatchTouchEvent", {
+      type,
+      touchPoints: points.map(([px, py], id) => ({ x: px, y: py, id })),
+    });
+  await touch("touchStart", [x, y]);
+  for (let at = 1; at < 8; at++) await touch("touchMove", [x + 9 * at, y + 3 * at]);
+  await touch("touchEnd");
+  const eye = await page.inputValue("#option-eye");
+  assert.notEqual(eye, "", "one finger turns");
+  const sheet = () =>
+    page.evaluate(() => ({ zoom: window.penup.view.zoom, offset: window.penup.view.offset }));
+  const before = await sheet();
+  await touch("touchStart", [x - 40, y], [x + 40, y]);
+  for (let at = 1; at < 8; at++)
+    await touch("touchMove", [x - 40 - 5 * at, y + 6 * at], [x + 40 + 5 * at, y + 6 * at]);
+  await touch("touchEnd");
+  const after = await sheet();
+  assert.ok(after.zoom > before.zoom * 1.5, `two fingers zoom: ${after.zoom}`);
+  assert.ok(after.offset[1] > before.offset[1] + 20, "two fingers move");
+  assert.equal(await page.inputValue("#option-eye"), eye, "two fingers do not turn");
+  assert.deepEqual(problems, []);
+});
+
+test("pictures are saved, as SVG and as PNG", async () => {
+  await fresh("#file=notched.obj&page=80x60");
+  const { svg } = await computed();
+  await page.click("#tab-check");
+  const save = async (button) => {
+    const [download] = await Promise.all([page.waitForEvent("download"), page.click(button)]);
+    return [download.suggestedFilename(), await readFile(await download.path())];
+  };
+  const [name, bytes] = await save("#export-svg");
+  assert.equal(name, "notched.svg");
+  assert.equal(bytes.toString(), svg);
+  const [picture, dots] = await save("#export-png");
+  assert.equal(picture, "notched.png");
+  assert.equal(dots.toString("latin1", 1, 4), "PNG");
+  const [program, gcode] = await save("#export-gcode");
+  assert.equal(program, "notched.gcode");
+  const [plot, hpgl] = await save("#export-hpgl");
+  assert.equal(plot, "notched.hpgl");
+  // What was saved draws the same ink when it is opened again.
+  for (const [own, content] of [[program, gcode], [plot, hpgl]]) {
+    const path = join(folder, own);
+    await writeFile(path, content);
+    await run(PENUP, ["preview", path, "--page", "80x60", "--margin", "0", "--svg", `${path}.svg`]);
+    sameInk(await readFile(`${path}.svg`, "utf8"), svg);
+  }
+  assert.deepEqual([dots.readUInt32BE(16), dots.readUInt32BE(20)], [640, 480], "8 dots in a mm");
+  assert.deepEqual(problems, []);
+});
+
+test("speeds, heights and a square by hand, and a job that has stopped", async () => {
+  await fresh("#file=lattice3.obj");
+  await page.click("#tab-draw");
+  await page.selectOption("#pace", "1000");
+  await page.click("#by-hand summary");
+  await page.selectOption("#jog-mm", "10");
+  await page.click("[data-jog='1,0']");
+  await page.waitForFunction(() => window.penup.plotting.phase === "ready");
+  await page.click("#heights-read");
+  await page.waitForFunction(() => document.getElementById("height-down").value === "127");
+  await page.fill("#height-down", "90");
+  await page.press("#height-down", "Enter");
+  await page.waitForTimeout(300);
+  await page.fill("#height-up", "5");
+  await page.press("#height-up", "Enter");
+  await page.waitForTimeout(300);
+  await page.fill("#height-up", "");
+  await page.click("#heights-read");
+  await page.waitForFunction(() => document.getElementById("height-up").value === "5");
+  await page.waitForTimeout(300);
+  await page.evaluate(() => window.penup.plotting.clear());
+  await page.click("#test-square");
+  await page.waitForFunction(() => {
+    const { path, count } = window.penup.plotting;
+    const [xs, ys] = [[], []];
+    for (let at = 0; at < count; at += 4) {
+      if (path[at + 3]) xs.push(path[at + 1]), ys.push(path[at + 2]);
+    }
+    const span = (list) => Math.max(...list) - Math.min(...list);
+    return xs.length && Math.abs(span(xs) - 20) < 0.02 && Math.abs(span(ys) - 20) < 0.02;
+  });
+  await page.selectOption("#pace", "5");
+  await page.click("#plot");
+  await state("Drawing");
+  const percent = (want) =>
+    page.waitForFunction(
+      (shown) => document.getElementById("percent").textContent === shown,
+      `${want} %`,
+    );
+  await page.click("#faster");
+  await percent(110);
+  await page.click("#slower");
+  await percent(100);
+  await page.click("#slower");
+  await percent(90);
+  await page.click("#as-set");
+  await percent(100);
+  await page.click("#give-up");
+  await state("Given up");
+  // The emulated plotter of the page keeps no jobs, so the status of one that does is said here.
+  await page.evaluate(() =>
+    window.penup.plotting.follow({ state: "Idle", position: [], percent: 100, stopped: [4, 9] }),
+  );
+  assert.match(await text("#stopped p"), /4 of 9 strokes/);
+  assert.deepEqual(problems, []);
 });
 
 test("dark, and on a phone", async () => {
@@ -370,11 +703,26 @@ function inkOf(svg) {
     .map(([, path]) => path.split("L").map((point) => point.split(" ").map(Number)));
 }
 
+/** The inked segments of a picture. */
+const segmentsOf = (svg) =>
+  inkOf(svg).flatMap((path) => path.slice(1).map((to, at) => [path[at], to]));
+
+/** The inked segments of samples of a path, as of a picture: with y downwards on A4. */
+function segmentsOfPath(path, height = 297) {
+  const segments = [];
+  for (let at = 4; at < path.length; at += 4) {
+    const [x0, y0] = path.slice(at - 3, at - 1);
+    const [x1, y1, pen] = path.slice(at + 1, at + 4);
+    if (pen) segments.push([[x0, height - y0], [x1, height - y1]]);
+  }
+  return segments;
+}
+
 /** Checks that two pictures have the same ink, however it is cut into strokes. */
-function sameInk(one, other) {
-  const segments = (svg) =>
-    inkOf(svg).flatMap((path) => path.slice(1).map((to, at) => [path[at], to]));
-  const [a, b] = [segments(one), segments(other)];
+const sameInk = (one, other) => sameSegments(segmentsOf(one), segmentsOf(other));
+
+/** Checks that segments have the same ink, but for the steps between two samples. */
+function sameSegments(a, b) {
   const length = (list) =>
     list.reduce((sum, [p, q]) => sum + Math.hypot(q[0] - p[0], q[1] - p[1]), 0);
   assert.ok(Math.abs(length(a) - length(b)) < 0.2, `${length(a)} and ${length(b)} mm of ink`);

@@ -19,6 +19,10 @@ pub enum Event {
         strokes: Option<(u64, u64)>,
         ink: Option<(f64, f64)>,
         left: Option<f64>,
+        /// The speeds in percent of those in the settings.
+        percent: u16,
+        /// The strokes done and all of a job that has stopped and can go on.
+        stopped: Option<(u64, u64)>,
     },
     /// The plotter waits for this pen.
     Pen { pen: u8 },

@@ -12,6 +12,7 @@
 mod board;
 mod delivery;
 mod event;
+mod number;
 mod options;
 mod phase;
 mod session;
@@ -23,7 +24,7 @@ pub use board::{Board, boards};
 pub use options::{NamedValues, options, pages};
 pub use session::Session;
 pub use sheet::Sheet;
-pub use source::{file_extensions, file_names};
+pub use source::needs_readers;
 
 use std::sync::{Mutex, Once};
 use wasm_bindgen::prelude::wasm_bindgen;

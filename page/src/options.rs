@@ -1,11 +1,21 @@
 //! Describes the options for the page's controls, from the library's table.
 
+use crate::source::Source;
+use crate::words::{for_page, sentence};
 use penup::plotter::{OPTIONS, PlotOptions};
 use penup::protocol::Escape;
 use penup_job::Settings;
-use penup_readers::page::{NAMED_PAGES, Page};
+use penup_job::view::{
+    AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
+};
+use penup_job::wishes::{Wishes, page_value};
+use penup_readers::PLAN_OPTIONS;
+use penup_readers::page::{A4, NAMED_PAGES, Page};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
+
+/// The name of the option for the size of the page.
+const PAGE: &str = "page";
 
 /// A control of the page.
 #[derive(Serialize)]
@@ -24,15 +34,21 @@ struct Control {
     default: Option<String>,
 }
 
+/// The names of the option that lays the page on its long side, and of its values.
+const LANDSCAPE: &str = "landscape";
+const WHEN: &[&str] = &["always", "auto"];
+const WHEN_MEANS: &[&str] = &["On its long side", "On its long side if a plan is wider than high"];
+
 /// The controls as JSON: an array with the name, heading, help, values and default of each option
-/// that a user sets, in the order of the library's table.
+/// that a user sets, in the order of the tables of the library, the views, and the readers.
 #[wasm_bindgen]
 pub fn options() -> String {
-    let controls = OPTIONS.iter().filter_map(|option| {
-        let flag = option.flag.get()?;
+    let mut controls = Vec::new();
+    for option in OPTIONS {
+        let Some(flag) = option.flag.get() else { continue };
         // The row after an option may explain more values of it.
         let same = OPTIONS.iter().filter(|other| other.name == option.name);
-        Some(Control {
+        controls.push(Control {
             name: option.name,
             heading: flag.heading,
             help: flag.help,
@@ -41,9 +57,60 @@ pub fn options() -> String {
             is_switch: flag.is_switch,
             range: option.range(),
             default: default_of(option.name),
-        })
+        });
+        if option.name == PAGE {
+            controls.push(Control {
+                values: WHEN.to_vec(),
+                choices: WHEN_MEANS,
+                is_switch: false,
+                ..Control::new(LANDSCAPE, flag.heading, "", "Lay the page on its long side")
+            });
+        }
+    }
+    let sides = NAMED_VIEWS.map(|(name, _)| name).to_vec();
+    let views = [VIEW, AZIMUTH, ELEVATION, Y_UP].map(|option| {
+        let control = Control::new(option.name, "Camera", option.value, option.help);
+        if option.name == VIEW.name {
+            Control { values: sides.clone(), ..control }
+        } else {
+            control
+        }
     });
-    text_of(&controls.collect::<Vec<_>>())
+    // They stand with the other options of the camera.
+    let behind = controls.iter().rposition(|control| control.heading == "Camera");
+    let behind = behind.map_or(controls.len(), |at| at + 1);
+    controls.splice(behind..behind, views);
+    controls.extend(PLAN_OPTIONS.iter().map(|option| {
+        let heading = "Plan: a drawing of straight lines at one height";
+        Control::new(option.name, heading, option.value, option.help)
+    }));
+    text_of(&controls)
+}
+
+impl Control {
+    /// A control for a value with this placeholder, or a switch if that is empty.
+    fn new(
+        name: &'static str,
+        heading: &'static str,
+        placeholder: &'static str,
+        help: &'static str,
+    ) -> Self {
+        Self {
+            name,
+            heading,
+            help,
+            values: Some(placeholder).filter(|it| !it.is_empty()).into_iter().collect(),
+            choices: &[],
+            is_switch: placeholder.is_empty(),
+            range: None,
+            default: None,
+        }
+    }
+}
+
+/// Whether the option with this name arranges plans, which `penup-page-files` does.
+pub(crate) fn is_of_plans(name: &str) -> bool {
+    name == LANDSCAPE || PLAN_OPTIONS.iter().any(|option| option.name == name)
 }
 
 /// The pages that have names as JSON: an array of pairs of the name and the value of the option.
@@ -80,27 +147,94 @@ impl NamedValues {
             .map_err(|error| format!("The page sent its settings in a wrong form: {error}"))
     }
 
-    /// The settings of a job: every option with the value that it was given, or else its default,
-    /// as the client sends them.
-    pub fn settings(&self) -> Settings {
-        let given = |name: &str| {
-            let value = self.0.iter().rfind(|(own, _)| own == name);
-            value.map(|(name, value)| as_sent(name, value))
-        };
+    /// The names of the options.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.0.iter().map(|(name, _)| name.as_str())
+    }
+
+    /// The value that an option was given; `None` if it was given none.
+    fn given(&self, name: &str) -> Option<&str> {
+        self.0.iter().rfind(|(own, _)| own == name).map(|(_, value)| value.trim())
+    }
+
+    /// The settings of a job that draws `source`: every option with the value that it was given, or
+    /// else its default, as the client sends them.
+    ///
+    /// # Errors
+    /// A sentence for the user: values contradict each other, or the file.
+    pub fn settings_for(&self, source: &Source) -> Result<Settings, String> {
+        let mut page = source.page;
+        if let (Some(named), false) = (self.page()?, source.is_arranged) {
+            page.sheet = named;
+        }
+        let settings = self.wishes()?.settings_for(&page, &*source.lines);
+        settings.map_err(|reason| for_page(&sentence(&reason)))
+    }
+
+    /// What the user wishes.
+    fn wishes(&self) -> Result<Wishes, String> {
         let flags = OPTIONS.iter().filter(|option| option.flag.get().is_some());
-        let values: Vec<_> = flags
+        let mut values: Vec<_> = flags
             .filter_map(|option| {
-                Some((option.name, given(option.name).or_else(|| default_of(option.name))?))
+                let given = self.given(option.name).map(|value| as_sent(option.name, value));
+                Some((option.name, given.or_else(|| default_of(option.name))?))
             })
             .collect();
-        let mut settings = Settings { page: Page { width: 210.0, height: 297.0 }, values };
-        let page = settings.value("page").and_then(|page| page.split_once('x'));
-        if let Some((Ok(width), Ok(height))) =
-            page.map(|(width, height)| (width.parse(), height.parse()))
-        {
-            settings.page = Page { width, height };
+        let angle = |option: ViewOption, most: f64| match self.given(option.name) {
+            None => Ok(None),
+            Some(text) => match text.parse::<f64>() {
+                Ok(angle) if angle.abs() <= most => Ok(Some(angle)),
+                _ => Err(format!(
+                    "\u{201c}{}\u{201d} is a number of degrees from -{most} to {most}.",
+                    option.name
+                )),
+            },
+        };
+        let (azimuth, elevation) =
+            (angle(AZIMUTH, MOST_DEGREES[0])?, angle(ELEVATION, MOST_DEGREES[1])?);
+        let side = self.given(VIEW.name);
+        if side.is_some() && azimuth.or(elevation).is_some() {
+            return Err("\u{201c}view\u{201d} is a direction by itself: leave out \
+                        \u{201c}azimuth\u{201d} and \u{201c}elevation\u{201d}."
+                .to_owned());
         }
-        settings
+        let viewpoint = Viewpoint::chosen(side, azimuth, elevation);
+        let chosen = ["eye", "angles"].into_iter().find(|name| self.given(name).is_some());
+        if let (Some(chosen), true) = (chosen, viewpoint.is_some()) {
+            return Err(format!(
+                "\u{201c}{chosen}\u{201d} chooses the eye: clear it, or \u{201c}view\u{201d}, \
+                 \u{201c}azimuth\u{201d} and \u{201c}elevation\u{201d}."
+            ));
+        }
+        if self.given(Y_UP.name).is_some() {
+            if let Some(other) = ["up", "angles"].into_iter().find(|it| self.given(it).is_some()) {
+                return Err(format!(
+                    "\u{201c}{other}\u{201d} says what is up: clear it, or \u{201c}y-up\u{201d}."
+                ));
+            }
+            values.push(("up", "0,1,0".to_owned()));
+        }
+        let settings = Settings { page: A4, values };
+        Ok(Wishes { settings, viewpoint, has_margin: self.given("margin").is_some() })
+    }
+
+    /// The page that the user has named; `None` if there is none.
+    ///
+    /// # Errors
+    /// It is no page.
+    fn page(&self) -> Result<Option<Page>, String> {
+        let Some(text) = self.given(PAGE) else { return Ok(None) };
+        let lower = text.to_lowercase();
+        let sides = lower.split_once('x');
+        let sides = sides.and_then(|(width, height)| {
+            Some(Page { width: width.trim().parse().ok()?, height: height.trim().parse().ok()? })
+        });
+        let range = OPTIONS.iter().find(|option| option.name == PAGE).and_then(|it| it.range());
+        let range = range.map(|range| format!(" ({range})")).unwrap_or_default();
+        let refused = || format!("A page is WIDTHxHEIGHT in mm, such as 200x150{range}.");
+        let page = sides.ok_or_else(refused)?;
+        PlotOptions::default().set(PAGE, &page_value(page)).map_err(|_| refused())?;
+        Ok(Some(page))
     }
 }
 

@@ -6,15 +6,16 @@
 
 use crate::delivery::{Delivery, Outcome};
 use crate::event::Event;
+use crate::number::Number;
 use crate::options::{NamedValues, text_of};
 use crate::phase::Phase;
 use crate::sheet::Shared;
-use crate::source;
+use crate::source::Source;
 use crate::words::{alarm, refusal};
 use penup_job::Job;
 use penup_job::protocol::{
-    ABORT, LAST_NUMBER, MODEL, PLOT, RESUME, Reply, ReplyReader, STATUS_QUERY, Status, is_penup,
-    numbered,
+    ABORT, AS_SET, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, LAST_NUMBER, MODEL, PEN_DOWN, PEN_UP,
+    PLOT, RESUME, Reply, ReplyReader, SLOWER, STATUS_QUERY, Status, is_penup, numbered,
 };
 use penup_job::results::JobReport;
 use penup_job::twin;
@@ -30,8 +31,6 @@ const AGAIN_AFTER: f64 = 1000.0;
 const OPEN_PATIENCE: f64 = 15_000.0;
 /// The most times that the checksums and the report are asked for again.
 const MOST_QUESTIONS: u32 = 10;
-/// Feed hold.
-const HOLD: u8 = b'!';
 
 /// The session.
 #[wasm_bindgen]
@@ -69,6 +68,10 @@ pub struct Session {
     /// Equal reports of a machine that waits, one after the other.
     holds: (Option<u8>, String, u32),
     is_given_up: bool,
+    /// Where the plotter last told that the pen is, in mm.
+    place: Vec<f64>,
+    /// The speeds in percent of those in the settings, which not every status tells.
+    percent: u16,
 }
 
 #[wasm_bindgen]
@@ -102,6 +105,8 @@ impl Session {
             is_computing: false,
             holds: (None, String::new(), 0),
             is_given_up: false,
+            place: Vec::new(),
+            percent: 100,
         }
     }
 
@@ -122,19 +127,26 @@ impl Session {
     }
 
     /// Draws the file `name` with `options`, a JSON array of pairs of name and value, as soon as
-    /// the plotter is ready.
+    /// the plotter is ready. If the file `is_read`, the `bytes` are what `penup-page-files` made of
+    /// it.
     ///
     /// # Errors
     /// A sentence for the user that says why nothing is sent.
-    pub fn plot(&mut self, name: &str, bytes: Vec<u8>, options: &str) -> Result<(), String> {
+    pub fn plot(
+        &mut self,
+        name: &str,
+        bytes: Vec<u8>,
+        is_read: bool,
+        options: &str,
+    ) -> Result<(), String> {
         if !matches!(self.phase, Phase::Finding | Phase::Greeting | Phase::Numbering | Phase::Ready)
         {
             return Err("The plotter is busy: wait until it is done, or give it up.".to_owned());
         }
-        let file = source::read(name, bytes)?;
-        let settings = NamedValues::parse(options)?.settings();
-        let job: Rc<dyn Lines> = Rc::new(Job::new(Shared(file), &settings));
-        self.expected = twin::contents(&*job, job.count());
+        let source = Source::read(name, bytes, is_read)?;
+        let settings = NamedValues::parse(options)?.settings_for(&source)?;
+        let job: Rc<dyn Lines> = Rc::new(Job::new(Shared(source.lines), &settings));
+        self.expected = twin::contents_of::<Number>(&*job, job.count());
         self.job = Some(job);
         self.begin_job();
         Ok(())
@@ -149,6 +161,45 @@ impl Session {
     pub fn resume(&mut self) {
         self.holds = (None, String::new(), 0);
         self.out.push(RESUME);
+    }
+
+    /// Changes all speeds by a tenth of those in the settings: `faster` if `by` is positive,
+    /// slower if it is negative. 0 is as set.
+    pub fn override_speed(&mut self, by: i32) {
+        self.out.push(match by {
+            0 => AS_SET,
+            by if by > 0 => FASTER,
+            _ => SLOWER,
+        });
+    }
+
+    /// Goes on with the job that a loss of power or a reset has stopped. The machine is homed
+    /// first, unless the user has put the pen at the origin.
+    ///
+    /// # Errors
+    /// A sentence for the user: the session is doing something else.
+    pub fn go_on(&mut self, is_at_origin: bool) -> Result<(), String> {
+        self.begin_lines(vec![if is_at_origin { GO_ON_AT_ORIGIN } else { GO_ON }.to_owned()])?;
+        self.is_given_up = false;
+        self.enter(Phase::Starting);
+        Ok(())
+    }
+
+    /// Draws a square with sides of so many `mm` to the right of the pen and above it.
+    ///
+    /// # Errors
+    /// A sentence for the user: the session is doing something else, or does not know where the
+    /// pen is.
+    pub fn test_square(&mut self, mm: f64) -> Result<(), String> {
+        let &[x, y, ..] = self.place.as_slice() else {
+            return Err("The plotter has not told yet where its pen is.".to_owned());
+        };
+        let corners = [(mm, 0.0), (mm, mm), (0.0, mm), (0.0, 0.0)];
+        let sides = corners.map(|(dx, dy)| format!("G21 G53 G1 X{:.3} Y{:.3}", x + dx, y + dy));
+        let lines = [PEN_DOWN.to_owned()].into_iter().chain(sides).chain([PEN_UP.to_owned()]);
+        self.begin_lines(lines.collect())?;
+        self.enter(Phase::Commanding);
+        Ok(())
     }
 
     /// Gives the drawing up: the machine stops with the pen up.
@@ -170,10 +221,7 @@ impl Session {
             self.enter(Phase::Finding);
             return Ok(());
         }
-        if self.phase != Phase::Ready {
-            return Err("The plotter is busy, or is not connected.".to_owned());
-        }
-        self.deliver(Rc::new(vec![JobLine::command(text)]));
+        self.begin_lines(vec![text.to_owned()])?;
         self.enter(Phase::Commanding);
         Ok(())
     }
@@ -285,6 +333,19 @@ impl Session {
     fn deliver(&mut self, lines: Rc<dyn Lines>) {
         self.messages.clear();
         self.delivery = Some(Delivery::new(lines, self.number, self.now));
+    }
+
+    /// Begins to send lines by hand.
+    ///
+    /// # Errors
+    /// A sentence for the user: the session is doing something else.
+    fn begin_lines(&mut self, lines: Vec<String>) -> Result<(), String> {
+        if self.phase != Phase::Ready {
+            return Err("The plotter is busy, or is not connected.".to_owned());
+        }
+        let lines: Vec<_> = lines.into_iter().map(JobLine::command).collect();
+        self.deliver(Rc::new(lines));
+        Ok(())
     }
 
     fn begin_job(&mut self) {
@@ -447,10 +508,15 @@ impl Session {
         if let Some((_, all)) = status.strokes {
             self.strokes = all;
         }
-        let position = status.position.split(',').filter_map(|c| c.parse().ok()).collect();
+        self.place = status.position.split(',').filter_map(|c| c.parse().ok()).collect();
+        if raw.contains("|Ov:") {
+            self.percent = status.percent;
+        }
         self.events.push(Event::Status {
             state: status.state.clone(),
-            position,
+            position: self.place.clone(),
+            percent: self.percent,
+            stopped: status.stopped,
             strokes: status.strokes,
             ink: pair("Ink:"),
             left: field(raw, "Left:").and_then(|left| left.parse().ok()),

@@ -1,10 +1,12 @@
 //! What a camera sees of a model, drawn on the sheet by the plotter's own code.
 
+use crate::number::Number;
 use crate::options::{NamedValues, text_of};
-use crate::source;
-use crate::words::refusal;
-use penup::boards::host::{HostBoard, lend_memory};
+use crate::source::Source;
+use crate::words::{for_page, refusal, sentence};
+use penup::boards::host::HostBoard;
 use penup::drawing::{LineType, PagePoint};
+use penup::index::Index as _;
 use penup::machine::{EventRing, PulserState, Setting};
 use penup::plotter::Plotter;
 use penup::protocol::CommandError;
@@ -12,7 +14,9 @@ use penup::stage::NeverCancel;
 use penup::step::Pattern;
 use penup::view::Pose;
 use penup_job::Job;
+use penup_job::Settings;
 use penup_job::protocol::{Reply, ReplyReader};
+use penup_job::room::Room;
 use penup_readers::lines::{JobLine, Lines};
 use serde::Serialize;
 use std::fmt;
@@ -23,13 +27,20 @@ use wasm_bindgen::prelude::wasm_bindgen;
 #[wasm_bindgen]
 pub struct Sheet {
     board: HostBoard<'static>,
-    plotter: Plotter<'static>,
-    file: Rc<dyn Lines>,
+    plotter: Plotter<'static, Number>,
+    /// The room that the plotter has.
+    room: Room,
+    source: Source,
+    /// Width and height of the page in mm.
+    page: [f64; 2],
 }
 
 impl fmt::Debug for Sheet {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
-        formatter.debug_struct("Sheet").field("lines", &self.file.count()).finish_non_exhaustive()
+        formatter
+            .debug_struct("Sheet")
+            .field("lines", &self.source.lines.count())
+            .finish_non_exhaustive()
     }
 }
 
@@ -44,6 +55,10 @@ struct Scene {
     is_plan: bool,
     /// The least and the greatest coordinates.
     bounds: Option<[[f64; 3]; 2]>,
+    /// What the user should know about the file.
+    notes: Vec<String>,
+    /// The room that a plotter needs for it, for [`Board`](crate::Board).
+    room: Room,
 }
 
 /// Where the camera stands.
@@ -60,28 +75,43 @@ impl Sheet {
     #[wasm_bindgen(constructor)]
     pub fn new() -> Self {
         crate::note_faults();
-        // The memory is leaked because the plotter and the board borrow from it; a worker makes
-        // one sheet and keeps it.
-        let ring = Box::leak(Box::new(EventRing::new()));
-        let pins = Box::leak(Box::new(PulserState::new()));
-        let board = HostBoard::new(ring, pins);
-        Self { board, plotter: Plotter::new(lend_memory(), pins), file: Rc::new(Vec::new()) }
+        let source = Source::default();
+        let room = Room::for_job(&*source.lines);
+        let (board, plotter) = started(room);
+        Self { board, plotter, room, source, page: [0.0; 2] }
     }
 
-    /// Reads the file `name` and keeps its model. Returns what there is to see, as JSON.
+    /// Reads the file `name` and keeps its model. If it `is_read`, the `bytes` are what
+    /// `penup-page-files` made of it. Returns what there is to see, as JSON.
     ///
     /// # Errors
     /// A sentence for the user; the sheet is then empty.
-    pub fn open(&mut self, name: &str, bytes: Vec<u8>, options: &str) -> Result<String, String> {
-        self.file = Rc::new(Vec::new());
+    pub fn open(
+        &mut self,
+        name: &str,
+        bytes: Vec<u8>,
+        is_read: bool,
+        options: &str,
+    ) -> Result<String, String> {
+        self.source = Source::default();
         self.take(&JobLine::command("$clear"))?;
-        self.file = source::read(name, bytes)?;
+        let source = Source::read(name, bytes, is_read)?;
+        let room = Room::for_job(&*source.lines);
+        if !room.fits(self.room) {
+            (self.board, self.plotter) = started(room);
+            self.room = room;
+        }
+        self.source = source;
         self.set(options)?;
         let model = self.plotter.model();
         let bounds = model.bounds().map(|(low, high)| {
             let unit = (0.5f64).powi(model.fraction_bits() as i32);
             [low, high].map(|it| [it.x, it.y, it.z].map(|c| f64::from(c) * unit))
         });
+        let moved = self.source.bounds.and_then(|bounds| {
+            NamedValues::parse(options).ok()?.settings_for(&self.source).ok()?.moves_plan(bounds)
+        });
+        let notes = self.source.notes.iter().chain(&moved);
         Ok(text_of(&Scene {
             vertices: model.vertices().len(),
             faces: model.face_count(),
@@ -89,22 +119,28 @@ impl Sheet {
             curves: model.curve_count(),
             is_plan: model.is_plan(),
             bounds,
+            notes: notes.map(|note| format!("{}.", sentence(&for_page(note)))).collect(),
+            room,
         }))
     }
 
     /// Sets the options, given as a JSON array of pairs of name and value, and all others to their
-    /// defaults. The file is read again, because pens depend on an option.
+    /// defaults. The lines of the file are sent again, because pens depend on an option.
     ///
     /// # Errors
     /// A sentence for the user.
     pub fn set(&mut self, options: &str) -> Result<(), String> {
-        let settings = NamedValues::parse(options)?.settings();
-        let file = Rc::clone(&self.file);
-        let job = Job::new(Shared(file), &settings);
+        let settings = self.settings(options)?;
+        let job = Job::new(Shared(Rc::clone(&self.source.lines)), &settings);
         for line in job.in_order() {
             self.take(&line)?;
         }
         Ok(())
+    }
+
+    /// Width and height of the page in mm.
+    pub fn page(&self) -> Vec<f64> {
+        self.page.to_vec()
     }
 
     /// Sets options without reading the file again: a JSON array of pairs of name and value.
@@ -112,7 +148,7 @@ impl Sheet {
     /// # Errors
     /// A sentence for the user; the options before it are set.
     pub fn turn(&mut self, options: &str) -> Result<(), String> {
-        let settings = NamedValues::parse(options)?.settings();
+        let settings = self.settings(options)?;
         self.take(&JobLine::command("$view=auto"))?;
         for (name, value) in &settings.values {
             if *name != "pens" {
@@ -133,7 +169,7 @@ impl Sheet {
         let dot = settings.get(Setting::DotLength).to_num::<f64>();
         let drawing = self.plotter.draw(&mut NeverCancel).map_err(|error| refused(&error))?;
         let mut lines = Vec::with_capacity(5 * drawing.segments.len());
-        let point = |number: u16| drawing.points.get(usize::from(number)).copied();
+        let point = |number: Number| drawing.points.get(number.get()).copied();
         for segment in drawing.segments {
             let (Some(from), Some(to)) = (point(segment.from()), point(segment.to())) else {
                 continue;
@@ -157,6 +193,15 @@ impl Sheet {
             Pose::Turned { .. } => None,
         }))
     }
+}
+
+impl Sheet {
+    /// The settings that `options` choose for the file that is open.
+    fn settings(&mut self, options: &str) -> Result<Settings, String> {
+        let settings = NamedValues::parse(options)?.settings_for(&self.source)?;
+        self.page = [settings.page.width, settings.page.height];
+        Ok(settings)
+    }
 
     fn take(&mut self, line: &JobLine) -> Result<(), String> {
         self.board.receive(line.sent.as_bytes());
@@ -177,6 +222,15 @@ impl Sheet {
         }
         Ok(())
     }
+}
+
+/// A plotter with this room, and its board.
+fn started(room: Room) -> (HostBoard<'static>, Plotter<'static, Number>) {
+    // The memory is leaked because the plotter and the board borrow from it. A worker makes one
+    // sheet and keeps it; only a larger model takes more.
+    let ring = Box::leak(Box::new(EventRing::new()));
+    let pins = Box::leak(Box::new(PulserState::new()));
+    (HostBoard::new(ring, pins), Plotter::new(room.lend(), pins))
 }
 
 impl Default for Sheet {

@@ -2,13 +2,17 @@
 
 use penup::plotter::OPTIONS;
 use penup::protocol::{AlarmEntry, alarm_entries};
+use penup_job::view::{AZIMUTH, ELEVATION, VIEW, Y_UP};
 use penup_readers::lines::JobLine;
-use penup_readers::words;
+use penup_readers::{PLAN_OPTIONS, words};
 
 /// Names the controls of the page where the client's messages name its flags.
 pub fn for_page(text: &str) -> String {
     let mut text = text.to_owned();
+    let views = [VIEW, AZIMUTH, ELEVATION, Y_UP].map(|option| option.name);
+    let plans = PLAN_OPTIONS.iter().map(|option| option.name);
     let mut names: Vec<&str> = OPTIONS.iter().map(|option| option.name).collect();
+    names.extend(views.into_iter().chain(plans).chain(["landscape"]));
     // `--title-size` must not become `"title"-size`.
     names.sort_by_key(|name| std::cmp::Reverse(name.len()));
     for name in names {
@@ -52,7 +56,7 @@ pub fn alarm(number: u16, messages: &[String]) -> String {
 }
 
 /// The text with a capital letter at its beginning.
-fn sentence(text: &str) -> String {
+pub fn sentence(text: &str) -> String {
     let mut letters = text.chars();
     letters
         .next()

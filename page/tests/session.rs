@@ -21,7 +21,7 @@ struct Pipe {
 
 impl Pipe {
     fn new(line: fn(&mut u64, bool, Vec<u8>) -> Vec<u8>) -> Self {
-        let (session, board) = (Session::new(5000.0), Board::new(""));
+        let (session, board) = (Session::new(5000.0), Board::new("", ""));
         let mut pipe = Self { session, board, now: 0.0, events: Vec::new(), line, count: 0 };
         pipe.session.connect(0.0);
         pipe
@@ -82,7 +82,7 @@ fn noisy(count: &mut u64, to_plotter: bool, bytes: Vec<u8>) -> Vec<u8> {
 /// Draws, and returns the picture that the pins made.
 fn drawn(line: fn(&mut u64, bool, Vec<u8>) -> Vec<u8>) -> String {
     let mut pipe = Pipe::new(line);
-    pipe.session.plot("notched.obj", NOTCHED.to_vec(), OPTIONS).expect("sent");
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
     let report = pipe.until("drawn");
     assert!(report["report"].as_str().is_some_and(|it| it.contains("mm drawn")), "{report}");
     pipe.board.svg(100.0, 80.0)
@@ -98,7 +98,7 @@ fn a_bad_line_changes_nothing() {
 #[test]
 fn hold_resume_and_give_up() {
     let mut pipe = Pipe::new(clean);
-    pipe.session.plot("notched.obj", NOTCHED.to_vec(), OPTIONS).expect("sent");
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
     pipe.until_state("Run");
     pipe.session.hold();
     pipe.until_state("Hold");
@@ -112,21 +112,21 @@ fn hold_resume_and_give_up() {
     pipe.session.give_up();
     pipe.until("stopped");
     // The session goes on with the next drawing.
-    pipe.session.plot("notched.obj", NOTCHED.to_vec(), "[]").expect("sent");
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, "[]").expect("sent");
     pipe.until("drawn");
 }
 
 #[test]
 fn what_is_refused_says_what_to_do() {
     let mut pipe = Pipe::new(clean);
-    let refused = pipe.session.plot("x.obj", b"v 1 2 3\nf 1 2 zero\n".to_vec(), "[]");
+    let refused = pipe.session.plot("x.obj", b"v 1 2 3\nf 1 2 zero\n".to_vec(), false, "[]");
     assert!(refused.expect_err("refused").contains("x.obj:2"));
     // Larger than the travel of the machine: the plotter itself refuses it.
     let options = r#"[["page","600x600"],["margin","0"]]"#;
-    pipe.session.plot("notched.obj", NOTCHED.to_vec(), options).expect("sent");
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, options).expect("sent");
     let failed = pipe.until("failed");
     assert!(failed["text"].as_str().is_some_and(|text| text.contains("travel")), "{failed}");
-    pipe.session.plot("notched.obj", NOTCHED.to_vec(), OPTIONS).expect("sent");
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
     pipe.until("drawn");
 }
 
@@ -140,13 +140,13 @@ fn a_plotter_that_falls_silent_is_given_up_with_a_sentence() {
 #[test]
 fn the_sheet_shows_what_the_plotter_draws() {
     let mut sheet = Sheet::new();
-    sheet.open("notched.obj", NOTCHED.to_vec(), "[]").expect("a model");
+    sheet.open("notched.obj", NOTCHED.to_vec(), false, "[]").expect("a model");
     let solid = sheet.draw().expect("lines");
     sheet.turn(r#"[["hidden","dashed"]]"#).expect("set");
     let dashed = sheet.draw().expect("lines");
     assert!(dashed.len() > solid.len(), "hidden lines are dashes of their own");
     let mut pipe = Pipe::new(clean);
-    pipe.session.plot("notched.obj", NOTCHED.to_vec(), "[]").expect("sent");
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, "[]").expect("sent");
     pipe.until("drawn");
     let strokes = pipe.board.strokes();
     let (mut ink, mut at) = (0.0, 0);
@@ -162,4 +162,92 @@ fn the_sheet_shows_what_the_plotter_draws() {
         .map(|line| f64::from(line[2] - line[0]).hypot(f64::from(line[3] - line[1])))
         .sum();
     assert!((ink - seen).abs() < 0.01, "{ink} mm of strokes, {seen} mm of lines");
+}
+
+#[test]
+fn a_model_stands_on_the_side_that_is_chosen_and_contradictions_are_refused() {
+    let mut sheet = Sheet::new();
+    sheet.open("notched.obj", NOTCHED.to_vec(), false, "[]").expect("a model");
+    let eye = |sheet: &mut Sheet, options: &str| -> Result<Vec<f64>, String> {
+        sheet.turn(options)?;
+        let camera: Value = serde_json::from_str(&sheet.camera()).expect("a camera");
+        let from = |name: &str, axis: usize| camera[name][axis].as_f64().expect("a number");
+        Ok((0..3).map(|axis| (from("eye", axis) - from("at", axis)).round()).collect())
+    };
+    let front = eye(&mut sheet, r#"[["view","front"]]"#).expect("seen");
+    assert!(front[1] < 0.0 && front[0] == 0.0 && front[2] == 0.0, "{front:?}");
+    let angles = r#"[["azimuth","-90"],["elevation","0"]]"#;
+    assert_eq!(eye(&mut sheet, angles), Ok(front.clone()));
+    let upright = eye(&mut sheet, r#"[["view","front"],["y-up","on"]]"#).expect("seen");
+    assert!(upright[2] > 0.0 && upright[1] == 0.0, "the front is at positive z: {upright:?}");
+    for (options, said) in [
+        (r#"[["view","front"],["eye","1,2,3"]]"#, "clear it"),
+        (r#"[["view","front"],["azimuth","3"]]"#, "leave out"),
+        (r#"[["azimuth","370"]]"#, "-360 to 360"),
+        (r#"[["elevation","steep"]]"#, "-90 to 90"),
+        (r#"[["y-up","on"],["up","0,0,1"]]"#, "what is up"),
+        (r#"[["page","wide"]]"#, "WIDTHxHEIGHT"),
+        (r#"[["view","front"],["projection","isometric"]]"#, "direction of its own"),
+    ] {
+        let refused = eye(&mut sheet, options).expect_err(options);
+        assert!(refused.contains(said), "{options}: {refused}");
+    }
+}
+
+#[test]
+fn speeds_follow_the_buttons() {
+    let mut pipe = Pipe::new(clean);
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
+    pipe.until_state("Run");
+    let until_percent = |pipe: &mut Pipe, percent: u64| {
+        for _ in 0..1000 {
+            if pipe.until("status")["percent"] == percent {
+                return;
+            }
+        }
+        panic!("the speeds are never at {percent} %");
+    };
+    until_percent(&mut pipe, 100);
+    pipe.session.override_speed(1);
+    until_percent(&mut pipe, 110);
+    pipe.session.override_speed(1);
+    until_percent(&mut pipe, 120);
+    pipe.session.override_speed(-1);
+    until_percent(&mut pipe, 110);
+    pipe.session.override_speed(0);
+    until_percent(&mut pipe, 100);
+    pipe.until("drawn");
+}
+
+#[test]
+fn a_test_square_is_a_square_where_the_pen_stands() {
+    let mut pipe = Pipe::new(clean);
+    assert!(pipe.session.test_square(20.0).is_err(), "nobody knows where the pen is");
+    let until_ready = |pipe: &mut Pipe| while pipe.until("phase")["name"] != "ready" {};
+    until_ready(&mut pipe);
+    pipe.session.command("$J=G91 X30 Y40 F3000").expect("sent");
+    pipe.until_state("Idle");
+    (0..200).for_each(|_| pipe.step());
+    pipe.board.begin_again();
+    pipe.board.take_path();
+    pipe.session.test_square(20.0).expect("sent");
+    (0..1000).for_each(|_| pipe.step());
+    let path = pipe.board.take_path();
+    let inked = path.chunks_exact(4).filter(|sample| sample[3] > 0.0);
+    let (mut low, mut high) = ([f32::MAX; 2], [f32::MIN; 2]);
+    for sample in inked {
+        for axis in [0, 1] {
+            low[axis] = low[axis].min(sample[axis + 1]);
+            high[axis] = high[axis].max(sample[axis + 1]);
+        }
+    }
+    assert_eq!((low, high), ([30.0, 40.0], [50.0, 60.0]));
+    // A square beyond the travel is refused with a reason, and the session goes on.
+    pipe.session.test_square(4000.0).expect("sent");
+    let failed = pipe.until("failed");
+    assert!(failed["text"].as_str().is_some_and(|text| text.contains("travel")), "{failed}");
+    until_ready(&mut pipe);
+    // This board keeps no job.
+    pipe.session.go_on(false).expect("sent");
+    pipe.until("failed");
 }

@@ -1,4 +1,4 @@
-// Turns the camera about the point that it looks at, with z up.
+// Turns the camera about the point that it looks at, with the model upright.
 
 const STEEPEST = 89.9;
 
@@ -8,23 +8,39 @@ export const short = (number) => String(Number(number.toPrecision(6)));
 /** Three numbers as they are written in an option. */
 export const triple = (numbers) => numbers.map(short).join(",");
 
+const sum = (a, b) => a.map((c, i) => c + b[i]);
+const times = (a, by) => a.map((c) => c * by);
+const dot = (a, b) => a.reduce((all, c, i) => all + c * b[i], 0);
+const cross = (a, b) => [0, 1, 2].map((i) => {
+  const [j, k] = [(i + 1) % 3, (i + 2) % 3];
+  return a[j] * b[k] - a[k] * b[j];
+});
+const unit = (a) => times(a, 1 / (Math.hypot(...a) || 1));
+
+/** Two directions at right angles to `up` and to each other; x and y if that is z. */
+function level(up) {
+  const x = Math.abs(up[0]) > 0.9 ? [0, 1, 0] : [1, 0, 0];
+  const first = unit(sum(x, times(up, -dot(x, up))));
+  return [first, cross(up, first)];
+}
+
 /**
- * The eye after a turn by these angles in degrees: `about` z, and `up`. Its distance from `at`
- * is multiplied by `nearer`.
+ * The eye after a turn by these angles in degrees: `about` what is up, and `by` upwards. Its
+ * distance from `at` is multiplied by `nearer`.
  */
-export function turned({ eye, at }, about, up, nearer = 1) {
-  const [x, y, z] = eye.map((c, i) => c - at[i]);
+export function turned({ eye, at }, upwards, about, by, nearer = 1) {
+  const up = unit(upwards);
+  const axes = [...level(up), up];
+  const way = eye.map((c, i) => c - at[i]);
+  const [x, y, z] = axes.map((axis) => dot(way, axis));
   const distance = Math.hypot(x, y, z) * nearer;
   const degrees = 180 / Math.PI;
   const azimuth = (Math.atan2(y, x) * degrees + about) / degrees;
-  const elevation = Math.asin(z / (Math.hypot(x, y, z) || 1)) * degrees + up;
+  const elevation = Math.asin(z / (Math.hypot(x, y, z) || 1)) * degrees + by;
   const steep = Math.max(-STEEPEST, Math.min(STEEPEST, elevation)) / degrees;
   const flat = Math.cos(steep) * distance;
-  return [
-    at[0] + flat * Math.cos(azimuth),
-    at[1] + flat * Math.sin(azimuth),
-    at[2] + Math.sin(steep) * distance,
-  ];
+  const parts = [flat * Math.cos(azimuth), flat * Math.sin(azimuth), Math.sin(steep) * distance];
+  return parts.reduce((to, part, i) => sum(to, times(axes[i], part)), at);
 }
 
 /** The options that a link has: those after its `#`. */

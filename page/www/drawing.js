@@ -5,6 +5,10 @@ import { indexAt, penAt } from "./sheet.js";
 
 const $ = (id) => document.getElementById(id);
 const SAMPLE = 4;
+const EXPORTS = ["export-svg", "export-png", "export-gcode", "export-hpgl"];
+/** Dots of a PNG in a mm, and the most on a side: as of the program's. */
+const DOTS = 8,
+  MOST_DOTS = 4096;
 
 /** A time in seconds as h:mm:ss or m:ss. */
 export function clock(seconds) {
@@ -40,7 +44,9 @@ export class Drawing {
     $("stroke-next").addEventListener("click", () => this.stroke(1));
     $("stroke-back").addEventListener("click", () => this.stroke(-1));
     $("show-up").addEventListener("change", () => view.draw());
-    $("export-svg").addEventListener("click", () => this.save());
+    for (const kind of ["svg", "gcode", "hpgl"])
+      $(`export-${kind}`).addEventListener("click", () => this.save(kind, this.computed[kind]));
+    $("export-png").addEventListener("click", () => this.savePng());
   }
 
   /** What was computed is not what is shown any more. */
@@ -50,7 +56,7 @@ export class Drawing {
     this.stop();
     this.computed = null;
     $("check-state").textContent = "…";
-    $("export-svg").disabled = true;
+    for (const button of EXPORTS) $(button).disabled = true;
   }
 
   /** Computes the drawing, by a session with an emulated plotter that runs ahead of time. */
@@ -90,41 +96,26 @@ export class Drawing {
     this.view.draw();
   }
 
-  take({ path, strokes: flat, svg, report, notes }, job) {
-    const strokes = [],
-      pens = [];
-    for (let at = 0; at < flat.length; at += 2 + 2 * flat[at + 1]) {
-      const count = flat[at + 1];
-      pens.push(flat[at]);
-      strokes.push(
-        Array.from({ length: count }, (_, i) => [flat[at + 2 + 2 * i], flat[at + 3 + 2 * i]]),
-      );
-    }
+  take(computed, job) {
+    const { path, ends, pens, ink, up, notes } = computed;
     const seconds = path.length ? path[path.length - SAMPLE] : 0;
-    this.computed = { path, strokes, pens, svg, report, seconds, name: job.name };
-    // Where each stroke begins in time: the pen comes down there, dashes not counted.
-    this.begins = starts(path, strokes);
-    const distance = (a, b) => Math.hypot(a[0] - b[0], a[1] - b[1]);
-    const ink = strokes.reduce(
-      (sum, s) => sum + s.slice(1).reduce((own, p, i) => own + distance(s[i], p), 0),
-      0,
-    );
-    const up = strokes.slice(1).reduce((sum, s, i) => sum + distance(strokes[i].at(-1), s[0]), 0);
-    const used = [...new Set(pens)].sort((a, b) => a - b);
+    const strokes = ends.length / 4;
+    this.computed = { ...computed, seconds, name: job.name, page: job.page };
+    this.begins = computed.begins;
     figures($("figures"), [
       ["Time", clock(seconds)],
       ["Ink", length(ink)],
       ["Moves with the pen up", length(up)],
-      ["Strokes", String(strokes.length)],
-      ["Lifts between them", String(Math.max(0, strokes.length - 1))],
+      ["Strokes", String(strokes)],
+      ["Lifts between them", String(Math.max(0, strokes - 1))],
       ["Efficiency", `${((100 * ink) / Math.max(ink + up, 1e-9)).toFixed(1)} %`],
-      ["Pens", used.join(", ")],
+      ["Pens", pens.join(", ")],
     ]);
-    $("check-state").textContent = `${clock(seconds)} with ${strokes.length} strokes`;
+    $("check-state").textContent = `${clock(seconds)} with ${strokes} strokes`;
     $("check-problem").textContent = notes.join(" ");
     $("check-problem").hidden = !notes.length;
     $("at").max = String(seconds);
-    $("export-svg").disabled = false;
+    for (const button of EXPORTS) $(button).disabled = false;
     this.seek(seconds);
   }
 
@@ -141,7 +132,15 @@ export class Drawing {
   }
 
   strokeAt() {
-    return this.begins ? this.begins.filter((begin) => begin <= this.time + 1e-3).length : 0;
+    const begins = this.begins ?? [];
+    let low = 0,
+      high = begins.length;
+    while (low < high) {
+      const middle = (low + high) >> 1;
+      if (begins[middle] <= this.time + 1e-3) low = middle + 1;
+      else high = middle;
+    }
+    return low;
   }
 
   stroke(by) {
@@ -175,69 +174,61 @@ export class Drawing {
     $("play").textContent = "Play";
   }
 
-  /** Draws the computed drawing. Returns whether there is one. */
+  /** What draws the computed drawing; null if there is none. */
   paint(brush) {
-    if (!this.computed) return false;
-    const { path, strokes, seconds } = this.computed;
-    const end = indexAt(path, this.time);
-    if (this.time < seconds)
-      this.view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
-    if ($("show-up").checked) this.view.moves(brush, strokes);
-    this.view.path(brush, path, end);
-    const now = penAt(path, this.time);
-    if (this.time < seconds && now) this.inkTo(brush, path, end, now);
-    this.view.marks(brush, strokes);
-    return true;
+    return this.computed && this.pieces(brush);
+  }
+
+  *pieces(brush) {
+    const { path, ends, seconds } = this.computed;
+    const { time, view } = this;
+    const end = indexAt(path, time);
+    if (time < seconds) yield* view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
+    if ($("show-up").checked) yield* view.moves(brush, ends);
+    yield* view.path(brush, path, end);
+    const now = penAt(path, time);
+    if (time < seconds && now) yield* this.inkTo(brush, path, end, now);
+    view.marks(brush, ends);
   }
 
   /** Draws the ink from the last sample to where the pen is now, and the pen. */
-  inkTo(brush, path, end, [x, y, pen]) {
+  *inkTo(brush, path, end, [x, y, pen]) {
     if (pen && end > 0) {
-      const last = new Float32Array([
-        ...path.subarray((end - 1) * SAMPLE, end * SAMPLE),
-        this.time,
-        x,
-        y,
-        pen,
-      ]);
-      this.view.path(brush, last, 2);
+      const before = path.subarray((end - 1) * SAMPLE, end * SAMPLE);
+      yield* this.view.path(brush, new Float32Array([...before, this.time, x, y, pen]), 2);
     }
     this.view.pen(brush, [x, y], pen);
   }
 
-  save() {
-    const { svg, name } = this.computed;
-    const address = URL.createObjectURL(new Blob([svg], { type: "image/svg+xml" }));
+  /** Saves what the pins draw as a file of this kind. */
+  save(kind, blob) {
+    const address = URL.createObjectURL(blob);
     const link = Object.assign(document.createElement("a"), {
       href: address,
-      download: name.replace(/\.\w+$/, "") + ".svg",
+      download: this.computed.name.replace(/\.\w+$/, "") + `.${kind}`,
     });
     link.click();
     setTimeout(() => URL.revokeObjectURL(address), 10_000);
   }
-}
 
-/** The times at which the strokes begin: the pen is at their first points, in this order. */
-function starts(path, strokes) {
-  const begins = [];
-  let at = 0;
-  const count = path.length / SAMPLE;
-  for (const [[x, y]] of strokes) {
-    let found = at;
-    // The sample before the first with the pen down.
-    while (
-      found + 1 < count &&
-      !(
-        path[(found + 1) * SAMPLE + 3] > 0 &&
-        path[found * SAMPLE + 3] === 0 &&
-        Math.abs(path[found * SAMPLE + 1] - x) < 0.05 &&
-        Math.abs(path[found * SAMPLE + 2] - y) < 0.05
-      )
-    )
-      found++;
-    if (found + 1 >= count) found = at;
-    begins.push(path[found * SAMPLE]);
-    at = found + 1;
+  /** Saves the same picture in dots. */
+  async savePng() {
+    const { svg, page } = this.computed;
+    const dots = Math.min(DOTS, MOST_DOTS / Math.max(...page));
+    const [width, height] = page.map((side) => Math.max(1, Math.round(side * dots)));
+    const address = URL.createObjectURL(svg);
+    try {
+      const picture = Object.assign(new Image(), { src: address });
+      await picture.decode();
+      const canvas = Object.assign(document.createElement("canvas"), { width, height });
+      canvas.getContext("2d").drawImage(picture, 0, 0, width, height);
+      const blob = await new Promise((done) => canvas.toBlob(done, "image/png"));
+      if (!blob) throw new Error("the picture is too large for this browser");
+      this.save("png", blob);
+    } catch (error) {
+      this.problem(`The PNG cannot be made: ${error.message}. Save the SVG instead.`);
+    } finally {
+      URL.revokeObjectURL(address);
+    }
   }
-  return begins;
 }

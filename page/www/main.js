@@ -4,7 +4,9 @@ import { command, fromLink, toLink, triple, turned } from "./camera.js";
 import { Controls } from "./controls.js";
 import { Drawing } from "./drawing.js";
 import { Plotting } from "./plotting.js";
+import { handed } from "./reading.js";
 import { SheetView } from "./sheet.js";
+import { joined } from "./socket.js";
 import { listen } from "./turning.js";
 import { Helper, load } from "./workers.js";
 import init, * as library from "./penup_page.js";
@@ -18,6 +20,12 @@ const REST = 350;
 /** How many steps back are kept. */
 const MOST_UNDOS = 200;
 const EXAMPLES = ["notched", "lattice3", "interpen", "lblock", "gears", "isobars"];
+/** Options of a camera, which do not fit another model. */
+const CAMERA = ["eye", "at", "up", "angles", "view", "azimuth", "elevation", "y-up"];
+/** Options that choose the eye by its direction; a turn chooses it by its place. */
+const DIRECTIONS = ["view", "azimuth", "elevation"];
+/** The heading of the options that arrange plans begins so. */
+const PLAN = "Plan";
 /** Projections that have a direction of their own; a turn makes them orthographic. */
 const FIXED = /^(isometric|dimetric|trimetric|axonometric)/;
 
@@ -32,7 +40,8 @@ let file = null,
 let lines = new Float32Array(),
   drawsBusy = false,
   drawsAgain = false,
-  reads = false;
+  reads = false,
+  arranges = false;
 let tab = "see",
   restTimer = 0,
   lastBegin = "";
@@ -56,10 +65,9 @@ async function main() {
   controls = new Controls($("controls"), table, JSON.parse(library.pages()), change);
   helper = new Helper(({ text }) => fail(text));
   drawing = new Drawing(view, JSON.parse(library.boards()), { job, announce });
-  plotting = new Plotting(view, { job, announce, lines: () => lines });
-  $("file").accept = library.file_extensions();
+  plotting = new Plotting(view, { job, announce, lines: () => lines, program: await joined() });
   for (const name of EXAMPLES) $("example").append(new Option(name, `${name}.obj`));
-  window.penup = { frames, drawing, plotting };
+  window.penup = { frames, drawing, plotting, view };
   listenToPage();
   const link = new Map(fromLink(location.hash));
   const given = link.get("given"),
@@ -88,9 +96,11 @@ function job() {
   return (
     file && {
       name: file.name,
-      bytes: file.bytes.slice(),
+      bytes: file.handed.bytes.slice(),
+      isRead: file.handed.isRead,
       options: JSON.stringify(pairs()),
       page: view.page,
+      room: scene.room,
     }
   );
 }
@@ -101,6 +111,8 @@ async function openFrom(address, name) {
   try {
     const answer = await fetch(address);
     if (!answer.ok) throw new Error(`the server answers ${answer.status}`);
+    const size = Number(answer.headers.get("Content-Length"));
+    if (size > LARGEST_FILE) return fail(tooLarge(name, size));
     await open(name, new Uint8Array(await answer.arrayBuffer()));
   } catch (error) {
     fail(`${name} cannot be loaded: ${error.message ?? error}.`);
@@ -109,40 +121,49 @@ async function openFrom(address, name) {
 
 const openExample = (name) => openFrom(`scenes/${name}`, name);
 
+const tooLarge = (name, size) =>
+  `${name} has ${Math.round(size / 1e6)} MB; the page opens files up to ` +
+  `${LARGEST_FILE >> 20} MB, which is more than any plotter holds.`;
+
 async function openFile(chosen) {
-  if (chosen.size > LARGEST_FILE) {
-    return fail(
-      `${chosen.name} has ${Math.round(chosen.size / 1e6)} MB; the page opens files up to ` +
-        `${LARGEST_FILE >> 20} MB, which is more than any plotter holds.`,
-    );
-  }
+  if (chosen.size > LARGEST_FILE) return fail(tooLarge(chosen.name, chosen.size));
   try {
     // The camera and the pens of another model do not fit this one.
-    const kept = new Map(
-      [...values].filter(([name]) => !["eye", "at", "up", "angles"].includes(name)),
-    );
+    const kept = new Map([...values].filter(([name]) => !CAMERA.includes(name)));
     await open(chosen.name, new Uint8Array(await chosen.arrayBuffer()), kept);
   } catch (error) {
     fail(`${chosen.name} cannot be read: ${error.message ?? error}.`);
   }
 }
 
+/** Reads a file with these options. Returns it, and what there is to see. */
+async function readFile(name, bytes, nextValues) {
+  const options = JSON.stringify([...nextValues]);
+  const given = await handed(name, bytes, options);
+  const opened = await helper.ask("open", { name, ...given, options });
+  return { file: { name, bytes, handed: given }, ...opened };
+}
+
 async function open(name, bytes, nextValues = values) {
   let opened;
   try {
-    const options = JSON.stringify([...nextValues]);
-    opened = await helper.ask("open", { name, bytes, options });
+    opened = await readFile(name, bytes, nextValues).catch((text) => {
+      // An option that arranges plans may not fit another file.
+      const kept = new Map([...nextValues].filter(([own]) => !isOfPlans(own)));
+      if (kept.size === nextValues.size) throw text;
+      nextValues = kept;
+      return readFile(name, bytes, kept);
+    });
   } catch (text) {
     // What was open stays open.
     if (file)
       await helper
-        .ask("open", { name: file.name, bytes: file.bytes, options: JSON.stringify(pairs()) })
+        .ask("open", { name: file.name, ...file.handed, options: JSON.stringify(pairs()) })
         .catch(() => {});
     return fail(text);
   }
-  file = { name, bytes };
+  ({ file, scene, camera } = opened);
   values = nextValues;
-  ({ scene, camera } = opened);
   undos.length = redos.length = 0;
   const counts = [
     [scene.vertices, "vertices"],
@@ -159,6 +180,7 @@ async function open(name, bytes, nextValues = values) {
     ? "Drag to turn. Shift and drag, or two fingers, to move. " +
       "Wheel to zoom, with Alt to step nearer."
     : "A flat drawing: drag to move, wheel to zoom.";
+  note(scene.notes);
   announce(`${name} is open: ${said}`);
   view.fit();
   changed();
@@ -172,8 +194,15 @@ function change(name, value) {
   if (value === null) values.delete(name);
   else values.set(name, value);
   reads ||= name === "pens";
+  // The page and the margin decide where a plan is laid that is arranged.
+  const lays = file?.handed.isRead && ["page", "margin"].includes(name);
+  arranges ||= isOfPlans(name) || lays;
   changed(name);
 }
+
+const isOfPlans = (name) =>
+  table.some((option) => option.name === name && option.heading.startsWith(PLAN)) ||
+  name === "landscape";
 
 /** Notes the values before a change. Changes of one kind in a row, such as keys, are one step. */
 function remember(kind = "") {
@@ -190,7 +219,7 @@ function step(from, to) {
   to.push(new Map(values));
   values = from.pop();
   lastBegin = "";
-  reads = true;
+  reads = arranges = true;
   changed();
 }
 
@@ -229,13 +258,16 @@ async function draw(name = null) {
   const began = performance.now();
   let problem = null;
   try {
+    if (arranges && file) {
+      ({ file, scene } = await readFile(file.name, file.bytes, new Map(pairs())));
+      note(scene.notes);
+    }
     const options = JSON.stringify(pairs());
     const answer = await helper.ask("draw", { options, reads });
-    reads = false;
+    reads = arranges = false;
     ({ lines, camera } = answer);
+    view.page = answer.page;
     frames.compute.push(answer.ms);
-    const page = (values.get("page") ?? "210x297").split(/x/i).map(Number);
-    if (page.every((side) => side > 0)) view.page = page;
     view.draw();
     frames.from.push(performance.now() - began);
   } catch (text) {
@@ -263,17 +295,25 @@ function turn(about, up, nearer) {
   if (!turns()) return;
   if (!camera) return fail("The camera stands by “angles”: clear that option to turn it.");
   if (FIXED.test(values.get("projection") ?? "")) values.set("projection", "orthographic");
-  const eye = turned(camera, about, up, nearer);
+  for (const name of DIRECTIONS) values.delete(name);
+  const eye = turned(camera, upwards(), about, up, nearer);
   camera = { ...camera, eye };
   values.set("eye", triple(eye));
   if (!values.has("at")) values.set("at", triple(camera.at));
   changed();
 }
 
+/** What is up in the model: the camera turns about it. */
+function upwards() {
+  if (values.has("y-up")) return [0, 1, 0];
+  const up = (values.get("up") ?? "").split(",").map(Number);
+  return up.length === 3 && up.every(Number.isFinite) && up.some(Boolean) ? up : [0, 0, 1];
+}
+
 function paint(brush) {
-  if (tab === "draw" && plotting.paint(brush)) return;
-  if (tab === "check" && drawing.paint(brush)) return;
-  view.lines(brush, lines);
+  const picture =
+    (tab === "draw" && plotting.paint(brush)) || (tab === "check" && drawing.paint(brush));
+  return picture || view.lines(brush, lines);
 }
 
 // The page itself.
@@ -301,7 +341,7 @@ function listenToPage() {
     const name = event.target.value;
     event.target.value = "";
     if (!name) return;
-    values = new Map([...values].filter(([own]) => !["eye", "at", "up", "angles"].includes(own)));
+    values = new Map([...values].filter(([own]) => !CAMERA.includes(own)));
     openExample(name);
   });
   $("undo").addEventListener("click", () => step(undos, redos));
@@ -309,7 +349,7 @@ function listenToPage() {
   $("reset").addEventListener("click", () => {
     remember();
     values = new Map();
-    reads = true;
+    reads = arranges = true;
     changed();
   });
   $("copy-link").addEventListener("click", () => copy(location.href, "The link is copied."));
@@ -381,6 +421,12 @@ function fail(text) {
 
 function hush() {
   $("error").hidden = true;
+}
+
+/** Says what the user should know about the file. */
+function note(notes) {
+  $("notes").textContent = notes.join(" ");
+  $("notes").hidden = !notes.length;
 }
 
 function announce(text) {

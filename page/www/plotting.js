@@ -1,9 +1,10 @@
-// Plots: on the emulated plotter of the page, or on a real one by WebSerial. Both are the same
-// session, at the end of a pipe of bytes.
+// Plots: on the emulated plotter of the page, on a real one by WebSerial, or on the one that the
+// program penup has joined. All are the same session, at the end of a pipe of bytes.
 
 import { Helper } from "./workers.js";
 import { clock, figures, length } from "./drawing.js";
 import { cannot, join } from "./serial.js";
+import { join as joinProgram } from "./socket.js";
 
 const $ = (id) => document.getElementById(id);
 const SAMPLE = 4;
@@ -19,9 +20,28 @@ const PHASES = {
   alarm: "Alarm.",
 };
 
+/** What is said about each kind of plotter. */
+const HINTS = {
+  emulated: "The plotter's own program, on pins of memory. Nothing needs to be plugged in.",
+  serial: "Chromium, Chrome or Edge, and a plotter that runs penup. The page talks to it by itself.",
+  program: "The program penup has its line, so any browser will do. One page at a time holds it.",
+};
+/** How dark the lines are that are still to be drawn. */
+const PLANNED = 0.28;
+/** The side of the test square in mm. */
+const SQUARE = 20;
+
 export class Plotting {
-  constructor(view, { job, lines, announce }) {
+  /** `program` is the name of the plotter that the program penup has joined, or empty. */
+  constructor(view, { job, lines, announce, program }) {
     Object.assign(this, { view, job, lines, announce, session: null, board: null, close: null });
+    /** Tells an emulated board that the program runs; null if there is none. */
+    this.order = null;
+    if (program) {
+      const option = $("plotter").querySelector("[value=program]");
+      Object.assign(option, { textContent: program, hidden: false });
+      $("plotter").value = "program";
+    }
     this.phase = "closed";
     this.clear();
     this.place = null;
@@ -33,6 +53,19 @@ export class Plotting {
     $("hold").addEventListener("click", () => this.tell("hold"));
     $("resume").addEventListener("click", () => this.tell("resume"));
     $("give-up").addEventListener("click", () => this.tell("give_up"));
+    $("slower").addEventListener("click", () => this.tell("override", { by: -1 }));
+    $("faster").addEventListener("click", () => this.tell("override", { by: 1 }));
+    $("as-set").addEventListener("click", () => this.tell("override", { by: 0 }));
+    $("go-on").addEventListener("click", () => this.goOn(false));
+    $("go-on-origin").addEventListener("click", () => this.goOn(true));
+    $("test-square").addEventListener("click", () => this.tell("testSquare", { mm: SQUARE }));
+    $("heights-read").addEventListener("click", () => this.tell("command", { text: "$$" }));
+    for (const field of document.querySelectorAll("[data-setting]")) {
+      field.addEventListener("change", () => {
+        if (!field.reportValidity() || field.value === "") return;
+        this.tell("command", { text: `$${field.dataset.setting}=${field.value}` });
+      });
+    }
     $("unlock").addEventListener("click", () => this.tell("command", { text: "$X" }));
     $("pen-in").addEventListener("click", () => this.penIsIn());
     $("pace").addEventListener("change", () =>
@@ -44,29 +77,36 @@ export class Plotting {
       );
     }
     for (const button of document.querySelectorAll("[data-jog]")) {
-      const [x, y] = button.dataset.jog.split(",");
-      button.addEventListener("click", () =>
-        this.tell("command", { text: `$J=G91 G21 X${x} Y${y} F3000` }),
-      );
+      button.addEventListener("click", () => {
+        const mm = Number($("jog-mm").value);
+        const [x, y] = button.dataset.jog.split(",").map((way) => way * mm);
+        this.tell("command", { text: `$J=G91 G21 X${x} Y${y} F3000` });
+      });
     }
     this.choose();
   }
 
-  get isSerial() {
-    return $("plotter").value === "serial";
+  get kind() {
+    return $("plotter").value;
+  }
+
+  /** Whether the plotter must be joined first. */
+  get isFar() {
+    return this.kind !== "emulated";
+  }
+
+  /** Whether the path of the pen is told by the pins of an emulated board. */
+  get hasPins() {
+    return !this.isFar || this.count > 0;
   }
 
   /** Another plotter is chosen: what was joined to the last one ends. */
   choose() {
     this.close?.();
     this.end();
-    const missing = this.isSerial ? cannot() : "";
-    $("plotter-hint").textContent =
-      missing ||
-      (this.isSerial
-        ? "Chromium, Chrome or Edge, and a plotter that runs penup. The page talks to it by itself."
-        : "The plotter's own program, on pins of memory. Nothing needs to be plugged in.");
-    $("pace-control").hidden = this.isSerial;
+    const missing = this.kind === "serial" ? cannot() : "";
+    $("plotter-hint").textContent = missing || HINTS[this.kind];
+    $("pace-control").hidden = this.isFar;
     $("connect").disabled = Boolean(missing);
     this.buttons();
   }
@@ -75,7 +115,7 @@ export class Plotting {
   end() {
     this.session?.end();
     this.board?.end();
-    this.session = this.board = this.close = null;
+    this.session = this.board = this.close = this.order = null;
     this.enter("closed");
   }
 
@@ -92,14 +132,26 @@ export class Plotting {
       if (said.event === "path") this.draw(said.path);
       else this.hear(said);
     });
+    this.room = this.job()?.room;
     this.board
-      .ask("board", { pipe: port1, pace: Number($("pace").value) }, [port1])
+      .ask("board", { pipe: port1, pace: Number($("pace").value), room: this.room }, [port1])
       .catch((text) => this.problem(text));
     this.begin(port2, "emulated");
   }
 
   async connect() {
     const { port1, port2 } = new MessageChannel();
+    if (this.kind === "program") {
+      const ended = (text) => {
+        this.end();
+        if (text) this.problem(text);
+      };
+      const { close, order } = joinProgram(port1, ended, (path) => this.draw(path));
+      Object.assign(this, { close, order });
+      this.clear();
+      this.begin(port2, "program");
+      return this.buttons();
+    }
     try {
       this.close = await join(port1, (text) => {
         this.end();
@@ -117,11 +169,15 @@ export class Plotting {
   async plot() {
     const job = this.job();
     if (!job) return this.problem("There is no drawing: open a file first.");
+    // An emulated plotter without room for a larger model is replaced.
+    const isSmall = (room) => Object.keys(room).some((own) => !(this.room?.[own] >= room[own]));
+    if (this.board && isSmall(job.room)) this.end();
     if (!this.session) {
-      if (this.isSerial) return this.problem("Connect the plotter first.");
+      if (this.isFar) return this.problem("Connect the plotter first.");
       this.emulate();
     }
     this.problem("");
+    this.order?.("begin");
     this.clear();
     this.planned = this.lines();
     await this.board?.ask("begin_again");
@@ -131,11 +187,11 @@ export class Plotting {
 
   async tell(call, args) {
     if (!this.session) {
-      if (this.isSerial) return this.problem("Connect the plotter first.");
-      if (call !== "command") return;
+      if (this.isFar) return this.problem("Connect the plotter first.");
+      if (!["command", "testSquare"].includes(call)) return;
       // The first command by hand starts the emulated plotter, and is sent when that is ready.
       this.emulate();
-      this.waiting = args;
+      this.waiting = [call, args];
       return;
     }
     try {
@@ -148,7 +204,24 @@ export class Plotting {
   penIsIn() {
     $("pen-change").hidden = true;
     this.board?.ask("pen", { pen: this.pen });
+    this.order?.({ pen: this.pen });
     this.tell("resume");
+  }
+
+  /** Goes on with the job that has stopped. */
+  async goOn(isAtOrigin) {
+    this.problem("");
+    this.order?.("begin");
+    this.clear();
+    this.planned = null;
+    await this.tell("goOn", { isAtOrigin });
+  }
+
+  /** Shows a setting that the plotter has told, such as `$210=0`. */
+  readSetting(text) {
+    const [, number, value] = /^\$(\d+)=(-?[\d.]+)/.exec(text) ?? [];
+    const field = document.querySelector(`[data-setting="${number}"]`);
+    if (field) field.value = String(Number(value));
   }
 
   hear(said) {
@@ -161,9 +234,9 @@ export class Plotting {
       case "phase":
         this.enter(event.name);
         if (event.name === "ready" && this.waiting) {
-          const args = this.waiting;
+          const waiting = this.waiting;
           this.waiting = null;
-          this.tell("command", args);
+          this.tell(...waiting);
         }
         break;
       case "sent":
@@ -181,8 +254,11 @@ export class Plotting {
         $("pen-change").hidden = false;
         break;
       case "note":
+        this.log(event.text);
+        break;
       case "reply":
         this.log(event.text);
+        this.readSetting(event.text);
         break;
       case "failed":
         this.log(event.text);
@@ -206,15 +282,17 @@ export class Plotting {
     // How the last drawing ended stays until something else begins.
     if (phase !== "ready" || !this.hasEnded) $("plot-state").textContent = PHASES[phase];
     if (phase !== "ready") this.hasEnded = false;
-    if (phase === "closed" && !this.isSerial) $("plot-state").textContent = "Ready.";
+    if (phase === "closed" && !this.isFar) $("plot-state").textContent = "Ready.";
     $("progress").hidden = !["sending", "computing", "drawing"].includes(phase);
     if (phase === "computing") $("progress").removeAttribute("value");
     if (!["drawing"].includes(phase)) $("pen-change").hidden = true;
     this.buttons();
   }
 
-  follow({ state, position, strokes, ink, left }) {
+  follow({ state, position, strokes, ink, left, percent, stopped }) {
     if (position.length >= 2) this.place = position;
+    $("percent").textContent = `${percent} %`;
+    this.offer(this.phase === "ready" ? stopped : null);
     const held = state === "Hold";
     if (held !== this.isHeld) {
       this.isHeld = held;
@@ -230,7 +308,17 @@ export class Plotting {
         ["Time left", left === null ? "" : clock(left)],
       ]);
     }
-    if (this.isSerial) this.view.draw();
+    if (this.isFar) this.view.draw();
+  }
+
+  /** Offers to go on with a job that has stopped, of which so many strokes are drawn. */
+  offer(stopped) {
+    if ($("stopped").hidden === !stopped) return;
+    $("stopped").hidden = !stopped;
+    if (!stopped) return;
+    $("stopped").querySelector("p").textContent =
+      `A job has stopped after ${stopped[0]} of ${stopped[1]} strokes. It can go on once the ` +
+      "machine is homed (By hand: Home), or the pen was put at the origin by hand.";
   }
 
   /** More of the path that the pins of the emulated plotter have made. */
@@ -255,16 +343,18 @@ export class Plotting {
     const busy = ["sending", "computing", "drawing"].includes(this.phase);
     const joined = Boolean(this.session);
     $("plot").disabled =
-      busy || this.phase === "alarm" || (this.isSerial && this.phase !== "ready");
+      busy || this.phase === "alarm" || (this.isFar && this.phase !== "ready");
     $("hold").disabled = this.phase !== "drawing" || this.isHeld;
     $("resume").disabled = !this.isHeld;
     $("give-up").disabled = !busy;
     $("unlock").hidden = this.phase !== "alarm";
-    $("connect").hidden = !this.isSerial || joined;
-    $("disconnect").hidden = !this.isSerial || !joined;
+    $("connect").hidden = !this.isFar || joined;
+    $("disconnect").hidden = !this.isFar || !joined;
+    for (const id of ["slower", "faster", "as-set"]) $(id).disabled = this.phase !== "drawing";
+    if (this.phase !== "ready") this.offer(null);
     $("plotter").disabled = busy;
-    for (const button of document.querySelectorAll("[data-command], [data-jog]")) {
-      button.disabled = busy || (this.isSerial && this.phase !== "ready");
+    for (const button of document.querySelectorAll("[data-command], [data-jog], [data-hand]")) {
+      button.disabled = busy || (this.isFar && this.phase !== "ready");
     }
   }
 
@@ -284,19 +374,19 @@ export class Plotting {
     while ($("log").children.length > 100) $("log").firstChild.remove();
   }
 
-  /** Draws what the plotter has drawn over what it will draw. Returns whether it has begun. */
+  /** What draws what the plotter has drawn over what it will draw; null before it has begun. */
   paint(brush) {
-    const planned = this.planned;
-    if (!this.count && !(this.isSerial && this.phase === "drawing")) return false;
+    return this.count || (this.isFar && this.phase === "drawing") ? this.pieces(brush) : null;
+  }
+
+  *pieces(brush) {
+    const { count, path, planned, view } = this;
     if (planned) {
-      brush.globalAlpha = 0.28;
-      this.view.lines(brush, planned);
-      brush.globalAlpha = 1;
+      yield* view.lines(brush, planned, PLANNED);
     }
-    this.view.path(brush, this.path, this.count / SAMPLE);
-    const last = this.path.subarray(this.count - SAMPLE, this.count);
-    const place = this.isSerial ? this.place : [last[1], last[2]];
-    if (place && this.phase === "drawing") this.view.pen(brush, place, this.isSerial ? 0 : last[3]);
-    return true;
+    yield* view.path(brush, path, count / SAMPLE);
+    const last = path.subarray(count - SAMPLE, count);
+    const place = this.hasPins ? [last[1], last[2]] : this.place;
+    if (place && this.phase === "drawing") view.pen(brush, place, this.hasPins ? last[3] : 0);
   }
 }

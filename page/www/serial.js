@@ -8,7 +8,7 @@ export const cannot = () =>
   "serial" in navigator
     ? ""
     : "This browser has no WebSerial: use Chromium, Chrome or Edge, " +
-      "or the program: penup plot --port …";
+      "or the program: penup page --port …";
 
 /**
  * Lets the user choose a port and joins it to `pipe`, which is a message port. `onend` is called

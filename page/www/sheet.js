@@ -14,6 +14,16 @@ const LEAST_PIXELS = 0.9;
 const LINE = 5,
   SAMPLE = 4;
 
+/** How many pieces are drawn at once, and how many in a frame at first and at least. */
+const CHUNK = 500,
+  FIRST_BUDGET = 6_000,
+  LEAST_BUDGET = 2_000;
+/** The times between frames in ms that let the budget of a frame shrink, or grow. */
+const SLOW = 55,
+  FAST = 25;
+/** In which order the lines of a large picture are drawn: an eighth of them at a time. */
+const EIGHTHS = [0, 4, 2, 6, 1, 5, 3, 7];
+
 export const inkOf = (pen) => (pen < 2 ? INK : INKS[(pen - 2) % INKS.length]);
 
 /** The view of the sheet, and what is on it. */
@@ -23,9 +33,15 @@ export class SheetView {
     this.page = [210, 297];
     this.zoom = 1;
     this.offset = [0, 0];
-    /** What is drawn: a function that gets the brush. */
-    this.paint = () => {};
+    /**
+     * What is drawn: a generator that gets the brush, and yields how many pieces it has drawn. A
+     * large picture takes several frames, so that the page never freezes; while it moves, only its
+     * beginning is seen.
+     */
+    this.paint = function* () {};
     this.isDue = false;
+    this.budget = FIRST_BUDGET;
+    this.rest = null;
     new ResizeObserver(() => this.draw()).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
   }
@@ -34,9 +50,29 @@ export class SheetView {
   draw() {
     if (this.isDue) return;
     this.isDue = true;
-    requestAnimationFrame(() => {
+    requestAnimationFrame((now) => {
       this.isDue = false;
       this.drawNow();
+      this.goOn(now);
+    });
+  }
+
+  /** Draws the next part of the picture, and the rest in the frames that follow. */
+  goOn(now) {
+    let drawn = 0,
+      step;
+    do {
+      step = this.rest.next();
+      drawn += step.value ?? 0;
+    } while (!step.done && drawn < this.budget);
+    const { rest } = this;
+    if (step.done && drawn < LEAST_BUDGET) return;
+    requestAnimationFrame((next) => {
+      // How long the browser takes for the lines is known when the next frame comes.
+      if (next - now > SLOW) this.budget = Math.max(LEAST_BUDGET, Math.round(drawn / 2));
+      else if (next - now < FAST) this.budget = Math.round(drawn * 1.5);
+      // Another picture may have begun.
+      if (!step.done && this.rest === rest && !this.isDue) this.goOn(next);
     });
   }
 
@@ -104,39 +140,67 @@ export class SheetView {
     brush.fillStyle = PAPER;
     brush.fillRect(0, 0, w, h);
     brush.restore();
+    brush.globalAlpha = 1;
     brush.lineCap = brush.lineJoin = "round";
     this.pixel = ratio / scale;
     brush.lineWidth = Math.max(PEN_WIDTH, LEAST_PIXELS * this.pixel);
-    this.paint(brush);
+    this.rest = this.paint(brush);
   }
 
-  /** Draws lines: x1, y1, x2, y2 and the pen of each. */
-  lines(brush, lines) {
-    let pen = NaN;
-    for (let at = 0; at < lines.length; at += LINE) {
-      if (lines[at + 4] !== pen) {
-        if (!Number.isNaN(pen)) brush.stroke();
+  /**
+   * Draws lines: x1, y1, x2, y2 and the pen of each. Of more lines than a frame has time for, those
+   * that are drawn first are spread over the picture. `alpha` is how dark they are.
+   */
+  *lines(brush, lines, alpha = 1) {
+    brush.globalAlpha = alpha;
+    const count = lines.length / LINE;
+    const isLarge = count > this.budget;
+    for (const first of isLarge ? EIGHTHS : [0]) {
+      yield* this.someLines(brush, lines, first, isLarge ? EIGHTHS.length : 1);
+    }
+    brush.globalAlpha = 1;
+  }
+
+  *someLines(brush, lines, first, every) {
+    let pen = NaN,
+      drawn = 0;
+    for (let at = first * LINE; at < lines.length; at += LINE * every) {
+      if (lines[at + 4] !== pen || drawn === CHUNK) {
+        if (!Number.isNaN(pen)) {
+          brush.stroke();
+          yield drawn;
+        }
+        drawn = 0;
         pen = lines[at + 4];
         brush.strokeStyle = inkOf(pen);
         brush.beginPath();
       }
       brush.moveTo(lines[at], lines[at + 1]);
       brush.lineTo(lines[at + 2], lines[at + 3]);
+      drawn++;
     }
     if (!Number.isNaN(pen)) brush.stroke();
+    yield drawn;
   }
 
   /**
    * Draws the samples of a path from `first` on, up to the index `end`: time, x, y and pen of
    * each. `faint` ink is still to be drawn.
    */
-  path(brush, path, end, { first = 0, faint = false } = {}) {
-    let pen = 0;
-    brush.globalAlpha = faint ? 0.28 : 1;
+  *path(brush, path, end, { first = 0, faint = false } = {}) {
+    let pen = 0,
+      drawn = 0;
+    const alpha = faint ? 0.28 : 1;
+    brush.globalAlpha = alpha;
     for (let at = Math.max(first, 1); at < end; at++) {
       const now = path[at * SAMPLE + 3];
-      if (now !== pen) {
+      if (now !== pen || drawn === CHUNK) {
         if (pen) brush.stroke();
+        if (drawn === CHUNK) {
+          yield drawn;
+          drawn = 0;
+          brush.globalAlpha = alpha;
+        }
         pen = now;
         if (pen) {
           brush.strokeStyle = inkOf(pen);
@@ -145,44 +209,55 @@ export class SheetView {
         }
       }
       if (pen) brush.lineTo(path[at * SAMPLE + 1], path[at * SAMPLE + 2]);
+      drawn++;
     }
     if (pen) brush.stroke();
     brush.globalAlpha = 1;
+    yield drawn;
   }
 
-  /** Draws the moves with the pen up between strokes, with an arrow at the middle of each. */
-  moves(brush, strokes) {
-    const width = brush.lineWidth;
-    brush.strokeStyle = brush.fillStyle = TRAVEL;
-    brush.lineWidth = Math.max(0.15, 0.7 * this.pixel);
+  /**
+   * Draws the moves with the pen up between strokes, with an arrow at the middle of each. `ends` are
+   * x and y where each stroke begins and where it ends.
+   */
+  *moves(brush, ends) {
     const size = Math.max(0.9, 4 * this.pixel);
-    brush.beginPath();
-    for (let at = 1; at < strokes.length; at++) {
-      const from = strokes[at - 1].at(-1),
-        to = strokes[at][0];
-      brush.moveTo(...from);
-      brush.lineTo(...to);
+    const count = ends.length / 4;
+    for (let first = 1; first < count; first += CHUNK) {
+      const end = Math.min(count, first + CHUNK);
+      const width = brush.lineWidth;
+      brush.strokeStyle = brush.fillStyle = TRAVEL;
+      brush.lineWidth = Math.max(0.15, 0.7 * this.pixel);
+      brush.beginPath();
+      for (let at = first; at < end; at++) {
+        brush.moveTo(ends[4 * at - 2], ends[4 * at - 1]);
+        brush.lineTo(ends[4 * at], ends[4 * at + 1]);
+      }
+      brush.globalAlpha = 0.6;
+      brush.stroke();
+      brush.globalAlpha = 1;
+      brush.beginPath();
+      for (let at = first; at < end; at++) {
+        arrow(brush, ends.subarray(4 * at - 2, 4 * at), ends.subarray(4 * at, 4 * at + 2), size);
+      }
+      brush.fill();
+      brush.lineWidth = width;
+      // An arrow takes as long as some lines.
+      yield 4 * (end - first);
     }
-    brush.globalAlpha = 0.6;
-    brush.stroke();
-    brush.globalAlpha = 1;
-    for (let at = 1; at < strokes.length; at++) {
-      arrow(brush, strokes[at - 1].at(-1), strokes[at][0], size);
-    }
-    brush.lineWidth = width;
   }
 
   /** Marks the start of the first stroke and the end of the last one. */
-  marks(brush, strokes) {
-    if (!strokes.length) return;
+  marks(brush, ends) {
+    if (!ends.length) return;
     const radius = Math.max(0.7, 3.2 * this.pixel);
     brush.fillStyle = START;
-    disc(brush, strokes[0][0], radius);
+    disc(brush, ends.subarray(0, 2), radius);
     brush.fill();
     brush.strokeStyle = END;
     const width = brush.lineWidth;
     brush.lineWidth = Math.max(0.2, 1.4 * this.pixel);
-    disc(brush, strokes.at(-1).at(-1), radius * 1.4);
+    disc(brush, ends.subarray(-2), radius * 1.4);
     brush.stroke();
     brush.lineWidth = width;
   }
@@ -205,17 +280,17 @@ function disc(brush, [x, y], radius) {
   brush.arc(x, y, radius, 0, 2 * Math.PI);
 }
 
+/** Adds an arrow to what is filled. */
 function arrow(brush, from, to, size) {
   const [dx, dy] = [to[0] - from[0], to[1] - from[1]];
   const length = Math.hypot(dx, dy);
   if (length < 2.5 * size) return;
   const [ux, uy] = [dx / length, dy / length];
   const [x, y] = [(from[0] + to[0]) / 2 + (ux * size) / 2, (from[1] + to[1]) / 2 + (uy * size) / 2];
-  brush.beginPath();
   brush.moveTo(x, y);
   brush.lineTo(x - ux * size - uy * size * 0.45, y - uy * size + ux * size * 0.45);
   brush.lineTo(x - ux * size + uy * size * 0.45, y - uy * size - ux * size * 0.45);
-  brush.fill();
+  brush.closePath();
 }
 
 /** The index of the first sample of a path behind `time`. */

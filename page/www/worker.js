@@ -3,10 +3,11 @@
 // or to be the emulated plotter itself. Each message is {id, call, args}; each answer is
 // {id, value} or {id, error}, and what comes without being asked for is {event, …}.
 
+import { summary } from "./strokes.js";
 import init, { Board, Session, Sheet, fault } from "./penup_page.js";
 
 /** The time in ms after which a session gives up a plotter that says nothing. */
-const SILENCE = { emulated: 120_000, serial: 5_000 };
+const SILENCE = { emulated: 120_000, serial: 5_000, program: 20_000 };
 /** How much of the plotter's time passes between two looks at the session, in ms. */
 const REPLAY_STEP = 200;
 
@@ -18,25 +19,26 @@ const calls = {
   },
 
   /** Opens a file and tells what is in it. */
-  open({ name, bytes, options }) {
+  open({ name, bytes, isRead, options }) {
     sheet ??= new Sheet();
-    const scene = JSON.parse(sheet.open(name, bytes, options));
+    const scene = JSON.parse(sheet.open(name, bytes, isRead, options));
     return { scene, camera: JSON.parse(sheet.camera()) };
   },
 
-  /** Sets options, and draws. `reads` tells that the file must be read again. */
+  /** Sets options, and draws. `reads` tells that the lines of the file must be sent again. */
   draw({ options, reads }) {
     const began = performance.now();
     if (reads) sheet.set(options);
     else sheet.turn(options);
     const lines = sheet.draw();
-    const value = { lines, camera: JSON.parse(sheet.camera()), ms: performance.now() - began };
+    const [page, camera] = [[...sheet.page()], JSON.parse(sheet.camera())];
+    const value = { lines, page, camera, ms: performance.now() - began };
     return [value, [lines.buffer]];
   },
 
   /** Computes the whole drawing ahead, by a session with an emulated plotter. */
-  async compute({ name, bytes, options, page, memory }) {
-    board = new Board(memory);
+  async compute({ name, bytes, isRead, options, page, room, memory }) {
+    board = new Board(memory, JSON.stringify(room));
     session = new Session(1e12);
     const paths = [];
     const notes = [];
@@ -45,7 +47,7 @@ const calls = {
       reported = 0,
       begun = false;
     session.connect(now);
-    session.plot(name, bytes, options);
+    session.plot(name, bytes, isRead, options);
     for (;;) {
       const out = session.take_out();
       if (out.length) board.receive(out);
@@ -79,8 +81,14 @@ const calls = {
       at += part.length;
     }
     const strokes = board.strokes();
-    const svg = board.svg(page[0], page[1]);
-    return [{ path, strokes, svg, report, notes }, [path.buffer, strokes.buffer]];
+    const more = summary(path, strokes);
+    const { ends, begins } = more;
+    // As a blob it need not be copied.
+    const svg = new Blob([board.svg(page[0], page[1])], { type: "image/svg+xml" });
+    const gcode = new Blob([board.gcode()], { type: "text/plain" });
+    const hpgl = new Blob([board.hpgl()], { type: "text/plain" });
+    const value = { path, strokes, svg, gcode, hpgl, report, notes, ...more };
+    return [value, [path.buffer, strokes.buffer, ends.buffer, begins.buffer]];
   },
 
   /** Begins a session at one end of a pipe of bytes, which is a port. */
@@ -108,8 +116,17 @@ const calls = {
       20,
     );
   },
-  plot({ name, bytes, options }) {
-    session.plot(name, bytes, options);
+  plot({ name, bytes, isRead, options }) {
+    session.plot(name, bytes, isRead, options);
+  },
+  override({ by }) {
+    session.override_speed(by);
+  },
+  goOn({ isAtOrigin }) {
+    session.go_on(isAtOrigin);
+  },
+  testSquare({ mm }) {
+    session.test_square(mm);
   },
   hold() {
     session.hold();
@@ -125,8 +142,8 @@ const calls = {
   },
 
   /** Is the emulated plotter, at the other end of such a pipe. */
-  board({ pipe, pace }) {
-    board = new Board("");
+  board({ pipe, pace, room }) {
+    board = new Board("", JSON.stringify(room ?? null));
     calls.pace({ pace });
     pipe.onmessage = ({ data }) => guarded(() => board.receive(data.bytes));
     let last = performance.now();

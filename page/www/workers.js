@@ -12,15 +12,16 @@ export async function load() {
 
 /** A worker that can be asked. `onevent` gets what it tells without being asked. */
 export class Helper {
-  constructor(onevent = () => {}) {
+  constructor(onevent = () => {}, script = "worker.js") {
     this.asked = new Map();
     this.last = 0;
-    this.worker = new Worker("worker.js", { type: "module" });
+    this.worker = new Worker(script, { type: "module" });
     this.worker.onmessage = ({ data }) => {
       if (data.event) return onevent(data);
       const { resolve, reject } = this.asked.get(data.id);
       this.asked.delete(data.id);
-      if ("error" in data) reject(data.error);
+      if ("broke" in data) reject(new Error(data.broke));
+      else if ("error" in data) reject(data.error);
       else resolve(data.value);
     };
     this.worker.onerror = (event) => {

@@ -35,7 +35,7 @@ pub use arrange::{Arrangement, PLAN_OPTIONS, PlanOption, Turn};
 pub use error::ReadError;
 pub use format::SIZE_LIMIT;
 
-use crate::lines::{JobLine, Lines};
+use crate::lines::{JobLine, Lines, extent};
 use crate::page::{A4, Page};
 use crate::plan::Plan;
 use format::{Body, Contents, Format};
@@ -161,19 +161,7 @@ impl SourceFile {
 
     /// The least and the greatest x, y and z of the vertices; `None` if there are none.
     pub fn extent(&self) -> Option<[[f64; 3]; 2]> {
-        let points = self.in_order().filter_map(|line| {
-            let mut words = line.sent.strip_prefix("v ")?.split(' ');
-            let mut number = || words.next()?.parse::<f64>().ok();
-            Some([number()?, number()?, number()?])
-        });
-        points.fold(None, |extent, point| {
-            let [low, high] = extent.unwrap_or([point; 2]);
-            let axes = [0, 1, 2];
-            Some([
-                axes.map(|axis: usize| low[axis].min(point[axis])),
-                axes.map(|axis: usize| high[axis].max(point[axis])),
-            ])
-        })
+        extent(self)
     }
 
     /// What the user should know about the file: sentences without a full stop, each about

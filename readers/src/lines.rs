@@ -68,6 +68,23 @@ pub trait Lines: Debug {
     }
 }
 
+/// The least and the greatest x, y and z of the vertices in `lines`; `None` if there are none.
+pub fn extent(lines: &dyn Lines) -> Option<[[f64; 3]; 2]> {
+    let points = lines.in_order().filter_map(|line| {
+        let mut words = line.sent.strip_prefix("v ")?.split(' ');
+        let mut number = || words.next()?.parse::<f64>().ok();
+        Some([number()?, number()?, number()?])
+    });
+    points.fold(None, |extent, point| {
+        let [low, high] = extent.unwrap_or([point; 2]);
+        let axes = [0, 1, 2];
+        Some([
+            axes.map(|axis: usize| low[axis].min(point[axis])),
+            axes.map(|axis: usize| high[axis].max(point[axis])),
+        ])
+    })
+}
+
 impl<const COUNT: usize> Lines for [JobLine; COUNT] {
     fn count(&self) -> usize {
         COUNT

@@ -7,17 +7,29 @@ use std::process::Command;
 use anyhow::Result;
 
 use crate::command::{cargo, run};
+use crate::firmware;
 use crate::set_up;
+use crate::table::LM3S6965;
 
 /// The target that a browser runs.
 const TARGET: &str = "wasm32-unknown-unknown";
+
+/// The packages of the page's programs. The first is loaded with the page, the other when it is
+/// needed.
+const PROGRAMS: [&str; 2] = ["penup-page", "penup-page-files"];
 
 /// Builds the page into `target/page`.
 pub fn build() -> Result<()> {
     set_up::target(TARGET)?;
     let root = crate::root();
-    let options = ["--package=penup-page", "--profile=browser", "--target", TARGET];
-    run(cargo().current_dir(&root).args(["build", "--quiet"]).args(options))?;
+    let built = root.join("target").join(TARGET).join("browser");
+    for package in PROGRAMS {
+        // Together, the first would have the features of the second.
+        run(cargo()
+            .current_dir(&root)
+            .args(["build", "--quiet", "--profile=browser", "--target", TARGET])
+            .args(["--package", package]))?;
+    }
     // What builds the page is a workspace of its own, so that no other build compiles it.
     let builder = root.join("page/builder/Cargo.toml");
     if !root.join("target/page-builder").exists() {
@@ -29,9 +41,9 @@ pub fn build() -> Result<()> {
         .arg("--target-dir")
         .arg(root.join("target/page-builder"))
         .arg("--")
-        .arg(root.join("target").join(TARGET).join("browser/penup_page.wasm"))
         .arg(&root)
-        .arg(folder()))
+        .arg(folder())
+        .args(PROGRAMS.map(|package| built.join(package.replace('-', "_") + ".wasm"))))
 }
 
 /// The folder of the page that was built.
@@ -54,6 +66,9 @@ pub struct TestArguments {
 pub fn test(arguments: &TestArguments) -> Result<()> {
     let installed = set_up::browser()?;
     build()?;
+    // The page is joined to this board by the client.
+    set_up::emulator(&LM3S6965)?;
+    firmware::check(&LM3S6965, &firmware::build(&LM3S6965)?)?;
     let root = crate::root();
     run(cargo().current_dir(&root).args(["build", "--quiet", "--package", "penup-client"]))?;
     let tests = root.join("page/browser-tests");

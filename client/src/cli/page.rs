@@ -1,9 +1,14 @@
 //! The arguments of `penup page`, and what it does.
 
-use super::FormatArgs;
+use super::{FormatArgs, machine};
+use crate::board;
+use crate::bridge::{Bridge, Far};
 use crate::error::Error;
+use crate::machines;
 use crate::outcome::Outcome;
+use crate::ports;
 use crate::serve::PageServer;
+use crate::table::BoardRow;
 use crate::workspace;
 use clap::Args;
 use std::io::{self, Write as _};
@@ -21,6 +26,18 @@ pub struct PageArgs {
     /// The port to listen at, on this computer alone; 0 takes one that is free
     #[arg(long, value_name = "PORT", default_value = "0")]
     pub listen: u16,
+    /// The serial port of a plotter, for browsers that cannot use one.
+    #[arg(
+        long,
+        value_name = "DEVICE",
+        help = format!("Join the page to a plotter, in any browser. {}", machine::port_help()),
+        conflicts_with = "board",
+        help_heading = "Plotter"
+    )]
+    pub port: Option<String>,
+    /// Join the page to this emulated board; what is drawn comes from its pins
+    #[arg(long, value_parser = board::parser(), help_heading = "Plotter")]
+    pub board: Option<&'static BoardRow>,
     /// How an answer is printed.
     #[command(flatten)]
     pub format: FormatArgs,
@@ -32,10 +49,12 @@ pub struct PageArgs {
 /// Serves the page until the process ends.
 ///
 /// # Errors
-/// The page is not built, the file cannot be read, or the port is in use.
+/// The page is not built, the file cannot be read, the port is in use, or the plotter cannot be
+/// joined.
 pub fn serve(args: &PageArgs) -> Result<Outcome, Error> {
     let folder = args.folder.clone().unwrap_or_else(|| workspace::root().join("target/page"));
-    let server = PageServer::new(&folder, args.file.as_deref(), args.listen)?;
+    let bridge = bridge(args)?;
+    let server = PageServer::new(&folder, args.file.as_deref(), args.listen, bridge)?;
     let address = server.address();
     let said = match args.format.json {
         true => serde_json::json!({ "address": address }).to_string(),
@@ -51,4 +70,20 @@ pub fn serve(args: &PageArgs) -> Result<Outcome, Error> {
     say("Ctrl-C ends the page");
     server.run();
     Ok(Outcome::sentence("the page is closed"))
+}
+
+/// The bridge to the plotter that the arguments name, and what the page calls that plotter.
+fn bridge(args: &PageArgs) -> Result<Option<(String, Bridge)>, Error> {
+    if let Some(board) = args.board {
+        let open = move || machines::emulate(board).map(Far::Board);
+        let name = format!("Emulated board {}", board.name);
+        return Ok(Some((name, Bridge::new(Box::new(open))?)));
+    }
+    let Some(device) = args.port.clone() else { return Ok(None) };
+    let name = match device.as_str() {
+        ports::AUTOMATIC => "The plotter of the program penup".to_owned(),
+        device => format!("The plotter at {device}"),
+    };
+    let open = move || -> Result<Far, Error> { Ok(Far::Port(Box::new(ports::open(&device)?))) };
+    Ok(Some((name, Bridge::new(Box::new(open))?)))
 }

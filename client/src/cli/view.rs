@@ -12,7 +12,10 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use penup::plotter::{Flag, OPTIONS, PlotOption, PlotOptions};
 use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
 use penup_job::Settings;
-use penup_job::view::{self, NAMED_VIEWS, THREE_QUARTER, Viewpoint, turned_upright};
+use penup_job::view::{
+    AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
+};
+use penup_job::wishes::{FilePage, Wishes, page_value};
 use penup_readers::lines::acts_at_once;
 use penup_readers::page::{NAMED_PAGES, Page};
 use penup_readers::words::for_client;
@@ -32,25 +35,16 @@ const FIT: &str = "fit";
 const LANDSCAPE: &str = "landscape";
 const ALWAYS: &str = "always";
 const AUTOMATIC: &str = "auto";
-/// The arguments that choose the eye by its direction.
-const VIEW: &str = "view";
-const AZIMUTH: &str = "azimuth";
-const ELEVATION: &str = "elevation";
-const Y_UP: &str = "y-up";
-/// The names of the options that they change.
+/// The name of the option that says what is up.
 const UP: &str = "up";
-const PROJECTION: &str = "projection";
-/// What is up where nobody says so.
-const UPRIGHT: [f64; 3] = [0.0, 0.0, 1.0];
 /// The heading of the options of plans.
 const PLAN: &str = "Plan: a drawing of straight lines at one height, in this order";
 
 /// The arguments of camera, page and order.
 #[derive(Debug, Clone)]
 pub struct ViewArgs {
-    settings: Settings,
+    wishes: Wishes,
     arrangement: Arrangement,
-    viewpoint: Option<Viewpoint>,
 }
 
 impl ViewArgs {
@@ -59,98 +53,15 @@ impl ViewArgs {
         &self.arrangement
     }
 
-    /// The settings for a file that was arranged by [`ViewArgs::arrangement`]. Where the arguments
-    /// do not say otherwise, a file that has a page is drawn on that, and at true size no margin is
-    /// kept free: so its plan keeps its place.
+    /// The settings for a file that was arranged by [`ViewArgs::arrangement`].
     ///
     /// # Errors
-    /// The direction of the view contradicts the projection, or the file is a plan, which has no
-    /// up.
+    /// As [`Wishes::settings_for`].
     pub fn settings_for(&self, file: &SourceFile) -> Result<Settings, String> {
-        let mut settings = self.settings.clone();
-        settings.page = file.sheet();
-        let is_own = file.page().is_some();
-        let is_true_size = settings.value(FIT) == Some("off");
-        let page = page_value(settings.page);
-        for (name, value) in &mut settings.values {
-            match *name {
-                PAGE => value.clone_from(&page),
-                MARGIN if is_own && is_true_size && !self.arrangement.has_margin() => {
-                    "0".clone_into(value);
-                }
-                _ => {}
-            }
-        }
-        self.look(file, &mut settings)?;
-        Ok(settings)
+        let page =
+            FilePage { own: file.page(), sheet: file.sheet(), is_plan: file.bounds().is_some() };
+        self.wishes.settings_for(&page, file)
     }
-
-    /// Chooses the eye if the arguments give a direction, or say what is up: the plotter's own
-    /// choice is made for models with z up.
-    fn look(&self, file: &SourceFile, settings: &mut Settings) -> Result<(), String> {
-        let position = |name: &str| -> Option<[f64; 3]> {
-            let parts = settings.value(name)?.split(',').map(|part| part.trim().parse());
-            parts.collect::<Result<Vec<f64>, _>>().ok()?.try_into().ok()
-        };
-        let (up, at) = (position(UP), position("at"));
-        let is_chosen = settings.value("eye").or(settings.value("angles")).is_some();
-        if is_chosen || self.viewpoint.is_none() && up.is_none() {
-            return Ok(());
-        }
-        if self.viewpoint.is_none() && file.bounds().is_some() {
-            return Err(format!(
-                "--{UP} and --{Y_UP} are for models in space, and this drawing lies flat"
-            ));
-        }
-        let Some(extent) = file.extent() else { return Ok(()) };
-        let projection = settings.value(PROJECTION).unwrap_or_default();
-        let fixed = axonometric(projection);
-        let (direction, own_up) = match (self.viewpoint, fixed) {
-            (Some(_), Some(_)) => {
-                return Err(format!(
-                    "--{PROJECTION} {projection} has a direction of its own: choose \
-                     orthographic, or leave --{VIEW}, --{AZIMUTH} and --{ELEVATION} out"
-                ));
-            }
-            (Some(view), None) | (None, Some(view)) => (view.direction(), view.up()),
-            (None, None) if is_oblique(projection) => ([0.0, -1.0, 0.0], UPRIGHT),
-            (None, None) => (THREE_QUARTER, UPRIGHT),
-        };
-        let stands = up.unwrap_or(UPRIGHT);
-        let turned = [direction, own_up].map(|vector| turned_upright(vector, stands));
-        let [Some(direction), Some(own_up)] = turned else { return Ok(()) };
-        let size = (0..3).map(|axis| extent[1][axis] - extent[0][axis]).fold(0.0, f64::max);
-        let mut set = |name: &'static str, value: String| {
-            settings.values.retain(|(own, _)| *own != name);
-            settings.values.push((name, value));
-        };
-        set("eye", view::text(view::eye(extent, direction, at), size));
-        set(UP, view::text(own_up, 1.0));
-        if fixed.is_some() {
-            set(PROJECTION, "orthographic".to_owned());
-        }
-        Ok(())
-    }
-}
-
-/// The direction of an axonometric projection; `None` for any other.
-fn axonometric(projection: &str) -> Option<Viewpoint> {
-    let mut options = PlotOptions::default();
-    options.set(PROJECTION, projection).ok()?;
-    // The plotter lists these projections by their angles.
-    let lines = options.lines().map(|line| line.to_string());
-    let line = lines.into_iter().find(|line| line.starts_with("$projection=axonometric,"))?;
-    let mut angles = line.split(',').skip(1).map(|angle| angle.parse::<f64>());
-    Some(Viewpoint { azimuth: angles.next()?.ok()?, elevation: angles.next()?.ok()? })
-}
-
-fn is_oblique(projection: &str) -> bool {
-    projection.starts_with("oblique") || matches!(projection, "cavalier" | "cabinet")
-}
-
-/// A page as the value of its option.
-fn page_value(page: Page) -> String {
-    format!("{}x{}", page.width, page.height)
 }
 
 impl Args for ViewArgs {
@@ -222,26 +133,15 @@ impl FromArgMatches for ViewArgs {
                     .map_err(|reason| Error::raw(ErrorKind::ValueValidation, reason))?;
             }
         }
-        let named = matches.get_one::<String>(VIEW).and_then(|name| {
-            NAMED_VIEWS.iter().find(|(own, _)| own == name).map(|(_, view)| *view)
-        });
-        let angle = |name| matches.get_one::<f64>(name).copied();
-        let viewpoint = match (named, angle(AZIMUTH), angle(ELEVATION)) {
-            (None, None, None) => None,
-            (Some(view), _, _) => Some(view),
-            (None, azimuth, elevation) => {
-                let usual = Viewpoint::three_quarter();
-                Some(Viewpoint {
-                    azimuth: azimuth.unwrap_or(usual.azimuth),
-                    elevation: elevation.unwrap_or(usual.elevation),
-                })
-            }
-        };
+        let side = matches.get_one::<String>(VIEW.name).map(String::as_str);
+        let angle = |option: ViewOption| matches.get_one::<f64>(option.name).copied();
+        let viewpoint = Viewpoint::chosen(side, angle(AZIMUTH), angle(ELEVATION));
         let mut settings = settings;
-        if matches.get_flag(Y_UP) {
+        if matches.get_flag(Y_UP.name) {
             settings.values.push((UP, "0,1,0".to_owned()));
         }
-        Ok(Self { settings, arrangement, viewpoint })
+        let has_margin = arrangement.has_margin();
+        Ok(Self { wishes: Wishes { settings, viewpoint, has_margin }, arrangement })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {
@@ -257,11 +157,13 @@ fn flags() -> impl Iterator<Item = (&'static PlotOption, Flag)> {
 
 /// The arguments that choose the eye by its direction.
 fn view_arguments() -> [Arg; 4] {
-    let argument = |name| Arg::new(name).long(name).help_heading("Camera");
+    let argument = |option: ViewOption| {
+        Arg::new(option.name).long(option.name).help(option.help).help_heading("Camera")
+    };
     let names = NAMED_VIEWS.map(|(name, _)| name);
-    let angle = |name, most: f64| {
-        let argument = argument(name).value_name("DEGREES").allow_hyphen_values(true);
-        argument.conflicts_with_all(["eye", "angles", VIEW]).value_parser(move |text: &str| {
+    let angle = |option: ViewOption, most: f64| {
+        let argument = argument(option).value_name(option.value).allow_hyphen_values(true);
+        argument.conflicts_with_all(["eye", "angles", VIEW.name]).value_parser(move |text: &str| {
             match number(text)? {
                 angle if angle.abs() <= most => Ok(angle),
                 _ => Err(format!("the angle is -{most} to {most} degrees")),
@@ -270,21 +172,12 @@ fn view_arguments() -> [Arg; 4] {
     };
     [
         argument(VIEW)
-            .help("See the model from this side")
-            .value_name("SIDE")
+            .value_name(VIEW.value)
             .conflicts_with_all(["eye", "angles"])
             .value_parser(PossibleValuesParser::new(names)),
-        angle(AZIMUTH, 360.0).help(
-            "See the model from this angle about the vertical, with any projection: -90 is in \
-             front, 0 on the right [default: -59]",
-        ),
-        angle(ELEVATION, 90.0).help(
-            "See the model from this angle above the horizontal, with any projection [default: 30]",
-        ),
-        argument(Y_UP)
-            .help("The file has y up: the model stands upright, and its front is at positive z")
-            .conflicts_with_all([UP, "angles"])
-            .action(ArgAction::SetTrue),
+        angle(AZIMUTH, MOST_DEGREES[0]),
+        angle(ELEVATION, MOST_DEGREES[1]),
+        argument(Y_UP).conflicts_with_all([UP, "angles"]).action(ArgAction::SetTrue),
     ]
 }
 

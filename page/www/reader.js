@@ -1,0 +1,18 @@
+// Reads files of the large formats and arranges plans, in a worker of its own: a file that is
+// nested too deeply ends it, and nothing else.
+
+import init, { read } from "./penup_page_files.js";
+
+let ready = null;
+
+onmessage = async ({ data: { id, call, args } }) => {
+  if (call === "start") return postMessage({ id });
+  try {
+    ready ??= init({ module_or_path: fetch("penup_page_files_bg.wasm") });
+    await ready;
+    const bytes = read(args.name, args.bytes, args.options);
+    postMessage({ id, value: bytes }, [bytes.buffer]);
+  } catch (error) {
+    postMessage({ id, ...(typeof error === "string" ? { error } : { broke: String(error) }) });
+  }
+};
