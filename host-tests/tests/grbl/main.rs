@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup::machine::{Contacts, State};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
+use penup::plotter::Board;
 use penup_host_tests::whole_jobs::Bench;
 
 /// A row of the list.
@@ -31,25 +31,9 @@ fn rows() -> impl Iterator<Item = Row<'static>> {
     })
 }
 
-/// Lets a number of milliseconds pass.
-fn work(bench: &mut Bench, milliseconds: u32) {
-    for _ in 0..milliseconds {
-        while bench.plotter.poll(&mut bench.board) {}
-        bench.board.wait();
-    }
-}
-
-/// A plotter with little memory.
-fn bench() -> Bench {
-    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
-    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
-    bench.heard();
-    bench
-}
-
 /// A plotter in one of the states of the list.
 fn bench_in(state: &str) -> Bench {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     let (bytes, milliseconds): (&[u8], _) = match state {
         "idle" => (b"", 0),
         "run" => (b"M3 S0\nM5\nG1 X300 F600\n", 700),
@@ -61,10 +45,10 @@ fn bench_in(state: &str) -> Bench {
         _ => panic!("no state {state}"),
     };
     bench.board.receive(bytes);
-    work(&mut bench, milliseconds);
+    bench.work(milliseconds);
     if state == "hold" {
         bench.board.receive(b"!");
-        work(&mut bench, 1500);
+        bench.work(1500);
     }
     bench.heard();
     bench
@@ -88,7 +72,7 @@ fn answer(state: &str, sent: &str) -> String {
                 rest = &rest[3..];
             }
             '\\' => {
-                work(&mut bench, if rest.starts_with('p') { 3 } else { 1500 });
+                bench.work(if rest.starts_with('p') { 3 } else { 1500 });
                 rest = &rest[1..];
             }
             letter => bench.board.receive(letter.encode_utf8(&mut [0; 4]).as_bytes()),
@@ -96,7 +80,7 @@ fn answer(state: &str, sent: &str) -> String {
     }
     // An arc or a dwell is answered when it is done.
     for _ in 0..200 {
-        work(&mut bench, 25);
+        bench.work(25);
         heard += &bench.heard();
         let answers =
             heard.lines().filter(|line| *line == "ok" || line.starts_with("error:")).count();
@@ -132,7 +116,7 @@ fn agrees(heard: &str, expected: &str) -> bool {
 /// The time that homing takes, in milliseconds, with the settings. While the machine homes, its
 /// switches lie 5 mm from where it begins.
 fn homing_time(settings: &str) -> u32 {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     bench.say("$22=1\n$130=60\n$131=60\n$J=X30 Y20 F6000\n");
     bench.finish();
     bench.say(settings);
@@ -161,7 +145,7 @@ fn homing_pauses_after_each_of_its_moves() {
 
 #[test]
 fn the_origin_of_the_coordinates_moves_what_is_drawn() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     // 20 mm by G54, 5 mm more by G92; then from there, by the machine's own coordinates, and back.
     for (lines, position) in [
         ("G10 L2 P1 X20 Y10\nG0 X1 Y1\n", "21.000,11.000"),
@@ -190,7 +174,7 @@ fn the_origin_of_the_coordinates_moves_what_is_drawn() {
 #[test]
 fn the_override_of_rapid_moves_slows_those_with_the_pen_up_only() {
     let time = |bytes: &[u8], line: &str| {
-        let mut bench = bench();
+        let mut bench = Bench::small();
         bench.board.receive(bytes);
         bench.say(line);
         bench.finish();
@@ -202,7 +186,7 @@ fn the_override_of_rapid_moves_slows_those_with_the_pen_up_only() {
 
 #[test]
 fn letters_of_utf_8_are_no_orders() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     assert_eq!(bench.say("# Å Д °±\n(Ä)\n"), "ok\nok\n");
     assert!(bench.say("?").starts_with("<Idle|"));
 }
