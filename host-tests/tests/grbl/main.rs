@@ -3,8 +3,10 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use penup::boards::host::Change;
 use penup::machine::{Contacts, State};
 use penup::plotter::Board;
+use penup_host_tests::ink;
 use penup_host_tests::whole_jobs::Bench;
 
 /// A row of the list.
@@ -134,6 +136,102 @@ fn homing_time(settings: &str) -> u32 {
         }
     }
     panic!("homing does not end");
+}
+
+/// Where the machine is after homing with `$23=MASK`, and how far its pins have moved from where it
+/// began. Its switches lie 5 mm away.
+fn homed(mask: u8) -> (String, [i32; 2]) {
+    let mut bench = Bench::small();
+    bench.say("$22=1\n$130=60\n$131=50\n$J=X30 Y20 F6000\n");
+    bench.finish();
+    bench.say(&format!("$23={mask}\n"));
+    let (_, began) = ink::inked(&bench);
+    bench.heard();
+    bench.board.receive(b"$H\n");
+    for _ in 0..60_000 {
+        while bench.plotter.poll(&mut bench.board) {}
+        let (_, at) = ink::inked(&bench);
+        let is_pressed = |axis: usize| {
+            let way = at[axis] - began[axis];
+            if mask & 1 << axis != 0 { way <= -400 } else { way >= 400 }
+        };
+        bench.board.set_contacts(Contacts { x: is_pressed(0), y: is_pressed(1), stop: false });
+        for _ in 0..5 {
+            bench.board.wait();
+            while bench.plotter.poll(&mut bench.board) {}
+        }
+        if bench.heard().contains("ok") {
+            let status = bench.say("?");
+            let place = status.split("MPos:").nth(1).and_then(|rest| rest.split(",0.000|").next());
+            let (_, at) = ink::inked(&bench);
+            return (place.expect("a place").to_owned(), [at[0] - began[0], at[1] - began[1]]);
+        }
+    }
+    panic!("homing does not end");
+}
+
+#[test]
+fn homing_seeks_the_corner_that_the_mask_says() {
+    for (mask, place, [x, y]) in [
+        (3, "0.000,0.000", [-1, -1]),
+        (2, "60.000,0.000", [1, -1]),
+        (1, "0.000,50.000", [-1, 1]),
+        (0, "60.000,50.000", [1, 1]),
+    ] {
+        let (found, moved) = homed(mask);
+        assert_eq!(found, place, "{mask}");
+        // 5 mm to the switch, and 2 mm back.
+        for (moved, sign) in moved.into_iter().zip([x, y]) {
+            assert!((moved * sign - 240).abs() < 20, "{mask}: {moved}");
+        }
+    }
+}
+
+#[test]
+fn the_drivers_are_switched_off_when_the_machine_has_stood_for_a_while() {
+    let drivers = |bench: &Bench| {
+        let enables =
+            bench.board.trace().changes().into_iter().filter_map(|stamped| match stamped.change {
+                Change::Enable(on) => Some((stamped.time / 25_000, on)),
+                _ => None,
+            });
+        enables.collect::<Vec<_>>()
+    };
+    let mut bench = Bench::small();
+    bench.say("$1=100\n");
+    bench.work(500);
+    assert_eq!(drivers(&bench), [], "they are off at first");
+    bench.say("G0 X10\n");
+    bench.finish();
+    let end = bench.board.trace().now() / 25_000;
+    bench.work(500);
+    let changes = drivers(&bench);
+    let [(_, true), (off, false)] = changes[..] else { panic!("{changes:?}") };
+    assert!((95..=115).contains(&(off - end)), "{off} {end}");
+    // They are on again with the next move, and the position is the same.
+    bench.say("G0 X20\n");
+    bench.finish();
+    assert_eq!(drivers(&bench).len(), 3);
+    assert!(bench.say("?").starts_with("<Idle|MPos:20.000,0.000,"));
+    // 255 keeps them on.
+    bench.say("$1=255\nG0 X30\n");
+    bench.work(5000);
+    let changes = drivers(&bench);
+    assert!(changes.last().is_some_and(|(_, on)| *on), "{changes:?}");
+}
+
+#[test]
+fn the_pins_of_the_drivers_are_inverted_as_the_settings_say() {
+    let mut bench = Bench::small();
+    for (line, expected) in
+        [("", (0, false)), ("$2=5\n", (5, false)), ("$4=1\n", (5, true)), ("$2=0\n", (0, true))]
+    {
+        bench.say(line);
+        assert_eq!(bench.board.inverted_pins(), expected, "{line}");
+    }
+    assert!(bench.say("$2=8\n").contains("invert step pulses goes from 0 to 7"));
+    bench.say("$RST=$\n");
+    assert_eq!(bench.board.inverted_pins(), (0, false));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup_client::files::parse;
-pub use penup_host_tests::ink::{Segment, assert_same_ink, difference, farthest, places as inked};
+pub use penup_host_tests::ink::{Segment, assert_same_ink, places as inked};
 use penup_host_tests::whole_jobs::Bench;
 use penup_readers::Arrangement;
 use penup_readers::lines::Lines as _;

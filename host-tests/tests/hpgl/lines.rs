@@ -1,7 +1,8 @@
 //! The list of lines, with what is answered and drawn.
 
 use super::draw;
-use super::ink::{difference, inked, strokes};
+use super::ink::{inked, strokes};
+use penup_host_tests::ink::difference;
 use penup_host_tests::whole_jobs::Bench;
 
 #[test]

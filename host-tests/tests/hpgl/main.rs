@@ -224,7 +224,7 @@ fn damaged_bytes_leave_a_part_out_and_ink_nothing_else() {
         spoilt.extend_from_slice(b"\x1B.E");
         let heard = draw(&mut bench, &spoilt);
         assert_eq!(heard, "15\r", "byte {damaged}");
-        let beside = ink::farthest(&inked(&bench), &whole);
+        let beside = penup_host_tests::ink::farthest(&inked(&bench), &whole);
         assert!(beside <= 1.0, "byte {damaged}: ink {beside} steps beside");
     }
 }
