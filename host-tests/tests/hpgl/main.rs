@@ -122,7 +122,7 @@ fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
 #[test]
 fn nothing_is_answered_that_hp_gl_does_not_ask_for() {
     let mut bench = Bench::small();
-    assert_eq!(draw(&mut bench, b"IN;SP1;PD100,100;XX;PA1;OE;SP2;PD200,200;\n\n"), "2\r");
+    assert_eq!(draw(&mut bench, b"IN;SP1;PD100,100;XX;PA1;OE;SP2;PD200,200;\n\n"), "1\r");
     // The pen was asked for at the other port only.
     let mut bench = Bench::small();
     bench.board.receive_by(1, b"$I\n");
@@ -257,4 +257,51 @@ fn nothing_leaves_the_travel() {
     let position = bench.plotter.machine().position();
     assert_eq!((position.x, position.y), (8000 - 200, 200));
     assert!(ink.iter().all(|[x, y]| (0.0..=8000.0).contains(x) && (0.0..=4000.0).contains(y)));
+}
+
+#[test]
+fn a_polygon_that_does_not_fit_is_an_error_and_is_not_drawn() {
+    let polygon = |points: usize| {
+        let mut text = String::from("IN;SP1;PU100,100;PM0;PD");
+        for point in 1..points {
+            text +=
+                &format!("{}{},{}", if point > 1 { "," } else { "" }, 100 + point, point % 2 * 100);
+        }
+        text + ";PM2;FP;EP;OE;"
+    };
+    // The last place is that of the point that closes it.
+    for (points, error, inks) in [(255, "0", true), (256, "7", false), (5000, "7", false)] {
+        let mut bench = Bench::small();
+        let heard = draw(&mut bench, polygon(points).as_bytes());
+        assert_eq!(heard.trim(), error, "{points}");
+        assert_eq!(inked(&bench).is_empty(), !inks, "{points}");
+    }
+}
+
+#[test]
+fn a_fill_of_a_circle_covers_it_and_nothing_else() {
+    for (style, spacing) in [("PT1", 40.0), ("FT2;PT0.5", 20.0), ("FT3,30,30", 30.0)] {
+        let mut bench = Bench::small();
+        let text = format!("IN;SP1;{style};PU2000,2000;PM0;CI400,3;PM1;CI200,3;PM2;FP;");
+        draw(&mut bench, text.as_bytes());
+        // A chord of 3 degrees lies less than a fifth of a unit within the circle.
+        let centre = [4000.0, 4000.0];
+        let off = |[x, y]: [f64; 2]| (x - centre[0]).hypot(y - centre[1]) / 2.0;
+        let ink = inked(&bench);
+        for point in &ink {
+            assert!((198.5..=401.0).contains(&off(*point)), "{style}: {point:?}");
+        }
+        // No point of the ring is farther from the ink than half the distance of the lines.
+        let mut random = 1u32;
+        for _ in 0..500 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let angle = f64::from(random >> 16) / 65536.0 * std::f64::consts::TAU;
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let radius = 2.0 * (230.0 + f64::from(random >> 16) / 65536.0 * 140.0);
+            let [x, y] = [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()];
+            let near =
+                ink.iter().map(|[ix, iy]| (ix - x).hypot(iy - y)).fold(f64::INFINITY, f64::min);
+            assert!(near / 2.0 <= spacing / 2.0 + 1.0, "{style}: {near} at {x} {y}");
+        }
+    }
 }
