@@ -29,6 +29,7 @@ pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
 pub mod heaviest_jobs;
+pub mod ink;
 pub mod transcript;
 pub mod whole_jobs;
 pub mod emulated_jobs;

@@ -2,7 +2,7 @@
 
 use penup::boards::host::{HostBoard, Stamped, lend_memory};
 use penup::machine::{EventRing, PulserState};
-use penup::plotter::{Board, MemorySlices, Plotter};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, MemorySlices, Plotter};
 use penup_client::emulator::{Machine, MachineEventKind};
 
 /// A plotter in memory at the other end of a serial line.
@@ -29,6 +29,23 @@ impl Bench {
     /// Starts a plotter with the capacities of a computer.
     pub fn new() -> Self {
         Self::with_memory(lend_memory())
+    }
+
+    /// Starts a plotter that has hardly any memory for models, which is enough for G-code and
+    /// HP-GL. Its greeting has been heard.
+    pub fn small() -> Self {
+        let memory = Box::leak(Box::new(Memory::<4, 4, 16, 2>::new()));
+        let mut bench = Self::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
+        bench.heard();
+        bench
+    }
+
+    /// Lets a number of milliseconds of the plotter's time pass.
+    pub fn work(&mut self, milliseconds: u32) {
+        for _ in 0..milliseconds {
+            while self.plotter.poll(&mut self.board) {}
+            self.board.wait();
+        }
     }
 
     /// Sends `text`, runs the plotter until it has read all of it, and returns its output.

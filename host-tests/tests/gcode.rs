@@ -8,6 +8,7 @@ use penup::machine::{Contacts, State};
 use penup::plotter::Board;
 use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
 use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::ink;
 use penup_host_tests::whole_jobs::Bench;
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -16,14 +17,6 @@ fn bench() -> Bench {
     let mut bench = Bench::new();
     bench.heard();
     bench
-}
-
-/// Lets `milliseconds` of the plotter's time pass.
-fn work(bench: &mut Bench, milliseconds: u32) {
-    for _ in 0..milliseconds {
-        while bench.plotter.poll(&mut bench.board) {}
-        bench.board.wait();
-    }
 }
 
 /// The field of the status report that begins with this text.
@@ -40,25 +33,14 @@ fn position_of(bench: &mut Bench) -> String {
     position.expect("a status").to_owned()
 }
 
-/// The length in mm moved with the pen down according to the pins, and the final position.
+/// The length in mm moved with the pen down according to the pins.
 fn inked(bench: &Bench) -> f64 {
-    let (mut up, mut pen, mut length) = ([false; 2], 0, 0.0);
-    let mut at = (0u64, [0.0f64; 2]);
-    for stamped in bench.board.trace().changes() {
-        if stamped.time != at.0 {
-            length += if pen > 64 { at.1[0].hypot(at.1[1]) / 80.0 } else { 0.0 };
-            at = (stamped.time, [0.0; 2]);
-        }
-        match stamped.change {
-            Change::StepX(true) => at.1[0] = 1.0,
-            Change::StepY(true) => at.1[1] = 1.0,
-            Change::UpX(level) => up[0] = level,
-            Change::UpY(level) => up[1] = level,
-            Change::Pen(height) => pen = height,
-            _ => {}
-        }
-    }
-    length
+    let (points, _) = ink::inked(bench);
+    let length = |ends: &[[i32; 2]]| match ends {
+        [[ax, ay], [bx, by]] => f64::from(bx - ax).hypot(f64::from(by - ay)) / 80.0,
+        _ => 0.0,
+    };
+    points.windows(2).map(length).sum()
 }
 
 #[test]
@@ -102,29 +84,6 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     assert_eq!(position_of(&mut bench), "5.000,5.000");
 }
 
-/// The positions with the pen down according to the pins, in steps from the start.
-fn inked_points(bench: &Bench) -> Vec<[i32; 2]> {
-    let (mut up, mut pen, mut at) = ([true; 2], 0, [0; 2]);
-    let mut points = Vec::new();
-    let changes = bench.board.trace().changes();
-    for (index, stamped) in changes.iter().enumerate() {
-        let mut step = |axis: usize, level: bool| at[axis] += if level { 1 } else { -1 };
-        match stamped.change {
-            Change::StepX(true) => step(0, up[0]),
-            Change::StepY(true) => step(1, up[1]),
-            Change::UpX(level) => up[0] = level,
-            Change::UpY(level) => up[1] = level,
-            Change::Pen(height) => pen = height,
-            _ => continue,
-        }
-        let is_last = changes.get(index + 1).is_none_or(|next| next.time != stamped.time);
-        if pen > 64 && is_last {
-            points.push(at);
-        }
-    }
-    points
-}
-
 #[test]
 fn circles_are_round_on_the_page_whatever_the_steps() {
     for (x, y) in [(80.0, 50.0), (40.0, 120.0), (79.8, 80.3)] {
@@ -135,7 +94,7 @@ fn circles_are_round_on_the_page_whatever_the_steps() {
             .board
             .receive(b"G0 X80 Y50\nM3\nG3 X80 Y50 I-30\nM5\nG0 X65 Y20\nM3\nG3 X35 Y20 R15\nM5\n");
         bench.finish();
-        let points = inked_points(&bench);
+        let (points, _) = ink::inked(&bench);
         let (mut full, mut half) = (0, 0);
         for [px, py] in points {
             let (px, py) = (f64::from(px), f64::from(py));
@@ -181,7 +140,7 @@ fn a_pen_that_goes_down_and_up_leaves_a_dot() {
 fn moves_by_hand_are_cancelled_where_they_are() {
     let mut bench = bench();
     assert_eq!(bench.say("$J=G91 X100 F3000\n$J=G91 Y10 F3000\n"), "ok\nok\n");
-    work(&mut bench, 500);
+    bench.work(500);
     assert_eq!(field(&mut bench, "Jog"), "Jog");
     bench.board.receive(&[0x85]);
     bench.finish();
@@ -229,11 +188,11 @@ fn a_limit_and_the_emergency_stop_are_alarms() {
     ] {
         let mut bench = bench();
         assert_eq!(bench.say("$21=1\nG0 X1\nM3\nG1 X90\n"), "ok\n".repeat(4));
-        work(&mut bench, 900);
+        bench.work(900);
         let before = bench.board.trace().now();
         bench.board.set_contacts(contacts);
         bench.board.receive(byte.as_slice());
-        work(&mut bench, 2);
+        bench.work(2);
         let changes = bench.board.trace().changes();
         let late = changes.iter().filter(|stamped| stamped.time > before + 50);
         assert!(late.count() <= 2, "no pulse after the alarm");
@@ -245,7 +204,7 @@ fn a_limit_and_the_emergency_stop_are_alarms() {
         assert!(height == 0 && after < 25_000, "the pen is up within a millisecond");
         assert_eq!(bench.heard(), alarm);
         assert!(bench.say("G0 X0\n").ends_with("error:9\n"));
-        work(&mut bench, 20);
+        bench.work(20);
         let position = position_of(&mut bench);
         if contacts.stop {
             assert!(field(&mut bench, "Pn").contains('E'));
@@ -265,10 +224,10 @@ fn speeds_change_while_it_draws() {
     let seconds = |bytes: &[u8]| {
         let mut bench = bench();
         bench.say("M3\nG1 X100\n");
-        work(&mut bench, 300);
+        bench.work(300);
         for byte in bytes {
             bench.board.receive(&[*byte]);
-            work(&mut bench, 1);
+            bench.work(1);
         }
         bench.finish();
         bench.board.trace().now() as f64 / 25e6
@@ -283,7 +242,7 @@ fn speeds_change_while_it_draws() {
     assert!((0.1..0.25).contains(&(plain - fast)), "{fast} {plain}");
     let mut bench = bench();
     bench.board.receive(&[0x93]);
-    work(&mut bench, 1);
+    bench.work(1);
     // The first report has the origin of the coordinates instead.
     field(&mut bench, "WCO");
     assert_eq!(field(&mut bench, "Ov"), "Ov:101,100,100");
@@ -293,7 +252,7 @@ fn speeds_change_while_it_draws() {
 fn pauses_wait_for_the_user() {
     let mut bench = bench();
     bench.board.receive(b"M3\nG1 X10\nM0\nG1 X20\n");
-    work(&mut bench, 1500);
+    bench.work(1500);
     assert_eq!(bench.heard(), "ok\nok\n[MSG:to go on, send ~]\nok\nok\n");
     assert_eq!(field(&mut bench, "Hold"), "Hold:0");
     assert_eq!(position_of(&mut bench), "10.000,0.000");
@@ -303,7 +262,7 @@ fn pauses_wait_for_the_user() {
     // At the end of the stroke.
     bench.say("M5\nG0 X0\nM3\nG1 X10\nG1 X20\nM5\nG0 X50\nG0 X60\n");
     bench.board.receive(&[0xFB]);
-    work(&mut bench, 3000);
+    bench.work(3000);
     assert_eq!(position_of(&mut bench), "20.000,0.000");
     assert_eq!(field(&mut bench, "Hold"), "Hold:0");
     bench.say("~");
@@ -346,7 +305,7 @@ fn asleep_it_takes_nothing_but_the_order_to_wake() {
     bench.say("G0 X3\n");
     bench.finish();
     assert_eq!(bench.say("$SLP\n"), "[MSG:Sleeping]\nok\n");
-    work(&mut bench, 50);
+    bench.work(50);
     assert_eq!(field(&mut bench, "Sleep"), "Sleep");
     let enable =
         bench.board.trace().changes().iter().rev().find_map(|stamped| match stamped.change {
@@ -429,7 +388,7 @@ fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
     let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
     bench.heard();
     bench.board.receive(PROGRAM.as_bytes());
-    work(&mut bench, instant);
+    bench.work(instant);
     let closed = match disturbance {
         Disturbance::Limit => Contacts { y: true, ..Contacts::default() },
         Disturbance::StopContact => Contacts { stop: true, ..Contacts::default() },
@@ -443,7 +402,7 @@ fn disturbed(disturbance: Disturbance, instant: u32) -> Drawn {
         _ => {}
     }
     if matches!(disturbance, Disturbance::HoldAndResume) {
-        work(&mut bench, 1500);
+        bench.work(1500);
         assert!(bench.plotter.machine().is_stopped());
         bench.board.receive(b"~");
     }

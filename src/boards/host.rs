@@ -309,6 +309,8 @@ pub struct HostBoard<'q> {
     kept: Option<Kept<CutFlash>>,
     /// How long it takes to write to the flash while a job is drawn, in ticks.
     write_ticks: u64,
+    /// Which step pins are inverted, as a mask, and whether the enable pin is.
+    inverted: (u8, bool),
 }
 
 impl core::fmt::Debug for HostBoard<'_> {
@@ -338,6 +340,7 @@ impl<'q> HostBoard<'q> {
             byte_ticks: 0,
             kept: None,
             write_ticks: 0,
+            inverted: (0, false),
         }
     }
 
@@ -397,6 +400,12 @@ impl<'q> HostBoard<'q> {
     /// Sets which contacts (limit switches and emergency stop) are closed.
     pub fn set_contacts(&mut self, contacts: Contacts) {
         self.contacts = contacts;
+    }
+
+    /// Which step pins are inverted, as a mask, and whether the enable pin is. The trace shows the
+    /// pins as the drivers take them, as if they were not.
+    pub fn inverted_pins(&self) -> (u8, bool) {
+        self.inverted
     }
 
     /// How often the queue of steps ran empty while the machine moved.
@@ -501,6 +510,10 @@ impl Board for HostBoard<'_> {
 
     fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
         self.kept.as_mut()?.progress(notes)
+    }
+
+    fn invert_driver_pins(&mut self, steps: u8, enable: bool) {
+        self.inverted = (steps, enable);
     }
 
     fn microseconds(&mut self) -> u32 {

@@ -140,7 +140,7 @@ pub(super) struct Frame {
     /// The user units at P1 and P2: x and x, y and y.
     scale: Option<[i64; 4]>,
     /// How many quarters of a turn the page is turned.
-    quarters: u8,
+    pub(super) quarters: u8,
     /// The hard clip limits on the page.
     pub(super) limits: Rectangle,
     /// The window that `IW` has chosen, on the page.

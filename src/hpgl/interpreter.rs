@@ -7,6 +7,7 @@ use super::line_type::{LineStyle, Part, Stroke};
 use super::number::Number;
 use super::outline::ArcStep;
 use super::parser::Mode;
+use super::polygon::{FillStyle, Hatch, Polygon};
 use crate::drawing::LetterStrokes;
 use heapless::Deque;
 
@@ -51,13 +52,17 @@ pub(super) enum Step {
     /// A dot where the pen is.
     Dot,
     Arc(ArcStep),
+    /// The lines that fill the polygon.
+    Fill,
+    /// The edges of the polygon.
+    Edges,
     /// A letter whose lower left corner, or whose middle if it is a symbol, is where the pen is.
     Letter(LetterStrokes, bool),
     Pen(u8),
     Answer(Answer),
 }
 
-/// The errors that `OE` tells by their number.
+/// The errors that `OE` tells by their number: those of the HP 7475A, and 7 of the HP 7550A.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum ErrorNumber {
     /// The instruction is not known.
@@ -70,6 +75,8 @@ pub(super) enum ErrorNumber {
     UnknownSet = 5,
     /// The position is beyond the range of coordinates.
     Overflow = 6,
+    /// The polygon has more points than fit into its buffer.
+    BufferOverflow = 7,
     /// Something was to be drawn while the machine was locked.
     Locked = 8,
 }
@@ -108,11 +115,14 @@ pub struct Interpreter {
     pub(super) has_no_pen: bool,
     pub(super) text: TextStyle,
     pub(super) line: LineStyle,
+    pub(super) fill: FillStyle,
+    pub(super) polygon: Polygon,
+    pub(super) hatch: Hatch,
     /// The lengths of ticks in the positive and the negative direction, in percent.
     pub(super) ticks: [i64; 2],
     /// The speed with the pen down in cm/s, in units of 2^-16; 0 if none was chosen.
     pub(super) speed: i64,
-    /// The number of the last error, 0 if there was none.
+    /// The number of the first error that `OE` has not told yet, 0 if there was none.
     pub(super) error: u8,
     pub(super) is_initialized: bool,
     pub(super) has_new_corners: bool,
@@ -147,6 +157,9 @@ impl Interpreter {
             has_no_pen: false,
             text: TextStyle::ZERO,
             line: LineStyle::ZERO,
+            fill: FillStyle::ZERO,
+            polygon: Polygon::ZERO,
+            hatch: Hatch::ZERO,
             ticks: [0; 2],
             speed: 0,
             error: 0,
@@ -175,6 +188,8 @@ impl Interpreter {
         self.is_relative = false;
         self.text = TextStyle::DEFAULT;
         self.line = LineStyle::SOLID;
+        self.fill = FillStyle::DEFAULT;
+        self.polygon.clear();
         self.ticks = [UNIT / 2; 2];
     }
 
@@ -207,9 +222,11 @@ impl Interpreter {
         self.fail(ErrorNumber::Locked);
     }
 
-    /// Notes an error.
+    /// Notes an error, unless one is noted that `OE` has not told yet.
     pub(super) fn fail(&mut self, error: ErrorNumber) {
-        self.error = error as u8;
+        if self.error == 0 {
+            self.error = error as u8;
+        }
     }
 
     /// Notes that the position is beyond the range of coordinates.
@@ -244,6 +261,9 @@ impl Interpreter {
         };
         let Some(to) = to else { return self.overflow() };
         let was_lost = core::mem::take(&mut self.is_lost);
+        if self.polygon.is_open {
+            return self.add_vertex(to);
+        }
         self.add(if self.is_down && !was_lost { Step::Line(to) } else { Step::Travel(to) });
         if let Some(symbol) = Some(self.text.symbol).filter(|symbol| *symbol != 0) {
             self.add_letter(symbol.into(), true);
@@ -271,6 +291,21 @@ impl Interpreter {
             self.index += 1;
             let order = match step {
                 Step::Initialize => Some(Order::Initialize),
+                Step::Fill => match self.next_of_fill(index == 0) {
+                    Some(order) => return Some(order),
+                    None => None,
+                },
+                Step::Edges => match self.polygon_edge(index) {
+                    Some((true, to)) => {
+                        self.draw_to(to);
+                        continue;
+                    }
+                    Some((false, to)) => {
+                        self.at = to;
+                        continue;
+                    }
+                    None => None,
+                },
                 Step::Arc(arc) => match arc.chord(index) {
                     Some(to) => {
                         self.draw_to(to);
@@ -320,7 +355,7 @@ impl Interpreter {
     }
 
     /// Begins a line in the present style.
-    fn draw_to(&mut self, to: Point) {
+    pub(super) fn draw_to(&mut self, to: Point) {
         let from = core::mem::replace(&mut self.at, to);
         self.stroke = Some(Stroke::new(from, to));
     }
@@ -343,7 +378,7 @@ impl Interpreter {
     }
 
     /// The order for a line or a dot, as far as it lies within the window.
-    fn ink(&self, line: [Point; 2]) -> Option<Order> {
+    pub(super) fn ink(&self, line: [Point; 2]) -> Option<Order> {
         if self.is_lost {
             return None;
         }

@@ -21,6 +21,7 @@ mod line_type;
 mod number;
 mod outline;
 mod parser;
+mod polygon;
 mod query;
 mod session;
 #[cfg(test)]

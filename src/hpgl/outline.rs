@@ -22,7 +22,7 @@ pub(super) struct ArcStep {
 impl ArcStep {
     /// The arc with this beginning. Without the angle of a chord, chords are at most an eighth of
     /// a plotter unit off the arc.
-    fn new(center: Point, radius: Point, sweep: i64, chord: Option<i64>) -> Self {
+    pub(super) fn new(center: Point, radius: Point, sweep: i64, chord: Option<i64>) -> Self {
         // A second turn draws the same again.
         let sweep = if sweep.abs() > TURN { sweep % TURN + TURN * sweep.signum() } else { sweep };
         let chords = match chord {
@@ -50,7 +50,7 @@ impl ArcStep {
 }
 
 /// The sine and the cosine in units of 2^-30.
-fn sine_and_cosine(degrees: f64) -> [i64; 2] {
+pub(super) fn sine_and_cosine(degrees: f64) -> [i64; 2] {
     let (sine, cosine) = sin_cos_degrees(degrees);
     let scaled = |number: f64| libm::round(number * f64::from(1 << 30)) as i64;
     [scaled(sine), scaled(cosine)]
@@ -84,7 +84,7 @@ impl Interpreter {
         self.add(Step::Place(center));
     }
 
-    /// `EW` and `WG`: the outline of a wedge about the pen.
+    /// `EW`: the outline of a wedge about the pen.
     pub(super) fn wedge(&mut self, radius: i64, start: i64, sweep: i64, chord: Option<i64>) {
         let center = self.at;
         let angle = sine_and_cosine(start as f64 / 65536.0);
@@ -95,7 +95,7 @@ impl Interpreter {
         self.add(Step::Line(center));
     }
 
-    /// `EA`, `ER`, `RA` and `RR`: the outline of a rectangle from the pen to the opposite corner.
+    /// `EA` and `ER`: the outline of a rectangle from the pen to the opposite corner.
     pub(super) fn rectangle(&mut self, corner: Point) {
         let at = self.at;
         for point in [Point { x: corner.x, y: at.y }, corner, Point { x: at.x, y: corner.y }, at] {

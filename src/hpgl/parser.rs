@@ -29,8 +29,8 @@ pub(super) enum Mode {
 #[rustfmt::skip]
 const WITHOUT_EFFECT: &[[u8; 2]] = &[
     *b"AC", *b"AD", *b"AF", *b"AH", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CT", *b"CV", *b"DC",
-    *b"DP", *b"EC", *b"FI", *b"FN", *b"FR", *b"FS", *b"FT", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY",
-    *b"LA", *b"LO", *b"MC", *b"NP", *b"NR", *b"PB", *b"PC", *b"PG", *b"PS", *b"PT", *b"PW", *b"QL",
+    *b"DP", *b"EC", *b"FI", *b"FN", *b"FR", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY",
+    *b"LA", *b"LO", *b"MC", *b"NP", *b"NR", *b"PB", *b"PC", *b"PG", *b"PS", *b"PW", *b"QL",
     *b"RF", *b"RP", *b"SB", *b"SD", *b"SG", *b"SV", *b"TD", *b"TR", *b"UL", *b"WU",
 ];
 
@@ -220,10 +220,17 @@ impl Interpreter {
         };
         let bad = ErrorNumber::BadParameter;
         // Shapes that begin where the pen is need a known position.
-        let is_shape =
-            matches!(&name, b"AA" | b"AR" | b"CI" | b"EA" | b"ER" | b"EW" | b"RA" | b"RR" | b"WG");
+        let is_drawn_apart = matches!(
+            &name,
+            b"EA" | b"EP" | b"ER" | b"EW" | b"FP" | b"RA" | b"RR" | b"WG" | b"XT" | b"YT"
+        );
+        let is_shape = is_drawn_apart || matches!(&name, b"AA" | b"AR" | b"CI" | b"PM");
         if self.is_lost && is_shape {
             return Ok(());
+        }
+        // A polygon is made of lines, arcs and circles alone.
+        if self.polygon.is_open && is_drawn_apart {
+            return Err(ErrorNumber::Unknown);
         }
         let chord = |index: usize| match numbers.get(index) {
             None => Ok(None),
@@ -287,31 +294,67 @@ impl Interpreter {
                     self.frame.distance(point).and_then(|distance| distance.plus(self.at))
                 };
                 self.text.advanced = Point::default();
-                self.arc(center.ok_or(ErrorNumber::Overflow)?, sweep, chord);
+                let center = center.ok_or(ErrorNumber::Overflow)?;
+                if self.polygon.is_open {
+                    self.add_arc(center, sweep, chord);
+                } else {
+                    self.arc(center, sweep, chord);
+                }
             }
             b"CI" => {
                 let (radius, chord) = (number(0)?, chord(1)?);
                 at_most(2)?;
                 let radius = self.frame.length(Point { x: radius, y: 0 });
-                self.circle(radius.ok_or(ErrorNumber::Overflow)?.x, chord);
+                let radius = radius.ok_or(ErrorNumber::Overflow)?.x;
+                if self.polygon.is_open {
+                    self.add_circle(radius, chord);
+                } else {
+                    self.circle(radius, chord);
+                }
             }
             b"EA" | b"RA" => {
                 let corner = pair()?;
                 at_most(2)?;
-                self.rectangle(self.frame.position(corner).ok_or(ErrorNumber::Overflow)?);
+                let corner = self.frame.position(corner).ok_or(ErrorNumber::Overflow)?;
+                if &name == b"EA" {
+                    self.rectangle(corner);
+                } else {
+                    self.fill_rectangle(corner)?;
+                }
             }
             b"ER" | b"RR" => {
                 let way = pair()?;
                 at_most(2)?;
                 let corner = self.frame.distance(way).and_then(|way| way.plus(self.at));
-                self.rectangle(corner.ok_or(ErrorNumber::Overflow)?);
+                let corner = corner.ok_or(ErrorNumber::Overflow)?;
+                if &name == b"ER" {
+                    self.rectangle(corner);
+                } else {
+                    self.fill_rectangle(corner)?;
+                }
             }
             b"EW" | b"WG" => {
                 let (radius, start, sweep, chord) = (number(0)?, number(1)?, number(2)?, chord(3)?);
                 at_most(4)?;
                 let radius = self.frame.length(Point { x: radius, y: 0 });
-                self.wedge(radius.ok_or(ErrorNumber::Overflow)?.x, start, sweep, chord);
+                let radius = radius.ok_or(ErrorNumber::Overflow)?.x;
+                if &name == b"EW" {
+                    self.wedge(radius, start, sweep, chord);
+                } else {
+                    self.fill_wedge(radius, start, sweep, chord)?;
+                }
             }
+            b"PM" => self.polygon_mode(numbers)?,
+            b"EP" => {
+                at_most(0)?;
+                self.edge_polygon();
+            }
+            b"FP" => {
+                at_most(0)?;
+                self.fill_polygon()?;
+            }
+            b"FT" => self.choose_fill(numbers)?,
+            b"PT" => self.choose_thickness(numbers)?,
             b"XT" | b"YT" => {
                 at_most(0)?;
                 if !self.is_lost {
@@ -439,6 +482,10 @@ impl Interpreter {
     fn write(&mut self, letter: char) {
         if self.is_lost {
             return;
+        }
+        // A polygon has no letters.
+        if self.polygon.is_open {
+            return self.fail(ErrorNumber::Unknown);
         }
         self.add_letter(letter, false);
         self.space([UNIT, 0]);

@@ -1,8 +1,9 @@
 //! Homing: finds the corner of the travel by the limit switches.
 //!
 //! Each axis in turn runs to its switch, backs off, approaches the switch again slowly, and backs
-//! off to its final position. The position of the axis there becomes 0. Which motors run, and what
-//! the position becomes on a machine that hangs on belts, is asked of the kinematics.
+//! off to its final position. The position of the axis there becomes 0, or its travel if the switch
+//! lies at the high end (`$23`). Which motors run, and what the position becomes on a machine that
+//! hangs on belts, is asked of the kinematics.
 
 use super::kinematics::{HomingSpace, Kinematics};
 use super::state::Activity;
@@ -24,9 +25,9 @@ pub enum Axis {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Switches {
-    /// The switch at the low end of x.
+    /// The switch of x.
     pub x: bool,
-    /// The switch at the low end of y.
+    /// The switch of y.
     pub y: bool,
 }
 
@@ -171,8 +172,8 @@ impl Homing {
 }
 
 impl Machine<'_> {
-    /// Homes x first, then y. Afterwards the machine is at (0, 0), one pull-off away from each
-    /// switch. [`Machine::watch`] must be called often meanwhile.
+    /// Homes x first, then y. Afterwards the machine is in the corner of the switches, one pull-off
+    /// away from each: at (0, 0) if both lie at the low ends. [`Machine::watch`] must be called often meanwhile.
     ///
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
@@ -265,6 +266,7 @@ impl Machine<'_> {
         };
         let distance =
             homing.distance(steps(properties.homing_travel[axis]), steps(Setting::HomingPullOff));
+        let distance = if self.homes_low(homing.axis) { distance } else { -distance };
         let mut point = self.homing_position(self.runner.position());
         let from = homing.pressed_at.unwrap_or(point);
         match homing.axis {
@@ -308,11 +310,19 @@ impl Machine<'_> {
         }
     }
 
-    /// Sets the position of an axis after its last phase: to 0, or to the homed length of a belt.
+    /// Whether the switch of an axis lies at its low end.
+    fn homes_low(&self, axis: Axis) -> bool {
+        self.settings.whole(Setting::HomingDirection) & 1 << axis as u32 != 0
+    }
+
+    /// Sets the position of an axis after its last phase: to 0 or its travel, or to the homed length
+    /// of a belt.
     fn set_homed(&mut self, axis: Axis) {
         let properties = Kinematics::properties(&self.settings);
         let mut position = self.homing_position(self.runner.position());
-        let homed = properties.homed_length.map_or(0, |setting| {
+        let end =
+            if self.homes_low(axis) { None } else { Some(properties.homing_travel[axis as usize]) };
+        let homed = properties.homed_length.or(end).map_or(0, |setting| {
             let steps_per_mm = properties.steps_per_mm[axis as usize];
             self.settings.millimetres_as_steps(setting, steps_per_mm)
         });

@@ -12,6 +12,8 @@
 
 mod backlash;
 mod estimate;
+#[cfg(feature = "driver-pins")]
+mod drivers;
 mod homing;
 mod job;
 mod kinematics;
@@ -86,6 +88,9 @@ pub struct Machine<'m> {
     pen: u8,
     /// How far the strokes of the job have been noted.
     log: StrokeLog,
+    /// The ticks of all events when the drivers were switched off at rest.
+    #[cfg(feature = "driver-pins")]
+    released_at: u32,
 }
 
 impl<'m> Machine<'m> {
@@ -123,6 +128,8 @@ impl<'m> Machine<'m> {
             percent: 100,
             rapid_percent: 100,
             pen: 0,
+            #[cfg(feature = "driver-pins")]
+            released_at: 0,
         };
         machine.configure_pulser();
         machine.set_position(PagePoint::default());

@@ -116,6 +116,10 @@ pub trait Board {
         let _ = notes;
         None
     }
+    /// Inverts the step pins of the motors in the mask, and the enable pin if `enable`, as `$2` and
+    /// `$4` ask. Called at the start and when these settings change, while nothing moves.
+    #[cfg(feature = "driver-pins")]
+    fn invert_driver_pins(&mut self, steps: u8, enable: bool);
     /// A clock in microseconds; the count wraps. It tells how long the plotter has been idle, so it
     /// must run while [`Board::wait_briefly`] waits.
     fn microseconds(&mut self) -> u32;

@@ -29,8 +29,13 @@ impl<I: Index> Inner<'_, I> {
         }
     }
 
-    /// Whether a program is open that idleness would end, so that time must be told.
+    /// Whether a program is open that idleness would end, or drivers are to be switched off, so that
+    /// time must be told.
     pub(super) fn is_timing(&self) -> bool {
+        #[cfg(feature = "driver-pins")]
+        if self.machine.driver_rest().is_some() {
+            return true;
+        }
         let is_at_rest =
             matches!(self.machine.state(), State::Idle | State::Check) && self.machine.is_stopped();
         self.program.is_open() && self.task.is_none() && is_at_rest
@@ -48,6 +53,28 @@ impl<I: Index> Inner<'_, I> {
         } else if now.wrapping_sub(self.busy_at) >= IDLE_MICROSECONDS {
             self.end_program(board);
         }
+    }
+
+    /// Switches the drivers off if the machine has stood for as long as `$1` says.
+    #[cfg(feature = "driver-pins")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn watch_drivers<B: Board>(&mut self, board: &mut B) {
+        let now = board.microseconds();
+        match self.machine.driver_rest() {
+            None => self.moved_at = now,
+            Some(milliseconds) if now.wrapping_sub(self.moved_at) >= milliseconds * 1000 => {
+                self.machine.release_drivers(board.queue());
+            }
+            Some(_) => {}
+        }
+    }
+
+    /// Passes the settings of the drivers' pins to the board.
+    #[cfg(feature = "driver-pins")]
+    pub(super) fn set_driver_pins<B: Board>(&self, board: &mut B) {
+        let settings = self.machine.settings();
+        let steps = settings.get(Setting::InvertSteps).to_num::<u8>();
+        board.invert_driver_pins(steps, settings.is_on(Setting::InvertEnable));
     }
 
     /// Ends the program, and says if it drew nothing.
@@ -310,6 +337,8 @@ impl<I: Index> Inner<'_, I> {
         if texts {
             self.parameters.texts = Default::default();
         }
+        #[cfg(feature = "driver-pins")]
+        self.set_driver_pins(board);
         Reply(board).line(format_args!("[MSG:Restoring defaults]"));
         records::save_settings(self.machine.settings(), board)?;
         records::save_parameters(&self.parameters, board)

@@ -170,6 +170,9 @@ struct Inner<'m, I> {
     resumption: Resumption,
     /// When the plotter last had something to do, in microseconds of the board's clock.
     busy_at: u32,
+    /// When the machine moved last, as [`Board::microseconds`] tells it.
+    #[cfg(feature = "driver-pins")]
+    moved_at: u32,
     /// When status reports next hold what they hold now and then.
     report_counts: ReportCounts,
     /// The task of a line that takes longer. The line is answered when the task is done.
@@ -223,6 +226,8 @@ impl<'m, I: Index> Plotter<'m, I> {
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
                 busy_at: 0,
+                #[cfg(feature = "driver-pins")]
+                moved_at: 0,
                 report_counts: ReportCounts::default(),
                 task: None,
                 alarm_reported: None,
@@ -242,6 +247,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         // A program that opened a port while the board started gets the greeting that goes to all
         // ports. It needs no second one.
         let _ = board.take_opened();
+        #[cfg(feature = "driver-pins")]
+        self.inner.set_driver_pins(board);
         self.inner.parameters = records::load_parameters(board);
         self.inner.find_stopped(board);
         self.greet(board);
@@ -270,6 +277,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.act(requests, board);
         self.inner.watch(board);
         self.inner.watch_idleness(board);
+        #[cfg(feature = "driver-pins")]
+        self.inner.watch_drivers(board);
         self.inner.note_progress(board);
         let planned = self.inner.plan(board);
         #[cfg(feature = "hpgl")]
@@ -553,6 +562,8 @@ impl<I: Index> Inner<'_, I> {
             Command::Assign { name, value } => {
                 if !self.options.set(name, value)? {
                     self.change_setting(name, value)?;
+                    #[cfg(feature = "driver-pins")]
+                    self.set_driver_pins(board);
                     records::save_settings(self.machine.settings(), board)?;
                 }
             }

@@ -55,6 +55,13 @@ impl LineReader {
             self.damaged = true;
             return None;
         }
+        // 0xC2 belongs to a command that was sent as a character of UTF-8, unless a letter follows.
+        if self.bytes.last() == Some(&0xC2) && !matches!(byte, 0xA0..=0xBF) {
+            self.bytes.pop();
+            if matches!(byte, 0x80..=0x9F) {
+                return None;
+            }
+        }
         if byte != b'\r' && byte != b'\n' {
             self.append(byte);
             return None;
@@ -92,10 +99,11 @@ impl LineReader {
 
     /// The line as text.
     fn text(&mut self) -> Result<&str, CommandError> {
-        if core::str::from_utf8(&self.bytes).is_err() {
-            self.bytes.retain(u8::is_ascii);
-            if !is_code(&self.bytes) {
-                return Err(CommandError::NotText);
+        let is_text = core::str::from_utf8(&self.bytes).is_ok();
+        if !is_text || self.bytes.first().is_some_and(|byte| !byte.is_ascii()) {
+            let letters = self.bytes.iter().take_while(|byte| !byte.is_ascii()).count();
+            if is_code(self.bytes.get(letters..).unwrap_or_default()) {
+                self.bytes.retain(u8::is_ascii);
             }
         }
         core::str::from_utf8(&self.bytes).map_err(|_| CommandError::NotText)
@@ -161,6 +169,13 @@ mod tests {
         }
         for line in [b"\xC2G0 X1\n".as_slice(), b"G0\xfe X1\n", b"G0 X1\xb7\n"] {
             assert_eq!(lines(line), [Ok("G0 X1".to_string())]);
+        }
+        for line in [b"\xC2\x9AG0 X1\n".as_slice(), b"\xC3\x84G0 X1\n", b"G0\xC2\x9D X1\xC2\n"] {
+            assert_eq!(lines(line), [Ok("G0 X1".to_string())]);
+        }
+        // What is sent as a character of UTF-8 belongs to no text either.
+        for line in ["\u{9A}$title=\u{9A}\u{A9} Gr\u{F6}\u{DF}e\u{80}\n"] {
+            assert_eq!(lines(line.as_bytes()), [Ok("$title=© Größe".to_string())]);
         }
         assert_eq!(lines("G0 X1 (Größe)\n".as_bytes()), [Ok("G0 X1 (Größe)".to_string())]);
     }

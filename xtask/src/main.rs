@@ -23,6 +23,7 @@ mod fuzz;
 mod gallery;
 mod page;
 mod panics;
+mod senders;
 mod set_up;
 mod side_by_side;
 mod test;
@@ -129,6 +130,9 @@ enum Task {
         #[arg(default_value_t = 4864)]
         count: u32,
     },
+    /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs them
+    /// into target/senders (some 15 minutes).
+    Senders(senders::Arguments),
     /// Lists, by file, the calls of panic functions that are left in the boards' images.
     Panics,
     /// Checks the licences, sources and known holes of all crates; needs cargo-deny.
@@ -189,6 +193,7 @@ fn carry_out() -> Result<()> {
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
+        Some(Task::Senders(arguments)) => senders::try_all(&arguments)?,
         Some(Task::Panics) => panics::list()?,
         Some(Task::Deny) => dependencies::deny()?,
         Some(Task::Fuzz { seconds, target }) => fuzz::fuzz(seconds, target.as_deref())?,

@@ -159,6 +159,10 @@ impl Board for Flash<'_, '_> {
         self.board.step_now();
     }
 
+    fn invert_driver_pins(&mut self, steps: u8, enable: bool) {
+        self.board.invert_driver_pins(steps, enable);
+    }
+
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         if record == Record::Job {
             take(&mut Bytes(self.job));

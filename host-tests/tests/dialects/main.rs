@@ -9,9 +9,9 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use penup::boards::host::Change;
 use penup::machine::{Contacts, State};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
+use penup::plotter::Board;
+use penup_host_tests::ink::{self, Segment};
 use penup_host_tests::whole_jobs::Bench;
 use std::path::PathBuf;
 
@@ -53,7 +53,7 @@ fn file(name: &str) -> String {
 }
 
 /// The lines of the figure in steps, with y counted upward or downward.
-fn figure(downward: bool) -> Vec<[[f64; 2]; 2]> {
+fn figure(downward: bool) -> Vec<Segment> {
     let svg = file("figure.svg");
     let lines = svg.split("points=\"").skip(1).map(|rest| rest.split('"').next().unwrap_or(""));
     let mut pieces = Vec::new();
@@ -71,17 +71,8 @@ fn figure(downward: bool) -> Vec<[[f64; 2]; 2]> {
     pieces
 }
 
-/// How far a point is from a line, in steps.
-fn distance([x, y]: [f64; 2], [[ax, ay], [bx, by]]: [[f64; 2]; 2]) -> f64 {
-    let (dx, dy) = (bx - ax, by - ay);
-    let along = (((x - ax) * dx + (y - ay) * dy) / (dx * dx + dy * dy)).clamp(0.0, 1.0);
-    (x - ax - along * dx).hypot(y - ay - along * dy)
-}
-
 fn bench(settings: &str) -> Bench {
-    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
-    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
-    bench.heard();
+    let mut bench = Bench::small();
     let answer = bench.say(settings);
     assert!(!answer.contains("error"), "{answer}");
     bench
@@ -125,49 +116,11 @@ fn send(bench: &mut Bench, program: &str) -> String {
 
 /// The positions of the machine, in steps, at which ink came onto the page.
 fn inked(bench: &Bench) -> Vec<[f64; 2]> {
-    let (mut up, mut pen, mut at) = ([true; 2], 0, [0; 2]);
-    let mut points = Vec::new();
-    let changes = bench.board.trace().changes();
-    for (index, stamped) in changes.iter().enumerate() {
-        let mut step = |axis: usize, level: bool| at[axis] += if level { 1 } else { -1 };
-        match stamped.change {
-            Change::StepX(true) => step(0, up[0]),
-            Change::StepY(true) => step(1, up[1]),
-            Change::UpX(level) => up[0] = level,
-            Change::UpY(level) => up[1] = level,
-            Change::Pen(height) => pen = height,
-            _ => continue,
-        }
-        let is_last = changes.get(index + 1).is_none_or(|next| next.time != stamped.time);
-        if pen > 64 && is_last {
-            points.push(at);
-        }
-    }
+    let (points, [x, y]) = ink::inked(bench);
     // Homing has shifted the coordinates.
     let position = bench.plotter.machine().position();
-    let shift = [position.x - at[0], position.y - at[1]];
+    let shift = [position.x - x, position.y - y];
     points.iter().map(|[x, y]| [f64::from(x + shift[0]), f64::from(y + shift[1])]).collect()
-}
-
-/// Whether the ink is the figure: the longest distances of a point of ink from the figure, and of a
-/// point of the figure from the ink.
-fn compare(ink: &[[f64; 2]], figure: &[[[f64; 2]; 2]]) -> (f64, f64) {
-    let from_figure = |point: &[f64; 2]| {
-        figure.iter().map(|line| distance(*point, *line)).fold(f64::INFINITY, f64::min)
-    };
-    let beside = ink.iter().map(from_figure).fold(0.0, f64::max);
-    let mut missing: f64 = 0.0;
-    for [a, b] in figure {
-        let length = (b[0] - a[0]).hypot(b[1] - a[1]);
-        let count = (length / 20.0) as usize;
-        for part in 0..=count {
-            let part = part as f64 / count as f64;
-            let point = [a[0] + part * (b[0] - a[0]), a[1] + part * (b[1] - a[1])];
-            let near = ink.iter().map(|[x, y]| (x - point[0]).hypot(y - point[1]));
-            missing = missing.max(near.fold(f64::INFINITY, f64::min));
-        }
-    }
-    (beside, missing)
 }
 
 #[test]
@@ -183,12 +136,9 @@ fn every_dialect_draws_the_figure_and_nothing_else() {
         }
         let heard = send(&mut bench, &program);
         let notes: Vec<_> = heard.lines().filter(|line| line.starts_with("[MSG:")).collect();
-        let (beside, missing) = compare(&inked(&bench), &figure(downward));
-        // A point of the figure lies at most half a diagonal from the nearest step.
-        if beside > 1.0 || missing > 1.5 || notes.iter().any(|note| !note.contains("Pgm End")) {
-            faults += &format!(
-                "{name} {settings:?}: ink {beside:.2} steps beside, {missing:.2} missing, {notes:?}\n"
-            );
+        let difference = ink::difference(&inked(&bench), &figure(downward), 0.0);
+        if difference.is_some() || notes.iter().any(|note| !note.contains("Pgm End")) {
+            faults += &format!("{name} {settings:?}: {difference:?}, {notes:?}\n");
         }
     }
     assert!(faults.is_empty(), "{faults}");

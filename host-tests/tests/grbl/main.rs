@@ -3,8 +3,10 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use penup::boards::host::Change;
 use penup::machine::{Contacts, State};
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
+use penup::plotter::Board;
+use penup_host_tests::ink;
 use penup_host_tests::whole_jobs::Bench;
 
 /// A row of the list.
@@ -31,25 +33,9 @@ fn rows() -> impl Iterator<Item = Row<'static>> {
     })
 }
 
-/// Lets a number of milliseconds pass.
-fn work(bench: &mut Bench, milliseconds: u32) {
-    for _ in 0..milliseconds {
-        while bench.plotter.poll(&mut bench.board) {}
-        bench.board.wait();
-    }
-}
-
-/// A plotter with little memory.
-fn bench() -> Bench {
-    let memory = Box::leak(Box::new(Memory::<4, 4, 16>::new()));
-    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
-    bench.heard();
-    bench
-}
-
 /// A plotter in one of the states of the list.
 fn bench_in(state: &str) -> Bench {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     let (bytes, milliseconds): (&[u8], _) = match state {
         "idle" => (b"", 0),
         "run" => (b"M3 S0\nM5\nG1 X300 F600\n", 700),
@@ -61,10 +47,10 @@ fn bench_in(state: &str) -> Bench {
         _ => panic!("no state {state}"),
     };
     bench.board.receive(bytes);
-    work(&mut bench, milliseconds);
+    bench.work(milliseconds);
     if state == "hold" {
         bench.board.receive(b"!");
-        work(&mut bench, 1500);
+        bench.work(1500);
     }
     bench.heard();
     bench
@@ -88,7 +74,7 @@ fn answer(state: &str, sent: &str) -> String {
                 rest = &rest[3..];
             }
             '\\' => {
-                work(&mut bench, if rest.starts_with('p') { 3 } else { 1500 });
+                bench.work(if rest.starts_with('p') { 3 } else { 1500 });
                 rest = &rest[1..];
             }
             letter => bench.board.receive(letter.encode_utf8(&mut [0; 4]).as_bytes()),
@@ -96,7 +82,7 @@ fn answer(state: &str, sent: &str) -> String {
     }
     // An arc or a dwell is answered when it is done.
     for _ in 0..200 {
-        work(&mut bench, 25);
+        bench.work(25);
         heard += &bench.heard();
         let answers =
             heard.lines().filter(|line| *line == "ok" || line.starts_with("error:")).count();
@@ -132,7 +118,7 @@ fn agrees(heard: &str, expected: &str) -> bool {
 /// The time that homing takes, in milliseconds, with the settings. While the machine homes, its
 /// switches lie 5 mm from where it begins.
 fn homing_time(settings: &str) -> u32 {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     bench.say("$22=1\n$130=60\n$131=60\n$J=X30 Y20 F6000\n");
     bench.finish();
     bench.say(settings);
@@ -152,6 +138,102 @@ fn homing_time(settings: &str) -> u32 {
     panic!("homing does not end");
 }
 
+/// Where the machine is after homing with `$23=MASK`, and how far its pins have moved from where it
+/// began. Its switches lie 5 mm away.
+fn homed(mask: u8) -> (String, [i32; 2]) {
+    let mut bench = Bench::small();
+    bench.say("$22=1\n$130=60\n$131=50\n$J=X30 Y20 F6000\n");
+    bench.finish();
+    bench.say(&format!("$23={mask}\n"));
+    let (_, began) = ink::inked(&bench);
+    bench.heard();
+    bench.board.receive(b"$H\n");
+    for _ in 0..60_000 {
+        while bench.plotter.poll(&mut bench.board) {}
+        let (_, at) = ink::inked(&bench);
+        let is_pressed = |axis: usize| {
+            let way = at[axis] - began[axis];
+            if mask & 1 << axis != 0 { way <= -400 } else { way >= 400 }
+        };
+        bench.board.set_contacts(Contacts { x: is_pressed(0), y: is_pressed(1), stop: false });
+        for _ in 0..5 {
+            bench.board.wait();
+            while bench.plotter.poll(&mut bench.board) {}
+        }
+        if bench.heard().contains("ok") {
+            let status = bench.say("?");
+            let place = status.split("MPos:").nth(1).and_then(|rest| rest.split(",0.000|").next());
+            let (_, at) = ink::inked(&bench);
+            return (place.expect("a place").to_owned(), [at[0] - began[0], at[1] - began[1]]);
+        }
+    }
+    panic!("homing does not end");
+}
+
+#[test]
+fn homing_seeks_the_corner_that_the_mask_says() {
+    for (mask, place, [x, y]) in [
+        (3, "0.000,0.000", [-1, -1]),
+        (2, "60.000,0.000", [1, -1]),
+        (1, "0.000,50.000", [-1, 1]),
+        (0, "60.000,50.000", [1, 1]),
+    ] {
+        let (found, moved) = homed(mask);
+        assert_eq!(found, place, "{mask}");
+        // 5 mm to the switch, and 2 mm back.
+        for (moved, sign) in moved.into_iter().zip([x, y]) {
+            assert!((moved * sign - 240).abs() < 20, "{mask}: {moved}");
+        }
+    }
+}
+
+#[test]
+fn the_drivers_are_switched_off_when_the_machine_has_stood_for_a_while() {
+    let drivers = |bench: &Bench| {
+        let enables =
+            bench.board.trace().changes().into_iter().filter_map(|stamped| match stamped.change {
+                Change::Enable(on) => Some((stamped.time / 25_000, on)),
+                _ => None,
+            });
+        enables.collect::<Vec<_>>()
+    };
+    let mut bench = Bench::small();
+    bench.say("$1=100\n");
+    bench.work(500);
+    assert_eq!(drivers(&bench), [], "they are off at first");
+    bench.say("G0 X10\n");
+    bench.finish();
+    let end = bench.board.trace().now() / 25_000;
+    bench.work(500);
+    let changes = drivers(&bench);
+    let [(_, true), (off, false)] = changes[..] else { panic!("{changes:?}") };
+    assert!((95..=115).contains(&(off - end)), "{off} {end}");
+    // They are on again with the next move, and the position is the same.
+    bench.say("G0 X20\n");
+    bench.finish();
+    assert_eq!(drivers(&bench).len(), 3);
+    assert!(bench.say("?").starts_with("<Idle|MPos:20.000,0.000,"));
+    // 255 keeps them on.
+    bench.say("$1=255\nG0 X30\n");
+    bench.work(5000);
+    let changes = drivers(&bench);
+    assert!(changes.last().is_some_and(|(_, on)| *on), "{changes:?}");
+}
+
+#[test]
+fn the_pins_of_the_drivers_are_inverted_as_the_settings_say() {
+    let mut bench = Bench::small();
+    for (line, expected) in
+        [("", (0, false)), ("$2=5\n", (5, false)), ("$4=1\n", (5, true)), ("$2=0\n", (0, true))]
+    {
+        bench.say(line);
+        assert_eq!(bench.board.inverted_pins(), expected, "{line}");
+    }
+    assert!(bench.say("$2=8\n").contains("invert step pulses goes from 0 to 7"));
+    bench.say("$RST=$\n");
+    assert_eq!(bench.board.inverted_pins(), (0, false));
+}
+
 #[test]
 fn homing_pauses_after_each_of_its_moves() {
     let (plain, paused) = (homing_time("$26=0\n"), homing_time("$26=100\n"));
@@ -161,7 +243,7 @@ fn homing_pauses_after_each_of_its_moves() {
 
 #[test]
 fn the_origin_of_the_coordinates_moves_what_is_drawn() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     // 20 mm by G54, 5 mm more by G92; then from there, by the machine's own coordinates, and back.
     for (lines, position) in [
         ("G10 L2 P1 X20 Y10\nG0 X1 Y1\n", "21.000,11.000"),
@@ -190,7 +272,7 @@ fn the_origin_of_the_coordinates_moves_what_is_drawn() {
 #[test]
 fn the_override_of_rapid_moves_slows_those_with_the_pen_up_only() {
     let time = |bytes: &[u8], line: &str| {
-        let mut bench = bench();
+        let mut bench = Bench::small();
         bench.board.receive(bytes);
         bench.say(line);
         bench.finish();
@@ -202,7 +284,7 @@ fn the_override_of_rapid_moves_slows_those_with_the_pen_up_only() {
 
 #[test]
 fn letters_of_utf_8_are_no_orders() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     assert_eq!(bench.say("# Å Д °±\n(Ä)\n"), "ok\nok\n");
     assert!(bench.say("?").starts_with("<Idle|"));
 }

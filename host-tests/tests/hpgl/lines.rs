@@ -1,7 +1,9 @@
 //! The list of lines, with what is answered and drawn.
 
-use super::ink::{difference, inked, strokes};
-use super::{bench, draw};
+use super::draw;
+use super::ink::{inked, strokes};
+use penup_host_tests::ink::difference;
+use penup_host_tests::whole_jobs::Bench;
 
 #[test]
 fn lines_are_drawn_and_answered_as_listed() {
@@ -24,7 +26,7 @@ fn lines_are_drawn_and_answered_as_listed() {
             }
         }
         bytes.extend(b";OE;");
-        let mut bench = bench();
+        let mut bench = Bench::small();
         let heard = draw(&mut bench, &bytes).replace('\r', " ").replace('\n', "⏎");
         if heard.trim() != answers.trim() {
             faults += &format!("{line}\n    answered {heard}\n");

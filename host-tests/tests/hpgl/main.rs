@@ -11,33 +11,17 @@ mod senders;
 
 use ink::{assert_same_ink, inked, plan, units};
 use penup::machine::State;
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory};
 use penup_host_tests::whole_jobs::Bench;
 use std::fmt::Write as _;
 
 /// A plotter with little memory.
-fn bench() -> Bench {
-    let memory = Box::leak(Box::new(Memory::<4, 4, 16, 2>::new()));
-    let mut bench = Bench::with_memory(memory.lend(Box::leak(Box::new(EMPTY_LOOKAHEAD))));
-    bench.heard();
-    bench
-}
-
-/// Lets a number of milliseconds pass.
-fn work(bench: &mut Bench, milliseconds: u32) {
-    for _ in 0..milliseconds {
-        while bench.plotter.poll(&mut bench.board) {}
-        bench.board.wait();
-    }
-}
-
 /// Draws HP-GL to its end, with whatever pens it asks for. Returns all that is heard.
 fn draw(bench: &mut Bench, bytes: &[u8]) -> String {
     bench.board.receive(bytes);
     let mut heard = String::new();
     let mut idle = 0;
     while idle < 50 {
-        work(bench, 1);
+        bench.work(1);
         heard += &String::from_utf8_lossy(&bench.board.take_sent());
         if bench.plotter.machine().state() == (State::Hold { stopped: true }) {
             // The other port puts the pen in. It is heard there, and not here.
@@ -128,7 +112,7 @@ fn slack(name: &str) -> f64 {
 fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
     assert!(vpype().len() > 14_701 && !vpype().contains(&b'\n'));
     for (name, bytes) in files() {
-        let mut bench = bench();
+        let mut bench = Bench::small();
         let heard = draw(&mut bench, &bytes);
         assert!(!heard.contains("ok") && !heard.contains("error"), "{name}: {heard}");
         assert_same_ink(name, &inked(&bench), &plan(&bytes), slack(name));
@@ -137,48 +121,48 @@ fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
 
 #[test]
 fn nothing_is_answered_that_hp_gl_does_not_ask_for() {
-    let mut bench = bench();
-    assert_eq!(draw(&mut bench, b"IN;SP1;PD100,100;XX;PA1;OE;SP2;PD200,200;\n\n"), "2\r");
+    let mut bench = Bench::small();
+    assert_eq!(draw(&mut bench, b"IN;SP1;PD100,100;XX;PA1;OE;SP2;PD200,200;\n\n"), "1\r");
     // The pen was asked for at the other port only.
-    let mut bench = self::bench();
+    let mut bench = Bench::small();
     bench.board.receive_by(1, b"$I\n");
     let heard = draw(&mut bench, b"IN;SP2;PD100,100;");
     assert!(heard.contains("[MSG:put in pen 2, then send ~]"), "{heard}");
     // An alarm is heard there, too, and what is to be drawn then sets error 8.
-    let mut bench = self::bench();
+    let mut bench = Bench::small();
     bench.board.receive(b"\xFDIN;PD100,100;OE;PA0,0;OE;");
-    work(&mut bench, 50);
+    bench.work(50);
     assert_eq!(bench.heard(), "ALARM:10\n8\r8\r");
 }
 
 #[test]
 fn pens_are_asked_for_when_they_differ_and_status_tells_which() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     bench.board.receive(b"IN;SP1;PD100,0;SP1;PD200,0;SP3;PD300,0;");
-    work(&mut bench, 3000);
+    bench.work(3000);
     assert_eq!(units(&bench), [[0, 0], [200, 0]]);
     let status = bench.say("?");
     assert!(status.starts_with("<Hold:0|") && status.contains("|Pen:3|"), "{status}");
     bench.board.receive(b"~");
-    work(&mut bench, 3000);
+    bench.work(3000);
     assert_eq!(units(&bench), [[0, 0], [300, 0]]);
     bench.board.receive(b"SP0;PD400,0;SP3;PD500,0;");
-    work(&mut bench, 3000);
+    bench.work(3000);
     assert!(!bench.say("?").contains("|Pen:"));
     let ink = inked(&bench);
     assert!(ink.iter().all(|[x, _]| *x <= 600.0 || *x >= 800.0), "put away");
     assert!(ink.iter().any(|[x, _]| *x == 1000.0));
     // With one pen for all there are no questions.
-    let mut bench = self::bench();
+    let mut bench = Bench::small();
     bench.say("$pens=one\n");
     bench.board.receive(b"IN;SP5;PD100,0;");
-    work(&mut bench, 2000);
+    bench.work(2000);
     assert_eq!(units(&bench), [[0, 0], [100, 0]]);
 }
 
 #[test]
 fn control_x_and_a_dollar_line_end_it() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     assert_eq!(bench.say("G0 X1\n"), "ok\n");
     draw(&mut bench, b"IN;PU0,0;LBWhat?! ~");
     // In a label these are letters.
@@ -198,7 +182,7 @@ fn control_x_and_a_dollar_line_end_it() {
     // What was sent before is drawn before the line is carried out.
     bench.board.trace().take_changes();
     bench.board.receive(b"PU0,0;PD4000,0;\n$G\nG0 X200\n");
-    work(&mut bench, 15_000);
+    bench.work(15_000);
     let heard = bench.heard();
     assert!(heard.starts_with("[GC:") && heard.ends_with("ok\nok\n"), "{heard}");
     let [[left, bottom], [right, top]] = units(&bench);
@@ -208,24 +192,24 @@ fn control_x_and_a_dollar_line_end_it() {
 
 #[test]
 fn the_other_port_watches_and_cannot_interrupt() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     bench.board.receive_by(1, b"$I\n");
-    work(&mut bench, 1);
+    bench.work(1);
     bench.heard();
     let zigzag: String = (0..80).map(|index| format!("PD{},{};", index % 2 * 400, index)).collect();
     bench.board.receive(format!("IN;PU0,0;{zigzag}").as_bytes());
-    work(&mut bench, 100);
+    bench.work(100);
     bench.board.receive_by(1, b"?G0 X1\n");
-    work(&mut bench, 2);
+    bench.work(2);
     let heard = bench.heard();
     assert!(heard.starts_with("<Run|"), "{heard}");
     assert!(heard.ends_with("error:8\n"), "{heard}");
     bench.board.receive(b"OI;");
-    work(&mut bench, 60_000);
+    bench.work(60_000);
     assert_eq!(bench.heard(), "7475A\r");
     assert_eq!(units(&bench), [[0, 0], [400, 79]]);
     bench.board.receive_by(1, b"G90\nIN;PD0,0;");
-    work(&mut bench, 5);
+    bench.work(5);
     assert!(bench.heard().starts_with("ok\n[MSG:HP-GL comes by the other port"));
 }
 
@@ -234,20 +218,20 @@ fn damaged_bytes_leave_a_part_out_and_ink_nothing_else() {
     let bytes = inkscape();
     let whole = plan(&bytes);
     for damaged in (18..bytes.len() - 10).step_by(7) {
-        let mut bench = bench();
+        let mut bench = Bench::small();
         let mut spoilt = bytes.clone();
         spoilt[damaged] = 0xFF;
         spoilt.extend_from_slice(b"\x1B.E");
         let heard = draw(&mut bench, &spoilt);
         assert_eq!(heard, "15\r", "byte {damaged}");
-        let beside = ink::farthest(&inked(&bench), &whole);
+        let beside = penup_host_tests::ink::farthest(&inked(&bench), &whole);
         assert!(beside <= 1.0, "byte {damaged}: ink {beside} steps beside");
     }
 }
 
 #[test]
 fn a_label_is_drawn_with_the_letters_that_the_line_would_otherwise_obey() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     let heard = draw(&mut bench, b"IN;SI1,1.4;PU400,400;LB?!~$\x03PU0,0;OE;");
     assert_eq!(heard, "0\r");
     let ink = inked(&bench);
@@ -262,7 +246,7 @@ fn a_label_is_drawn_with_the_letters_that_the_line_would_otherwise_obey() {
 
 #[test]
 fn nothing_leaves_the_travel() {
-    let mut bench = bench();
+    let mut bench = Bench::small();
     bench.say("$130=100\n$131=50\n");
     let text = b"IN;PU-500,-500;PD9000,900;CI3000;PA-9000,3000;PU8000000,0;PD0,0;RO90;PD5000,100;\
         LBoutside\x03EA-4000,9000;IW-10,-10,20000,200;EW9000,0,359;PU100,100;OH;OE;";
@@ -273,4 +257,51 @@ fn nothing_leaves_the_travel() {
     let position = bench.plotter.machine().position();
     assert_eq!((position.x, position.y), (8000 - 200, 200));
     assert!(ink.iter().all(|[x, y]| (0.0..=8000.0).contains(x) && (0.0..=4000.0).contains(y)));
+}
+
+#[test]
+fn a_polygon_that_does_not_fit_is_an_error_and_is_not_drawn() {
+    let polygon = |points: usize| {
+        let mut text = String::from("IN;SP1;PU100,100;PM0;PD");
+        for point in 1..points {
+            text +=
+                &format!("{}{},{}", if point > 1 { "," } else { "" }, 100 + point, point % 2 * 100);
+        }
+        text + ";PM2;FP;EP;OE;"
+    };
+    // The last place is that of the point that closes it.
+    for (points, error, inks) in [(255, "0", true), (256, "7", false), (5000, "7", false)] {
+        let mut bench = Bench::small();
+        let heard = draw(&mut bench, polygon(points).as_bytes());
+        assert_eq!(heard.trim(), error, "{points}");
+        assert_eq!(inked(&bench).is_empty(), !inks, "{points}");
+    }
+}
+
+#[test]
+fn a_fill_of_a_circle_covers_it_and_nothing_else() {
+    for (style, spacing) in [("PT1", 40.0), ("FT2;PT0.5", 20.0), ("FT3,30,30", 30.0)] {
+        let mut bench = Bench::small();
+        let text = format!("IN;SP1;{style};PU2000,2000;PM0;CI400,3;PM1;CI200,3;PM2;FP;");
+        draw(&mut bench, text.as_bytes());
+        // A chord of 3 degrees lies less than a fifth of a unit within the circle.
+        let centre = [4000.0, 4000.0];
+        let off = |[x, y]: [f64; 2]| (x - centre[0]).hypot(y - centre[1]) / 2.0;
+        let ink = inked(&bench);
+        for point in &ink {
+            assert!((198.5..=401.0).contains(&off(*point)), "{style}: {point:?}");
+        }
+        // No point of the ring is farther from the ink than half the distance of the lines.
+        let mut random = 1u32;
+        for _ in 0..500 {
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let angle = f64::from(random >> 16) / 65536.0 * std::f64::consts::TAU;
+            random = random.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let radius = 2.0 * (230.0 + f64::from(random >> 16) / 65536.0 * 140.0);
+            let [x, y] = [centre[0] + radius * angle.cos(), centre[1] + radius * angle.sin()];
+            let near =
+                ink.iter().map(|[ix, iy]| (ix - x).hypot(iy - y)).fold(f64::INFINITY, f64::min);
+            assert!(near / 2.0 <= spacing / 2.0 + 1.0, "{style}: {near} at {x} {y}");
+        }
+    }
 }

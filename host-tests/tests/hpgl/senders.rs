@@ -1,7 +1,7 @@
 //! Senders that wait for the plotter, with a slow main loop.
 
 use super::ink::{assert_same_ink, inked, plan};
-use super::{bench, chiplotle, gnuplot, slack, vpype};
+use super::{chiplotle, gnuplot, slack, vpype};
 use penup::machine::State;
 use penup::plotter::Board;
 use penup_host_tests::whole_jobs::Bench;
@@ -20,7 +20,7 @@ struct SlowPort {
 
 impl SlowPort {
     fn new() -> Self {
-        Self { bench: bench(), waiting: [].into(), heard: Vec::new(), time: 0 }
+        Self { bench: Bench::small(), waiting: [].into(), heard: Vec::new(), time: 0 }
     }
 
     /// Sends a byte, which takes a tenth of a millisecond.

@@ -208,6 +208,10 @@ impl Board for Pico {
         self.steps.sync_consumed();
     }
 
+    fn invert_driver_pins(&mut self, steps: u8, enable: bool) {
+        pins::invert(steps, enable);
+    }
+
     fn microseconds(&mut self) -> u32 {
         clock::microseconds()
     }

@@ -1,5 +1,6 @@
 //! Assigns the pins to their functions. The table of the boards has the pins of the machine.
 
+use super::registers::{IO_BANK0, Put as _};
 use penup::board_table::Pins;
 use rp2040_hal::gpio::{DynBankId, DynFunction, DynPinId, DynPullType, DynSioConfig, new_pin};
 
@@ -37,6 +38,23 @@ pub fn hand_over() {
     give(PINS.dir_z, DynFunction::Sio(DynSioConfig::Output), None);
     for number in [PINS.limit_x, PINS.limit_y, PINS.stop] {
         give(number, DynFunction::Sio(DynSioConfig::Input), Some(DynPullType::Up));
+    }
+}
+
+/// Inverts the step pins of the motors in the mask `steps`, and the enable pin if `enable`. Whatever
+/// drives these pins then drives them the other way, a fault included.
+pub fn invert(steps: u8, enable: bool) {
+    /// The bit of a pin's control register that inverts its output (data sheet, 2.19.6.1).
+    const INVERT: u32 = 1 << 8;
+    let is_inverted = [steps & 1 != 0, steps & 2 != 0, steps & 4 != 0, enable];
+    let numbers = [PINS.step_x, PINS.step_y, PINS.step_z, PINS.enable];
+    for (number, is_inverted) in numbers.into_iter().zip(is_inverted) {
+        let control = IO_BANK0.gpio(number.into()).gpio_ctrl();
+        if is_inverted {
+            control.set(INVERT);
+        } else {
+            control.clear(INVERT);
+        }
     }
 }
 

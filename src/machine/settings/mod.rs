@@ -1,10 +1,9 @@
 //! The numbered settings and their values.
 //!
 //! Numbers up to 132 have the meaning that they have in Grbl 1.1, with one exception: 5 is a mask
-//! here, and it also covers the emergency stop. What this machine does not have is fixed: any other
-//! value is refused. Numbers from 200 on are penup's own. A value is
-//! checked when it is entered, both alone and together with the other values. A refused value
-//! changes nothing.
+//! here, and it also covers the emergency stop. What a board does not have is fixed: any other
+//! value is refused. Numbers from 200 on are penup's own. A value is checked when it is entered,
+//! both alone and together with the other values. A refused value changes nothing.
 //!
 //! The settings themselves are rows of a table ([`SETTINGS`]). Checks of several settings together
 //! belong to the part that obeys them: the kinematics, the tool, and the limits of motion.

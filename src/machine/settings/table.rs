@@ -10,19 +10,20 @@ use super::Value;
 pub enum Setting {
     /// `$0` The width of a step pulse, in microseconds.
     StepPulse,
-    /// `$1` How long the drivers stay on after a move; 255 for always, which is the only choice.
+    /// `$1` How long the drivers stay on after a move; 255 for always.
     StepIdleDelay,
-    /// `$2` The mask of motors whose step pulses are inverted; none are.
+    /// `$2` The mask of motors whose step pulses are inverted: bit 0 for x, bit 1 for y, bit 2 for
+    /// z.
     InvertSteps,
     /// `$3` The mask of motors whose direction is inverted: bit 0 for x, bit 1 for y, bit 2
     /// for z.
     InvertDirections,
-    /// `$4` Whether the enable pin is inverted; it is not.
+    /// `$4` Whether the enable pin is inverted: high switches the drivers on.
     InvertEnable,
     /// `$5` The mask of contacts that are closed when they are not pressed: bit 0 for x, bit 1 for
     /// y, bit 2 for the emergency stop.
     InvertContacts,
-    /// `$6` Whether the probe is inverted; there is none.
+    /// `$6` Whether the probe is inverted. There is none; the value is only kept.
     InvertProbe,
     /// `$10` The mask of what a status report holds: bit 0 the position of the machine instead of
     /// that of the work, bit 1 the room in the buffers.
@@ -40,7 +41,7 @@ pub enum Setting {
     HardLimits,
     /// `$22` Whether the machine must be homed before it draws.
     Homing,
-    /// `$23` The mask of axes whose limit switch lies at their low end; all do.
+    /// `$23` The mask of axes whose limit switch lies at their low end: bit 0 for x, bit 1 for y.
     HomingDirection,
     /// `$24` The speed of the second, slow approach to a switch.
     HomingFeed,
@@ -196,6 +197,26 @@ const fn row(
     }
 }
 
+/// Whether the board can invert the pins of the drivers, and switches them off at rest. On other
+/// boards these settings have one value.
+const DRIVER_PINS: bool = cfg!(feature = "driver-pins");
+/// The names of [`Setting::StepIdleDelay`], [`Setting::InvertSteps`] and [`Setting::InvertEnable`].
+const DRIVER_NAMES: [&str; 3] = if DRIVER_PINS {
+    ["drivers off after a move: 255 is never", "invert step pulses", "invert enable pin"]
+} else {
+    [
+        "drivers off after a move (never on this board)",
+        "invert step pulses (not on this board)",
+        "invert enable pin (not on this board)",
+    ]
+};
+/// The least and the greatest value, and the default, of the same settings.
+const DRIVER_RANGES: [(f64, f64, f64); 3] = if DRIVER_PINS {
+    [(0.0, 255.0, 255.0), (0.0, 7.0, 0.0), (0.0, 1.0, 0.0)]
+} else {
+    [(255.0, 255.0, 255.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
+};
+
 /// All settings, sorted by number: number, name, unit, range with default, and whether only whole
 /// numbers are allowed.
 #[rustfmt::skip] // a table
@@ -203,12 +224,12 @@ pub const SETTINGS: &[SettingInfo] = {
     use Setting::*;
     &[
         row(StepPulse, 0, "step pulse length", "us", (0.2, 500.0, 2.0), false),
-        row(StepIdleDelay, 1, "drivers off after a move: 255 is never", "ms", (255.0, 255.0, 255.0), true),
-        row(InvertSteps, 2, "invert step pulses: 0 is never", "mask", (0.0, 0.0, 0.0), true),
+        row(StepIdleDelay, 1, DRIVER_NAMES[0], "ms", DRIVER_RANGES[0], true),
+        row(InvertSteps, 2, DRIVER_NAMES[1], "mask", DRIVER_RANGES[1], true),
         row(InvertDirections, 3, "invert directions", "mask", (0.0, 7.0, 0.0), true),
-        row(InvertEnable, 4, "invert enable pin: 0 is never", "0|1", (0.0, 0.0, 0.0), true),
+        row(InvertEnable, 4, DRIVER_NAMES[2], "0|1", DRIVER_RANGES[2], true),
         row(InvertContacts, 5, "invert contacts", "mask", (0.0, 7.0, 0.0), true),
-        row(InvertProbe, 6, "invert probe: 0, there is none", "0|1", (0.0, 0.0, 0.0), true),
+        row(InvertProbe, 6, "invert probe; there is none", "0|1", (0.0, 1.0, 0.0), true),
         row(StatusReport, 10, "status report", "mask", (0.0, 3.0, 1.0), true),
         row(JunctionDeviation, 11, "junction deviation", "mm", (0.0, 1.0, 0.05), false),
         row(ArcTolerance, 12, "arc tolerance, or half a step", "mm", (0.0, 10.0, 0.002), false),
@@ -216,7 +237,7 @@ pub const SETTINGS: &[SettingInfo] = {
         row(SoftLimits, 20, "soft limits", "0|1", (0.0, 1.0, 1.0), true),
         row(HardLimits, 21, "hard limits", "0|1", (0.0, 1.0, 0.0), true),
         row(Homing, 22, "homing", "0|1", (0.0, 1.0, 0.0), true),
-        row(HomingDirection, 23, "switches at the low end: 3 is both", "mask", (3.0, 3.0, 3.0), true),
+        row(HomingDirection, 23, "switches at the low end", "mask", (0.0, 3.0, 3.0), true),
         row(HomingFeed, 24, "homing speed, slow approach", "mm/min", (1.0, 32767.0, 60.0), false),
         row(HomingSeek, 25, "homing speed, first approach", "mm/min", (1.0, 32767.0, 1500.0), false),
         row(HomingDebounce, 26, "homing pause for the switches", "ms", (0.0, 1000.0, 0.0), false),

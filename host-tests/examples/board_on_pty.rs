@@ -1,0 +1,95 @@
+//! Serves an emulated board at a pseudo-terminal, so that any program that uses a serial port can
+//! use it, and judges what the pins ink. `cargo xtask senders` runs it.
+//!
+//! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is
+//! the name of the terminal. Then each line of the input is answered by one line: `forget` forgets
+//! the ink so far; `judge FILE` compares the ink since then with the lines of FILE, each of which
+//! is a polyline of points `x,y` in steps, and answers `same` or what differs; `heard` prints what
+//! the board has been sent since the last call, escaped. It ends with its input.
+
+use std::error::Error;
+use std::io::{BufRead as _, Read as _, Write as _};
+use std::sync::mpsc::{self, TryRecvError};
+use std::time::Duration;
+
+use penup_client::emulator::{EmulatedBoard, Emulator, Options, Pico, PicoByUsb, image_path};
+use penup_host_tests::ink::{Ink, Segment, difference};
+use serialport::{SerialPort as _, TTYPort};
+
+fn boot(board: &str) -> Result<Box<dyn EmulatedBoard>, Box<dyn Error>> {
+    Ok(match board {
+        "lm3s6965" => Box::new(Emulator::start(&image_path(board), Options::default())?),
+        "pico" => Box::new(Pico::start(&image_path("pico"))?),
+        "pico-usb" => {
+            let mut pico = Pico::start(&image_path("pico"))?;
+            pico.plug_usb_in()?;
+            Box::new(PicoByUsb(pico))
+        }
+        other => return Err(format!("no board {other}").into()),
+    })
+}
+
+/// Reads the polylines of a file.
+fn figure(file: &str) -> Result<Vec<Segment>, Box<dyn Error>> {
+    let mut segments = Vec::new();
+    for line in std::fs::read_to_string(file)?.lines() {
+        let mut points = Vec::new();
+        for point in line.split_whitespace() {
+            let (x, y) = point.split_once(',').ok_or("a point is x,y")?;
+            points.push([x.parse()?, y.parse()?]);
+        }
+        segments.extend(points.windows(2).filter_map(|ends| Some([*ends.first()?, *ends.last()?])));
+    }
+    Ok(segments)
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let name = std::env::args().nth(1).ok_or("the board is missing")?;
+    let mut board = boot(&name)?;
+    let (mut wire, terminal) = TTYPort::pair()?;
+    wire.set_timeout(Duration::from_millis(1))?;
+    println!("{}", terminal.name().ok_or("the terminal has no name")?);
+    let (sender, orders) = mpsc::channel();
+    std::thread::spawn(move || {
+        let lines = std::io::stdin().lock().lines();
+        lines.map_while(Result::ok).all(|line| sender.send(line).is_ok())
+    });
+    // The other end stays open here, so that the programs may open and close it.
+    let _terminal = terminal;
+    let (mut ink, mut sent) = (Ink::default(), Vec::new());
+    let mut buffer = [0; 256];
+    loop {
+        if let Ok(count) = wire.read(&mut buffer) {
+            let bytes = buffer.get(..count).unwrap_or_default();
+            sent.extend_from_slice(bytes);
+            board.send(bytes)?;
+        }
+        let count = board.receive(&mut buffer, Duration::from_millis(1))?;
+        // What nobody reads is lost.
+        let _ = wire.write_all(buffer.get(..count).unwrap_or_default());
+        for change in board.pin_changes()? {
+            ink.change(change);
+        }
+        let order = match orders.try_recv() {
+            Ok(order) => order,
+            Err(TryRecvError::Empty) => continue,
+            Err(TryRecvError::Disconnected) => return Ok(()),
+        };
+        match order.split_once(' ').unwrap_or((&order, "")) {
+            ("forget", _) => {
+                ink.take_points();
+                println!("forgotten");
+            }
+            ("judge", file) => {
+                let points = ink.take_points();
+                let points: Vec<_> = points.iter().map(|point| point.map(f64::from)).collect();
+                // Both ends of a line are rounded to a step, and so is each point between them: together
+                // at most 1.07 steps across it.
+                let found = difference(&points, &figure(file)?, 0.07);
+                println!("{}", found.unwrap_or_else(|| "same".to_owned()));
+            }
+            ("heard", _) => println!("{}", std::mem::take(&mut sent).escape_ascii()),
+            (order, _) => return Err(format!("no order {order}").into()),
+        }
+    }
+}

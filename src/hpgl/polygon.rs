@@ -1,0 +1,479 @@
+//! Polygons (`PM EP FP`), filled shapes (`RA RR WG`), and how they are filled (`FT PT`).
+//!
+//! A polygon is kept in a buffer of [`VERTICES`] points. As on Hewlett-Packard's machines, filled
+//! rectangles and wedges use the same buffer, and what does not fit sets error 7 (HP 7550A) and is
+//! not drawn at all. Inside is what an odd number of edges surrounds. A fill is made line by line,
+//! each from edge to edge: no list of crossings is kept, the next one is looked for among all edges.
+//!
+//! Sources: PCL 5 Printer Language Technical Reference Manual (Hewlett-Packard), part II, chapter
+//! 21, "The Polygon Group": which points are joined, how subpolygons are closed, and what `EP` and
+//! `FP` draw. Its `FT` and the `PT` of HP-GL give the fill types and their defaults.
+
+use super::coordinates::{Point, UNIT, UNITS_PER_MM};
+use super::interpreter::{ErrorNumber, Interpreter, Order, Step};
+use super::outline::{ArcStep, sine_and_cosine};
+use crate::fixed::{divide_rounding, product};
+
+/// The most points of a polygon. Each takes 8 bytes.
+pub(super) const VERTICES: usize = 256;
+/// Coordinates of a vertex are kept without so many of their lowest bits: in 2^-6 plotter units.
+const DROPPED_BITS: u32 = 10;
+/// The angle of the chords of arcs in a polygon, if none is given: 5 degrees.
+const CHORD: i64 = 5 * UNIT;
+/// The width of the pen until `PT` sets it: 0.3 mm.
+const THICKNESS: i64 = 3 * UNITS_PER_MM * UNIT / 10;
+/// The least distance of the lines of a fill. Nearer ones would fall on the same steps.
+const LEAST_PITCH: i64 = UNIT / 2;
+
+/// A point of a polygon.
+#[derive(Debug, Clone, Copy)]
+struct Vertex {
+    /// x in units of 2^-6 plotter units, times 2, plus 1 if the point begins a subpolygon.
+    x: i32,
+    /// y in the same way, plus 1 if the edge to the point is drawn by `EP`.
+    y: i32,
+}
+
+impl Vertex {
+    fn new(at: Point, begins: bool, is_drawn: bool) -> Self {
+        // Coordinates are below 2^40 in units of 2^-16, so below 2^31 here.
+        let packed = |coordinate: i64, flag: bool| {
+            ((coordinate >> DROPPED_BITS) as i32) << 1 | i32::from(flag)
+        };
+        Self { x: packed(at.x, begins), y: packed(at.y, is_drawn) }
+    }
+
+    fn at(self) -> Point {
+        let [x, y] = [self.x, self.y].map(|packed| i64::from(packed >> 1) << DROPPED_BITS);
+        Point { x, y }
+    }
+
+    fn begins(self) -> bool {
+        self.x & 1 != 0
+    }
+
+    fn is_drawn(self) -> bool {
+        self.y & 1 != 0
+    }
+}
+
+/// The polygon buffer.
+#[derive(Debug)]
+pub(super) struct Polygon {
+    vertices: [Vertex; VERTICES],
+    count: usize,
+    /// The index of the first point of the subpolygon that is being defined.
+    first: usize,
+    /// Whether polygon mode is on.
+    pub(super) is_open: bool,
+    /// Whether points did not fit.
+    is_full: bool,
+    /// Where the pen was when polygon mode began.
+    began_at: Point,
+}
+
+impl Polygon {
+    /// No polygon; it consists of zero bits.
+    pub(super) const ZERO: Self = Self {
+        vertices: [Vertex { x: 0, y: 0 }; VERTICES],
+        count: 0,
+        first: 0,
+        is_open: false,
+        is_full: false,
+        began_at: Point::ZERO,
+    };
+
+    /// Forgets the polygon, and ends polygon mode.
+    pub(super) fn clear(&mut self) {
+        (self.count, self.first, self.is_open, self.is_full) = (0, 0, false, false);
+    }
+
+    /// Adds a point. Returns whether there was room for it.
+    fn push(&mut self, at: Point, is_drawn: bool) -> bool {
+        let begins = self.count == self.first;
+        match self.vertices.get_mut(self.count) {
+            Some(slot) if !self.is_full => {
+                *slot = Vertex::new(at, begins, is_drawn);
+                self.count += 1;
+            }
+            _ => self.is_full = true,
+        }
+        !self.is_full
+    }
+
+    /// Closes the subpolygon that is being defined. A single point is none.
+    fn close(&mut self) {
+        let [first, last] =
+            [self.first, self.count.wrapping_sub(1)].map(|index| self.vertices.get(index).copied());
+        match (first, last) {
+            (Some(first), Some(last)) if self.count >= self.first + 2 => {
+                if first.at() != last.at() {
+                    self.push(first.at(), last.is_drawn());
+                }
+            }
+            _ => self.count = self.first,
+        }
+        self.first = self.count;
+    }
+
+    /// The edge that ends at the point with this index; `Some(None)` if none does, `None` behind
+    /// the last point.
+    fn edge(&self, index: usize) -> Option<Option<[Point; 2]>> {
+        let points = self.vertices.get(..self.count)?;
+        let end = points.get(index)?;
+        let begin = index.checked_sub(1).and_then(|before| points.get(before));
+        Some(begin.filter(|_| !end.begins()).map(|begin| [begin.at(), end.at()]))
+    }
+
+    /// All edges, with the index of each.
+    fn edges(&self) -> impl Iterator<Item = (usize, [Point; 2])> {
+        (1..self.count).filter_map(|index| Some((index, self.edge(index)??)))
+    }
+}
+
+/// How shapes are filled.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct FillStyle {
+    /// 1 and 2: lines at the width of the pen, in both directions or in one. 3: parallel lines. 4:
+    /// crossing ones.
+    kind: u8,
+    /// The distance of the lines of 3 and 4, on the page; 0 for 1 % of the distance of P1 and P2.
+    spacing: i64,
+    /// The direction of the lines of 3 and 4, in units of 2^-16 degrees.
+    angle: i64,
+    /// The width of the pen, on the page.
+    thickness: i64,
+}
+
+impl FillStyle {
+    /// Consists of zero bits.
+    pub(super) const ZERO: Self = Self { kind: 0, spacing: 0, angle: 0, thickness: 0 };
+    /// The default.
+    pub(super) const DEFAULT: Self = Self { kind: 1, spacing: 0, angle: 0, thickness: THICKNESS };
+
+    fn is_solid(self) -> bool {
+        self.kind < 3
+    }
+}
+
+/// How far a fill has come.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Hatch {
+    /// The sine and the cosine of the direction of the lines, in units of 2^-30.
+    direction: [i64; 2],
+    /// How far the line with index 0 lies to the left of the direction.
+    base: i64,
+    /// The distance of the lines.
+    pitch: i64,
+    /// The index of the present line, and of the last.
+    line: i64,
+    last: i64,
+    /// The last crossing of the present line: where along the line, and the index of its edge.
+    crossing: Option<(i64, usize)>,
+    /// Whether the lines are those that cross the first ones.
+    is_second: bool,
+}
+
+impl Hatch {
+    /// Consists of zero bits.
+    pub(super) const ZERO: Self = Self {
+        direction: [0; 2],
+        base: 0,
+        pitch: 0,
+        line: 0,
+        last: 0,
+        crossing: None,
+        is_second: false,
+    };
+
+    /// A point with x along the lines, and y to the left of them.
+    fn turned(&self, point: Point) -> Point {
+        let [sine, cosine] = self.direction;
+        point.rotated([-sine, cosine])
+    }
+
+    /// Where the present line crosses an edge. Of both ends of an edge, the lower one belongs to it.
+    fn crosses(&self, y: i64, edge: [Point; 2]) -> Option<i64> {
+        let [a, b] = edge.map(|point| self.turned(point));
+        if (a.y <= y) == (b.y <= y) {
+            return None;
+        }
+        let (from, to) = if a.y < b.y { (a, b) } else { (b, a) };
+        let way = divide_rounding(product(to.x - from.x, y - from.y), (to.y - from.y).into());
+        Some(from.x + way as i64) // It lies between both ends.
+    }
+}
+
+impl Interpreter {
+    /// `PM`: begins polygon mode, closes a subpolygon, or ends polygon mode.
+    pub(super) fn polygon_mode(&mut self, numbers: &[i64]) -> Result<(), ErrorNumber> {
+        let mode = match *numbers {
+            [] => 0,
+            [mode] => mode / UNIT,
+            _ => return Err(ErrorNumber::WrongCount),
+        };
+        match mode {
+            0 => {
+                self.polygon.clear();
+                self.polygon.is_open = true;
+                self.polygon.began_at = self.at;
+                self.polygon.push(self.at, false);
+            }
+            1 | 2 if self.polygon.is_open => {
+                self.polygon.close();
+                if mode == 2 {
+                    self.polygon.is_open = false;
+                    self.at = self.polygon.began_at;
+                }
+                self.check_polygon()?;
+            }
+            1 | 2 => return Err(ErrorNumber::Unknown),
+            _ => return Err(ErrorNumber::BadParameter),
+        }
+        Ok(())
+    }
+
+    /// Adds a point to the polygon, whose mode is on.
+    pub(super) fn add_vertex(&mut self, to: Point) {
+        self.at = to;
+        if !self.polygon.push(to, self.is_down) {
+            self.fail(ErrorNumber::BufferOverflow);
+        }
+    }
+
+    /// `AA` and `AR` in polygon mode: an arc about a centre.
+    pub(super) fn add_arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
+        let radius = self.at.minus(center);
+        let arc = ArcStep::new(center, radius, sweep, chord.or(Some(CHORD)));
+        for index in 0..=VERTICES as u32 {
+            let Some(to) = arc.chord(index) else { return };
+            self.add_vertex(to);
+        }
+    }
+
+    /// `CI` in polygon mode: a subpolygon of its own. The pen then returns.
+    pub(super) fn add_circle(&mut self, radius: i64, chord: Option<i64>) {
+        let center = self.at;
+        let Some(begin) = center.plus(self.frame.turned(Point { x: radius, y: 0 })) else {
+            return self.overflow();
+        };
+        self.polygon.close();
+        self.push_wedge(center, begin, 360 * UNIT, chord);
+        self.polygon.close();
+        self.at = center;
+        if self.polygon.is_full {
+            self.fail(ErrorNumber::BufferOverflow);
+        }
+    }
+
+    /// Adds the points of an arc that begins there.
+    fn push_wedge(&mut self, center: Point, begin: Point, sweep: i64, chord: Option<i64>) {
+        let arc = ArcStep::new(center, begin.minus(center), sweep, chord.or(Some(CHORD)));
+        let mut has_room = self.polygon.push(begin, true);
+        for index in 0.. {
+            let Some(to) = arc.chord(index).filter(|_| has_room) else { return };
+            has_room = self.polygon.push(to, true);
+        }
+    }
+
+    /// `RA` and `RR`: a filled rectangle from the pen to the opposite corner.
+    pub(super) fn fill_rectangle(&mut self, corner: Point) -> Result<(), ErrorNumber> {
+        let at = self.at;
+        self.polygon.clear();
+        for point in [at, Point { x: corner.x, y: at.y }, corner, Point { x: at.x, y: corner.y }] {
+            self.polygon.push(point, true);
+        }
+        self.polygon.close();
+        self.fill_polygon()
+    }
+
+    /// `WG`: a filled wedge about the pen.
+    pub(super) fn fill_wedge(
+        &mut self,
+        radius: i64,
+        start: i64,
+        sweep: i64,
+        chord: Option<i64>,
+    ) -> Result<(), ErrorNumber> {
+        let center = self.at;
+        let angle = sine_and_cosine(start as f64 / 65536.0);
+        let radius = self.frame.turned(Point { x: radius, y: 0 }.rotated(angle));
+        let begin = center.plus(radius).ok_or(ErrorNumber::Overflow)?;
+        self.polygon.clear();
+        self.polygon.push(center, true);
+        self.push_wedge(center, begin, sweep, chord);
+        self.polygon.close();
+        self.fill_polygon()
+    }
+
+    /// Checks that the polygon has fitted. Otherwise it is forgotten, since a part of it would be
+    /// another shape.
+    fn check_polygon(&mut self) -> Result<(), ErrorNumber> {
+        if !self.polygon.is_full {
+            return Ok(());
+        }
+        let is_open = self.polygon.is_open;
+        if !is_open {
+            self.polygon.clear();
+        }
+        Err(ErrorNumber::BufferOverflow)
+    }
+
+    /// `FP`: fills the polygon.
+    pub(super) fn fill_polygon(&mut self) -> Result<(), ErrorNumber> {
+        self.check_polygon()?;
+        self.hatch = Hatch::ZERO;
+        self.add(Step::Fill);
+        self.add(Step::Place(self.at));
+        Ok(())
+    }
+
+    /// `EP`: draws the edges of the polygon that were defined with the pen down.
+    pub(super) fn edge_polygon(&mut self) {
+        self.add(Step::Edges);
+        self.add(Step::Place(self.at));
+    }
+
+    /// The edge of the polygon with this index: whether it is drawn, and its end. `None` behind the
+    /// last.
+    pub(super) fn polygon_edge(&self, index: u32) -> Option<(bool, Point)> {
+        let vertex = self.polygon.vertices.get(..self.polygon.count)?.get(index as usize)?;
+        Some((vertex.is_drawn() && !vertex.begins(), vertex.at()))
+    }
+
+    /// `FT`: how shapes are filled. Numbers that are left out keep their values.
+    pub(super) fn choose_fill(&mut self, numbers: &[i64]) -> Result<(), ErrorNumber> {
+        let thickness = self.fill.thickness;
+        let [kind, rest @ ..] = numbers else {
+            self.fill = FillStyle { thickness, ..FillStyle::DEFAULT };
+            return Ok(());
+        };
+        let bad = ErrorNumber::BadParameter;
+        let kind = u8::try_from(kind / UNIT).ok().filter(|kind| (1..=4).contains(kind));
+        let mut fill = FillStyle { kind: kind.ok_or(bad)?, ..self.fill };
+        // Solid fills have no spacing and no angle.
+        if let Some(spacing) = rest.first().filter(|_| !fill.is_solid()) {
+            let length = self.frame.length(Point { x: *spacing, y: 0 }).filter(|_| *spacing >= 0);
+            fill.spacing = length.ok_or(bad)?.length();
+        }
+        if let Some(angle) = rest.get(1).filter(|_| !fill.is_solid()) {
+            fill.angle = angle % (360 * UNIT);
+        }
+        if rest.len() > 2 {
+            return Err(ErrorNumber::WrongCount);
+        }
+        self.fill = fill;
+        Ok(())
+    }
+
+    /// `PT`: the width of the pen in millimetres, from 0.1 to 5.
+    pub(super) fn choose_thickness(&mut self, numbers: &[i64]) -> Result<(), ErrorNumber> {
+        self.fill.thickness = match *numbers {
+            [] => THICKNESS,
+            [millimetres] if (UNIT / 10..=5 * UNIT).contains(&millimetres) => {
+                millimetres * UNITS_PER_MM
+            }
+            [_] => return Err(ErrorNumber::BadParameter),
+            _ => return Err(ErrorNumber::WrongCount),
+        };
+        Ok(())
+    }
+
+    /// Begins the lines of a fill, or those that cross the first ones.
+    fn begin_hatch(&mut self, is_second: bool) {
+        let fill = self.fill;
+        let quarters = i64::from(is_second) + i64::from(self.frame.quarters);
+        let angle = if fill.is_solid() { 0 } else { fill.angle } + quarters * 90 * UNIT;
+        let direction = sine_and_cosine(angle as f64 / 65536.0);
+        let mut hatch = Hatch { direction, is_second, ..Hatch::ZERO };
+        let (mut least, mut most) = (i64::MAX, i64::MIN);
+        for (_, edge) in self.polygon.edges() {
+            for point in edge {
+                let y = hatch.turned(point).y;
+                (least, most) = (least.min(y), most.max(y));
+            }
+        }
+        if least < most {
+            if fill.is_solid() {
+                // The lines at the borders lie within them.
+                let pitch = fill.thickness.max(LEAST_PITCH);
+                let count = (most - least + pitch - 1) / pitch; // at least 1
+                hatch.pitch = ((most - least) / count).max(1);
+                hatch.base = least + hatch.pitch / 2;
+            } else {
+                let spacing =
+                    if fill.spacing > 0 { fill.spacing } else { self.frame.percent(UNIT) };
+                hatch.pitch = spacing.max(LEAST_PITCH);
+            }
+            // What lies beyond the window is not looked at.
+            let bounds = self.frame.visible();
+            let mut beyond = (i64::MAX, i64::MIN);
+            for x in [bounds.least.x, bounds.most.x] {
+                for y in [bounds.least.y, bounds.most.y] {
+                    let y = hatch.turned(Point { x, y }).y;
+                    beyond = (beyond.0.min(y), beyond.1.max(y));
+                }
+            }
+            (least, most) = (least.max(beyond.0), most.min(beyond.1));
+        }
+        let pitch = hatch.pitch.max(1);
+        hatch.pitch = pitch;
+        // The first line at `least` or above, and the last at `most` or below.
+        hatch.line = -(hatch.base.saturating_sub(least)).div_euclid(pitch);
+        hatch.last = most.saturating_sub(hatch.base).div_euclid(pitch);
+        self.hatch = hatch;
+    }
+
+    /// The next line of a fill. [`Order::Nothing`] if it lies elsewhere than on the page or the
+    /// work took long enough for now; `None` if the shape is filled.
+    pub(super) fn next_of_fill(&mut self, is_first: bool) -> Option<Order> {
+        if is_first {
+            self.begin_hatch(false);
+        }
+        let hatch = self.hatch;
+        if hatch.line > hatch.last {
+            if self.fill.kind != 4 || hatch.is_second {
+                return None;
+            }
+            self.begin_hatch(true);
+            return Some(Order::Nothing);
+        }
+        let y = hatch.base + hatch.line * hatch.pitch;
+        // Every other line is drawn backwards, but with fill type 2.
+        let is_backward = self.fill.kind != 2 && hatch.line & 1 != 0;
+        let begin = self.crossing_after(hatch.crossing, y, is_backward);
+        let end = begin.and_then(|begin| self.crossing_after(Some(begin), y, is_backward));
+        let (Some((from, _)), Some((to, _))) = (begin, end) else {
+            self.hatch.line += 1;
+            self.hatch.crossing = None;
+            return Some(Order::Nothing);
+        };
+        self.hatch.crossing = end;
+        let [from, to] = [from, to].map(|x| Point { x, y }.rotated(hatch.direction));
+        if from == to {
+            return Some(Order::Nothing);
+        }
+        if self.fill.is_solid() {
+            return Some(self.ink([from, to]).unwrap_or(Order::Nothing));
+        }
+        self.at = from;
+        self.draw_to(to);
+        Some(Order::Nothing)
+    }
+
+    /// The crossing of the line at `y` that follows another one, or the first.
+    fn crossing_after(
+        &self,
+        after: Option<(i64, usize)>,
+        y: i64,
+        is_backward: bool,
+    ) -> Option<(i64, usize)> {
+        let is_before =
+            |a: &(i64, usize), b: &(i64, usize)| if is_backward { a > b } else { a < b };
+        let edges = self.polygon.edges();
+        let crossings =
+            edges.filter_map(|(index, edge)| Some((self.hatch.crosses(y, edge)?, index)));
+        let behind = crossings.filter(|found| after.is_none_or(|after| is_before(&after, found)));
+        behind.reduce(|best, found| if is_before(&found, &best) { found } else { best })
+    }
+}
