@@ -248,7 +248,7 @@ fn what_the_job_depends_on_must_be_as_it_was() {
         // A setting that decides where ink falls.
         let deviant = [("$3=1", "$3=0"), ("$101=81", "$101=80"), ("$220=2", "$220=1")];
         for (other, same) in deviant {
-            assert_eq!(plotter.say(other), "ok\n");
+            assert!(plotter.say(other).ends_with("ok\n"));
             let answer = plotter.say("$resume=origin");
             assert!(answer.contains(&format!("set {same}.000")), "{answer}");
             assert!(answer.ends_with("error:166\n"), "{answer}");

@@ -5,6 +5,7 @@ use embedded_storage::nor_flash::{
 };
 use penup::boards::host::{Cut, CutFlash};
 use penup::storage::{Log, NOTE_BYTES, Slots, StorageError};
+use penup_host_tests::cut_jobs::{empty_flash, switch_on};
 
 /// The slots are not at the beginning of the flash, and each has more than one sector.
 const SLOTS: Slots = Slots { start: 4096, bytes: 8192 };
@@ -229,4 +230,31 @@ fn a_state_that_is_said_not_to_be_kept_is_not() {
     writer.write(b"lost").expect("the page of the payload is sound");
     assert_eq!(writer.finish(), Err(StorageError::Flash(NotHeld)));
     assert!(SLOTS.latest(&mut flash).is_none());
+}
+
+#[test]
+fn settings_that_are_too_fast_are_kept_and_the_user_hears_how_fast_the_machine_is() {
+    let held = |rate: u32| {
+        format!(
+            "[MSG:held to {rate} mm/min, to stop in time: a greater $120 and $121 allow more]\n"
+        )
+    };
+    let (flash, _) = switch_on(empty_flash(), |plotter| {
+        assert!(!plotter.heard().contains("MSG"));
+        // 13/16 of 619 steps of 1/80 mm, at 800 and at 400 mm/s².
+        assert_eq!(plotter.say("$110=32000"), "ok\n");
+        assert_eq!(plotter.say("$111=32000"), "ok\n");
+        assert_eq!(plotter.say("$202=20000"), held(6017) + "ok\n");
+        assert_eq!(plotter.say("$120=400"), held(4255) + "ok\n");
+        assert_eq!(plotter.say("$121=400"), "ok\n");
+        assert_eq!(plotter.say("$220=2"), "ok\n");
+    });
+    switch_on(flash, |plotter| {
+        assert!(plotter.heard().contains(&held(4255)));
+        let settings = plotter.say("$$");
+        for line in ["$110=32000.000 ", "$120=400.000 ", "$202=20000.000 "] {
+            assert!(settings.contains(line), "{settings}");
+        }
+        assert_eq!(plotter.say("$202=4000"), "ok\n");
+    });
 }

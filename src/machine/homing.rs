@@ -257,7 +257,7 @@ impl Machine<'_> {
     fn begin_phase(&mut self, homing: Homing) {
         let speed = if homing.is_slow() { Setting::HomingFeed } else { Setting::HomingSeek };
         let pen = Tool::positions(&self.settings);
-        self.runner.set_limits(self.settings.limits_at(speed), pen);
+        self.runner.set_limits(self.settings.limits_at(speed, self.pins.queue()), pen);
         let properties = Kinematics::properties(&self.settings);
         let axis = homing.axis as usize;
         let steps = |setting| {

@@ -102,6 +102,9 @@ impl<'m> Machine<'m> {
     /// pins. The machine plans further ahead if it could otherwise not stop in time when the main
     /// loop is late. A feed hold takes effect after that delay. With `u32::MAX` only the size of
     /// the queue limits the planning.
+    ///
+    /// The machine is never faster than it could stop within the queue of `pins`, whatever the
+    /// settings say: see [`Machine::held_to`].
     pub fn new(
         settings: Settings,
         blocks: &'m mut [Block],
@@ -115,7 +118,7 @@ impl<'m> Machine<'m> {
             } else {
                 Activity::Idle
             },
-            runner: Runner::new(settings.limits(), Tool::positions(&settings), blocks),
+            runner: Runner::new(settings.limits(pins.queue()), Tool::positions(&settings), blocks),
             pins,
             origin: PagePoint::default(),
             ahead_ticks,
@@ -198,8 +201,16 @@ impl<'m> Machine<'m> {
 
     /// Passes the limits, the pen positions and the override to the motion planner.
     fn take_settings(&mut self) {
-        self.runner.set_limits(self.settings.limits(), Tool::positions(&self.settings));
+        let limits = self.settings.limits(self.pins.queue());
+        self.runner.set_limits(limits, Tool::positions(&self.settings));
         self.runner.set_override(self.percent, self.rapid_percent);
+    }
+
+    /// The greatest speed of the machine, in mm/min, if its settings ask for a greater one: from
+    /// that it could not stop within the steps that wait for the interrupt, and would have to brake
+    /// harder than it may whenever the main loop is late. `None` if the settings hold.
+    pub fn held_to(&self) -> Option<Value> {
+        self.settings.brake(self.pins.queue()).1
     }
 
     /// Returns what the machine is doing.
@@ -387,7 +398,7 @@ impl<'m> Machine<'m> {
             self.settings.microseconds_as_ticks(Setting::StepPulse),
             self.settings.whole(Setting::InvertDirections) as u8, // at most 7
         );
-        let rule = self.settings.brake(self.pins.queue());
+        let (rule, _) = self.settings.brake(self.pins.queue());
         self.runner.set_brake(rule);
         self.pins.brake().set_rule(rule);
     }

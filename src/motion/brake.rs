@@ -12,7 +12,7 @@
 //! 2^16 of them: then the interval is 2^k·ℓ/√s ticks, one product of 32 bits and a shift.
 
 use super::limits::hypotenuse;
-use super::{Limits, PathLength, StepEvent};
+use super::{Limits, StepEvent};
 use core::sync::atomic::{AtomicU32, Ordering};
 
 /// The root's interval is between two of these.
@@ -121,46 +121,14 @@ impl BrakeRule {
     }
 }
 
-/// What there is for steps to wait in.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct QueueSize {
-    /// How many can be counted on to wait, on a long path; 0 for no end.
-    pub steps: u32,
-    /// How many wait when it is full; more than can be, if the main loop is never late by as much
-    /// as they last.
-    pub full: u32,
-}
-
-/// So late the main loop may be, without slowing the greatest rate.
-const LATE_MILLISECONDS: u64 = 2;
-
-impl QueueSize {
-    /// A queue without end.
-    pub const ENDLESS: Self = Self { steps: 0, full: u32::MAX };
-
-    /// How many can be counted on at so many steps a second: at least a quarter of all.
-    fn steps_at(self, rate: u64) -> u64 {
-        let late = rate * LATE_MILLISECONDS / 1000;
-        let full = u64::from(self.full);
-        u64::from(self.steps).min(full.saturating_sub(late).max(full / 4))
-    }
-}
-
 impl Limits {
-    /// The rule for a `queue` of steps that are at most `longer` times as long as a diagonal one,
-    /// on a machine that is never faster than the stopping distance `fastest`.
+    /// The rule for steps that are at most `longer` times as long as a diagonal one.
     ///
-    /// It brakes as hard as the machine accelerates, or harder if it must in order to stop within
-    /// 13/16 of the queue. Both by 1/32, so that it never slows a plan that is in time.
-    pub fn brake(&self, fastest: PathLength, longer: u64, queue: QueueSize) -> BrakeRule {
+    /// It brakes as hard as the machine accelerates, and by 1/32 harder, so that it never slows a
+    /// plan that is in time.
+    pub fn brake(&self, longer: u64) -> BrakeRule {
         let acceleration = u64::from(self.acceleration.to_bits());
-        let rate = self.step_rate(self.speed(fastest));
-        let fastest = u64::from(fastest.to_bits());
-        // 2^-18 mm; below 2^20 steps of at most 1 mm.
-        let steps = queue.steps_at(rate);
-        let held = (u64::from(self.least_move.to_bits()) * steps / 16 * 13) >> 14;
-        let harder = (acceleration * fastest).checked_div(held).unwrap_or(0);
-        let braking = (acceleration + acceleration / 32).max(harder).clamp(1, u64::from(u32::MAX));
+        let braking = (acceleration + acceleration / 32).max(1);
         let [x, y] = self.step_length.map(|step| u64::from(step.to_bits()));
         let longest_step = longer * hypotenuse(x, y);
         // The unit is 2^(2k-23) times the acceleration per slice.
@@ -168,7 +136,7 @@ impl Limits {
         let exponent = (0..MAX_EXPONENT).find(|k| !too_long(k)).unwrap_or(MAX_EXPONENT);
         let reciprocal = (1u64 << 59).checked_div(braking << (2 * exponent)).unwrap_or(1);
         // Below 2^46 units of 2^-32 mm: 16 m.
-        let stop = (fastest * acceleration / braking) << 14;
+        let stop = (u64::from(self.top.to_bits()) * acceleration / braking) << 14;
         let top = (u128::from(stop) * u128::from(reciprocal)) >> RECIPROCAL_BITS;
         BrakeRule { exponent, reciprocal, top: top.min(1 << 30) as u32 }
     }
@@ -557,10 +525,6 @@ mod tests {
         Limits::new(&settings()).expect("valid")
     }
 
-    fn queue(steps: u32) -> QueueSize {
-        QueueSize { steps, ..QueueSize::ENDLESS }
-    }
-
     /// 0.01 mm.
     const STEP: u64 = (1 << 32) / 100;
 
@@ -577,7 +541,7 @@ mod tests {
     #[test]
     fn an_interval_is_that_of_the_speed_that_can_be_shed() {
         let limits = limits();
-        let rule = limits.brake(limits.top, 1, queue(0));
+        let rule = limits.brake(1);
         let length = rule.step_length(STEP);
         for steps in 1..=300u32 {
             let ticks = least_interval(length, steps * length, rule.exponent);
@@ -592,23 +556,6 @@ mod tests {
     }
 
     #[test]
-    fn a_queue_too_short_to_stop_in_brakes_harder() {
-        let limits = limits();
-        // 100 mm/s: 25 mm, 2500 steps.
-        let braking = |capacity| {
-            let rule = limits.brake(limits.top, 1, queue(capacity));
-            let length = rule.step_length(STEP);
-            let slowest = least_interval(length, length, rule.exponent);
-            let speed = 0.01 / f64::from(slowest) * f64::from(TICKS_PER_SECOND);
-            speed * speed / 2.0 / 0.01
-        };
-        assert!((braking(0) - 206.25).abs() < 0.5);
-        assert!((braking(5000) - 206.25).abs() < 0.5);
-        // 10,000 mm²/s² over twice 812 steps.
-        assert!((braking(1000) - 615.4).abs() < 1.0, "{}", braking(1000));
-    }
-
-    #[test]
     fn the_longest_and_the_shortest_steps_there_are_fit() {
         for (steps_per_mm, acceleration) in [(2, 10), (2, 32767), (4000, 10), (4000, 32767)] {
             let mut settings = settings();
@@ -620,12 +567,12 @@ mod tests {
             settings.acceleration_mm_per_s2 = value(acceleration);
             let limits = Limits::new(&settings).expect("valid");
             let step = u64::from(limits.step_length[0].to_bits());
-            let rule = limits.brake(limits.top, 1, queue(600));
+            let rule = limits.brake(1);
             let length = rule.step_length(step);
             let ticks = least_interval(length, length, rule.exponent);
             let mm = 1.0 / f64::from(steps_per_mm);
-            let hardest = (100.0 / (2.0 * mm * 487.5)).max(f64::from(acceleration) * 33.0 / 32.0);
-            let expected = (mm / 2.0 / hardest).sqrt() * f64::from(TICKS_PER_SECOND);
+            let braking = f64::from(acceleration) * 33.0 / 32.0;
+            let expected = (mm / 2.0 / braking).sqrt() * f64::from(TICKS_PER_SECOND);
             assert!((f64::from(ticks) / expected - 1.0).abs() < 0.01, "{ticks} {expected}");
         }
     }
@@ -633,7 +580,7 @@ mod tests {
     #[test]
     fn a_queue_that_runs_dry_is_a_ramp_to_rest_and_one_that_fills_is_a_ramp_up() {
         let limits = limits();
-        let rule = limits.brake(limits.top, 1, queue(0));
+        let rule = limits.brake(1);
         let orders = BrakeOrders::new();
         let (mut brake, mut steps) = (Brake::default(), StepLength::default());
         let length = rule.step_length(STEP);

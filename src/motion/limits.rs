@@ -29,6 +29,9 @@ pub struct MotionSettings {
     pub pulse_ticks: u32,
     /// From a change of direction to the pulse.
     pub direction_setup_ticks: u32,
+    /// How many steps can be counted on to wait for the interrupt. Speeds are lowered so that the
+    /// machine can stop within them, should no more come.
+    pub queue_steps: u32,
 }
 
 /// A setting that motion cannot keep.
@@ -166,7 +169,10 @@ impl Limits {
             pulse_ticks: settings.pulse_ticks.max(1),
             setup_ticks: settings.direction_setup_ticks,
         };
-        let fastest = draw_speed.max(travel_speed);
+        let held = limits.held_by(settings.queue_steps);
+        limits.draw_speed = draw_speed.min(held);
+        limits.travel_speed = travel_speed.min(held);
+        let fastest = limits.draw_speed.max(limits.travel_speed);
         limits.top = limits.stopping_distance(fastest);
         limits.jerk = JerkLimit::new(jerk, limits.acceleration, fastest);
         limits.longest_stop = limits.jerk.map_or(limits.top, |jerk| {
@@ -201,9 +207,18 @@ impl Limits {
         (2 * self.pulse_ticks).min(StepEvent::MAX_TICKS)
     }
 
-    /// The stopping distance of the greater speed.
-    pub fn fastest(&self) -> PathLength {
-        self.top
+    /// The greatest speed from which the machine can stop within 13/16 of `queue` steps. The rest
+    /// is for a main loop that is a little late, so that it need not slow down at once, and for
+    /// what waits between steps.
+    fn held_by(&self, queue: u32) -> SliceSpeed {
+        // A step is below 2^31.
+        let held = (u64::from(self.least_move.to_bits()) * u64::from(queue) / 16 * 13) >> 14;
+        self.speed(PathLength::from_bits(u32::try_from(held).unwrap_or(u32::MAX)))
+    }
+
+    /// The greater speed, in mm/min.
+    pub fn greatest_rate(&self) -> Millimetres {
+        mm_per_min(self.draw_speed.max(self.travel_speed))
     }
 
     /// The stopping distance of `speed`, v²/2a; at most what a length can hold.
@@ -310,6 +325,7 @@ pub(crate) mod tests {
             centripetal: true,
             pulse_ticks: 50,
             direction_setup_ticks: 25,
+            queue_steps: u32::MAX,
         }
     }
 

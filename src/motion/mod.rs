@@ -39,7 +39,7 @@ mod runner;
 mod smooth;
 mod steady;
 
-pub use brake::{Brake, BrakeOrders, BrakeRule, QueueSize, StepBrake, StepLength, StepWay};
+pub use brake::{Brake, BrakeOrders, BrakeRule, StepBrake, StepLength, StepWay};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent, StepTrain};
 pub use lift::LiftRule;

@@ -253,6 +253,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.find_stopped(board);
         self.greet(board);
         report::fault(board);
+        #[cfg(feature = "resume")]
+        self.inner.report_held(None, board);
         self.inner.resumption.report(State::Idle, board);
         self.inner.run_startup_lines(board);
     }
@@ -561,9 +563,11 @@ impl<I: Index> Inner<'_, I> {
             }
             Command::Assign { name, value } => {
                 if !self.options.set(name, value)? {
+                    let before = self.machine.held_to();
                     self.change_setting(name, value)?;
                     #[cfg(feature = "driver-pins")]
                     self.set_driver_pins(board);
+                    self.report_held(before, board);
                     records::save_settings(self.machine.settings(), board)?;
                 }
             }

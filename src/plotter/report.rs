@@ -6,7 +6,7 @@ use super::resume::Resumption;
 use super::{Board, Inner};
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
-use crate::machine::{Alarm, Setting, State};
+use crate::machine::{Alarm, Setting, State, Value};
 use crate::order;
 use crate::protocol::AlarmEntry;
 
@@ -60,6 +60,18 @@ pub(super) fn fault<B: Board>(board: &mut B) {
 }
 
 impl<I: Index> Inner<'_, I> {
+    /// Says so if the machine is slower than its settings ask for, unless it was as slow `before`.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
+    pub(super) fn report_held<B: Board>(&self, before: Option<Value>, board: &mut B) {
+        let held = self.machine.held_to();
+        if let Some(rate) = held.filter(|_| held != before) {
+            Reply(board).line(format_args!(
+                "[MSG:held to {} mm/min, to stop in time: a greater $120 and $121 allow more]",
+                rate.to_bits() >> Value::FRAC_NBITS
+            ));
+        }
+    }
+
     /// Reports the faces and edges that the job has left out, if any.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn report_degenerate<B: Board>(&self, board: &mut B) {

@@ -1,7 +1,12 @@
 //! A main loop that is late: the queue runs dry while the machine moves.
 
 use crate::fixtures::{ink, is_ready, to, with, with_backlash};
-use penup::machine::{Alarm, Setting, Settings, Target, TargetList, Value};
+use penup::boards::host::traced_steps;
+use penup::machine::{
+    Alarm, EventRing, Machine, PulserState, Setting, SettingError, Settings, Target, TargetList,
+    Value,
+};
+use penup::motion::Block;
 use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::pin_machine;
 use penup_host_tests::random::Random;
@@ -86,23 +91,90 @@ fn an_underrun_keeps_the_acceleration_where_jerk_is_limited() {
     starve_often(settings, allowed, 40);
 }
 
-#[test]
-fn what_the_queue_cannot_hold_is_braked_within_what_it_holds() {
-    let fast = with(&[
+/// Speeds from which the machine cannot stop within the queue, as they may be stored.
+fn too_fast() -> Settings {
+    with(&[
         (Setting::MaxRateX, 15_000.0),
         (Setting::MaxRateY, 15_000.0),
         (Setting::TravelSpeed, 15_000.0),
         (Setting::DrawSpeed, 9_000.0),
-        (Setting::AccelerationX, 2000.0),
-        (Setting::AccelerationY, 2000.0),
-    ]);
-    // 250 mm/s within 13/16 of 623 steps of 1/80 mm.
-    let mut allowed = fast;
-    let hardest = 250.0 * 250.0 / (2.0 * 13.0 / 16.0 * 623.0 / 80.0);
-    for axis in [Setting::AccelerationX, Setting::AccelerationY] {
-        allowed.set(axis, Value::from_num(hardest)).expect("valid");
+        (Setting::AccelerationX, 400.0),
+        (Setting::AccelerationY, 400.0),
+    ])
+}
+
+#[test]
+fn what_the_queue_cannot_hold_is_not_braked_harder() {
+    starve_often(too_fast(), too_fast(), 40);
+    let mut with_jerk = too_fast();
+    with_jerk.set(Setting::Jerk, Value::from_num(20)).expect("valid");
+    starve_often(with_jerk, too_fast(), 20);
+}
+
+/// The speed from which the machine can stop within 13/16 of the 619 steps of the queue, and the
+/// greatest that the settings ask for, in mm/min.
+fn held_and_asked(settings: &Settings) -> [f64; 2] {
+    let value = |setting| settings.get(setting).to_num::<f64>();
+    let least = |x, y| value(x).min(value(y));
+    let asked =
+        [Setting::DrawSpeed, Setting::TravelSpeed, Setting::HomingSeek, Setting::HomingFeed]
+            .map(value)
+            .into_iter()
+            .fold(0.0, f64::max)
+            .min(least(Setting::MaxRateX, Setting::MaxRateY));
+    let acceleration = least(Setting::AccelerationX, Setting::AccelerationY);
+    let motor_steps = match settings.get(Setting::Kinematics).to_num() {
+        0 => value(Setting::StepsPerMmX).max(value(Setting::StepsPerMmY)),
+        1 => value(Setting::StepsPerMmX) * 2f64.sqrt(),
+        _ => value(Setting::StepsPerMmX),
+    };
+    let held = 619.0 * 13.0 / 16.0 / motor_steps;
+    [60.0 * (2.0 * acceleration * held).sqrt(), asked]
+}
+
+#[test]
+fn the_machine_says_how_fast_it_is_where_its_settings_ask_for_more_than_the_queue_holds() {
+    const CHANGED: [(Setting, f64, f64); 12] = [
+        (Setting::MaxRateX, 100.0, 32_767.0),
+        (Setting::MaxRateY, 100.0, 32_767.0),
+        (Setting::DrawSpeed, 100.0, 32_767.0),
+        (Setting::TravelSpeed, 100.0, 32_767.0),
+        (Setting::HomingSeek, 100.0, 32_767.0),
+        (Setting::HomingFeed, 10.0, 32_767.0),
+        (Setting::AccelerationX, 10.0, 32_767.0),
+        (Setting::AccelerationY, 10.0, 32_767.0),
+        (Setting::StepsPerMmX, 5.0, 800.0),
+        (Setting::StepsPerMmY, 5.0, 800.0),
+        (Setting::Jerk, 0.0, 900.0),
+        (Setting::Kinematics, 0.0, 2.9),
+    ];
+    let (state, mut ring) = (PulserState::new(), EventRing::new());
+    let _pins = traced_steps(&mut ring, &state);
+    let mut blocks = [Block::EMPTY; 4];
+    let mut machine = Machine::new(Settings::default(), &mut blocks, &state, u32::MAX);
+    assert_eq!(machine.held_to(), None, "the default settings hold");
+    let mut random = Random::new(1492);
+    let mut held_count = 0;
+    for _ in 0..4000 {
+        let (setting, least, greatest) = *random.one_of(&CHANGED.each_ref());
+        // Small values are more likely than great ones.
+        let part = random.below(1 << 20) as f64 / f64::from(1 << 20);
+        let value = least + (greatest - least) * part * part;
+        let value = if setting == Setting::Kinematics { value.floor() } else { value };
+        if let Err(refusal) = machine.set(setting, Value::from_num(value)) {
+            assert!(matches!(refusal, SettingError::Conflict(_)), "{refusal:?}");
+        }
+        let [held, asked] = held_and_asked(machine.settings());
+        match machine.held_to() {
+            Some(rate) => {
+                held_count += 1;
+                assert!((rate.to_num::<f64>() / held - 1.0).abs() < 0.001, "{rate} {held}");
+                assert!(held < asked, "{held} {asked}");
+            }
+            None => assert!(asked < held * 1.001, "{asked} {held}"),
+        }
     }
-    starve_often(fast, allowed, 40);
+    assert!((500..3500).contains(&held_count), "{held_count}");
 }
 
 #[test]

@@ -16,7 +16,7 @@ use state::Halt;
 pub use state::PulserState;
 
 use super::Pen;
-use crate::motion::{EventKind, QueueSize, StepBrake, StepEvent};
+use crate::motion::{EventKind, StepBrake, StepEvent};
 use core::sync::atomic::Ordering;
 
 /// The work of the step interrupt: it takes step events from the queue, sets the pins as they say,
@@ -69,7 +69,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         state: &'q PulserState,
     ) -> (Self, StepQueue<'q, N>) {
         let ring = &*ring;
-        state.set_queue(QueueSize { steps: StepQueue::<N>::EVENTS as u32, ..QueueSize::ENDLESS });
+        state.set_queue(StepQueue::<N>::EVENTS as u32);
         let pulser = Self { axes, pen, ring, state, ticks: 0, brake: StepBrake::new() };
         (pulser, StepQueue::new(ring, state, A::ORDER))
     }

@@ -2,7 +2,7 @@
 //! the pins have done.
 
 use crate::array::MapEach;
-use crate::motion::{BrakeOrders, QueueSize};
+use crate::motion::BrakeOrders;
 use core::sync::atomic::{AtomicBool, AtomicU8, AtomicU32, Ordering};
 
 /// What the step interrupt and the main loop share: orders to the interrupt, and counts of what the
@@ -37,10 +37,8 @@ pub struct PulserState {
     inverted: AtomicU8,
     /// Whether the direction pin of z is inverted.
     z_inverted: AtomicBool,
-    /// How many steps the board's queue holds: the field `steps` of [`QueueSize`].
+    /// How many steps can be counted on to wait on a long path.
     queue_steps: AtomicU32,
-    /// The field `full` of the board's [`QueueSize`].
-    queue_full: AtomicU32,
     /// How the interrupt brakes when its queue runs empty.
     pub(super) brake: BrakeOrders,
 }
@@ -73,8 +71,7 @@ impl PulserState {
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
             z_inverted: AtomicBool::new(false),
-            queue_steps: AtomicU32::new(QueueSize::ENDLESS.steps),
-            queue_full: AtomicU32::new(QueueSize::ENDLESS.full),
+            queue_steps: AtomicU32::new(u32::MAX),
             brake: BrakeOrders::new(),
         }
     }
@@ -204,18 +201,15 @@ impl PulserState {
         self.z_inverted.store(inverted & 4 != 0, Ordering::Relaxed);
     }
 
-    /// Sets the size of the board's queue. Call it before the machine asks for the size.
-    pub fn set_queue(&self, queue: QueueSize) {
-        self.queue_steps.store(queue.steps, Ordering::Relaxed);
-        self.queue_full.store(queue.full, Ordering::Relaxed);
+    /// Sets how many steps of the board's queue can be counted on to wait on a long path. Call it
+    /// before the machine asks for the number.
+    pub fn set_queue(&self, steps: u32) {
+        self.queue_steps.store(steps, Ordering::Relaxed);
     }
 
-    /// The size of the board's queue. Without a board it is unlimited.
-    pub(in crate::machine) fn queue(&self) -> QueueSize {
-        QueueSize {
-            steps: self.queue_steps.load(Ordering::Relaxed),
-            full: self.queue_full.load(Ordering::Relaxed),
-        }
+    /// How many steps can be counted on to wait. Without a board there is no limit.
+    pub(in crate::machine) fn queue(&self) -> u32 {
+        self.queue_steps.load(Ordering::Relaxed)
     }
 
     /// How the interrupt brakes when its queue runs empty.

@@ -2,7 +2,7 @@
 
 use super::{Setting, Settings, Value};
 use crate::machine::{Kinematics, Tool};
-use crate::motion::{BrakeRule, Limits, LimitsError, MotionSettings, PathLength, QueueSize};
+use crate::motion::{BrakeRule, Limits, LimitsError, MotionSettings, PathLength};
 
 impl Settings {
     /// Checks the settings against each other.
@@ -15,31 +15,43 @@ impl Settings {
         Limits::new(&self.motion_settings()).map(|_| ())
     }
 
-    /// The limits that the motion planner needs.
+    /// The limits that the motion planner needs if so many steps can be counted on to wait in the
+    /// `queue`.
     ///
     /// Speed and acceleration are measured along the path, so the slower axis determines both.
-    pub fn limits(&self) -> Limits {
-        // `set` refuses whatever the motion planner would refuse, so the default is never used.
-        Limits::new(&self.motion_settings()).unwrap_or_default()
+    pub fn limits(&self, queue: u32) -> Limits {
+        self.limits_with(self.get(Setting::TravelSpeed), self.get(Setting::Jerk), queue)
     }
 
     /// Returns the limits for homing. They differ from [`Settings::limits`] in two ways: the speed
     /// with the pen up is that of the setting `travel`, and the jerk is not limited, because the
     /// machine must brake soon at a switch.
-    pub(in crate::machine) fn limits_at(&self, travel: Setting) -> Limits {
-        let settings = MotionSettings {
-            travel_mm_per_min: self.get(travel).min(self.axes_rate()),
-            jerk_m_per_s3: Value::ZERO,
-            ..self.motion_settings()
-        };
-        Limits::new(&settings).unwrap_or_else(|_| self.limits())
+    pub(in crate::machine) fn limits_at(&self, travel: Setting, queue: u32) -> Limits {
+        self.limits_with(self.get(travel), Value::ZERO, queue)
     }
 
-    /// The rule by which the interrupt brakes if its `queue` runs empty.
-    pub(in crate::machine) fn brake(&self, queue: QueueSize) -> BrakeRule {
-        let limits = self.limits();
-        let fastest = limits.fastest().max(self.limits_at(Setting::HomingSeek).fastest());
-        limits.brake(fastest, Kinematics::properties(self).longest_step, queue)
+    /// The limits with this speed with the pen up and this jerk.
+    fn limits_with(&self, travel: Value, jerk_m_per_s3: Value, queue_steps: u32) -> Limits {
+        let travel_mm_per_min = travel.min(self.axes_rate());
+        let settings = self.motion_settings();
+        let settings = MotionSettings { travel_mm_per_min, jerk_m_per_s3, queue_steps, ..settings };
+        // `set` refuses whatever the motion planner would refuse, so the default is never used.
+        Limits::new(&settings).unwrap_or_default()
+    }
+
+    /// The rule by which the interrupt brakes if its `queue` of so many steps runs empty. The
+    /// second value is the greatest speed in mm/min if the settings ask for more than the queue can
+    /// hold.
+    pub(in crate::machine) fn brake(&self, queue: u32) -> (BrakeRule, Option<Value>) {
+        let speeds =
+            [Setting::DrawSpeed, Setting::TravelSpeed, Setting::HomingSeek, Setting::HomingFeed];
+        let asked = speeds.into_iter().map(|speed| self.get(speed)).fold(Value::ZERO, Value::max);
+        let asked = asked.min(self.axes_rate());
+        let limits = self.limits_with(asked, Value::ZERO, queue);
+        let held = limits.greatest_rate();
+        // A speed is rounded by less than that.
+        let is_less = asked - held > const { Value::lit("0.001") };
+        (limits.brake(Kinematics::properties(self).longest_step), is_less.then_some(held))
     }
 
     /// Returns the length of the dots of a dotted line.
@@ -70,6 +82,7 @@ impl Settings {
             centripetal: self.is_on(Setting::Centripetal),
             pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),
             direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),
+            queue_steps: u32::MAX,
         }
     }
 }

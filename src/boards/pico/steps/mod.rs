@@ -31,7 +31,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Producer, Queue};
 use penup::machine::PulserState;
-use penup::motion::{Brake, QueueSize, Runner, StepEvent, StepLength, TICKS_PER_SECOND};
+use penup::motion::{Brake, Runner, StepEvent, StepLength, TICKS_PER_SECOND};
 use rp2040_hal::pac::Interrupt;
 
 use super::registers::{DMA, Get, PIO0, Put};
@@ -50,9 +50,9 @@ pub(super) use target::PULSE;
 /// The words that may still be on their way from the ring to the state machine, and the additional
 /// words that waits may take.
 const RESERVED: u32 = 16 + Runner::ROOM as u32 * WAIT_WORDS;
-/// The number of steps within which the machine must be able to stop: a half full ring. On long
-/// paths the ring is always fuller.
-const STOPPING_STEPS: u32 = WORDS / 2;
+/// The number of steps that can be counted on to wait on a long path: 7/8 of the ring, which leaves
+/// 1.9 ms at 400,000 steps a second until the main loop fills it again.
+const STOPPING_STEPS: u32 = WORDS / 8 * 7;
 /// The duration, 2 ms, after which a block ends. A longer block would fix the times of its steps
 /// too early, when more steps may still come.
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
@@ -117,7 +117,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         HEIGHTS_DUE.fill(due);
         BRAKE.fill(Brake::default());
     }
-    STATE.set_queue(QueueSize { steps: STOPPING_STEPS, full: WORDS - RESERVED });
+    STATE.set_queue(STOPPING_STEPS);
     critical::enable(nvic, Interrupt::DMA_IRQ_0, critical::STEP_PRIORITY);
     critical::enable(nvic, Interrupt::PIO0_IRQ_0, critical::PEN_PRIORITY);
     Steps {
