@@ -115,6 +115,7 @@ impl Decimal {
 
     /// Converts to binary units. `more` gives, for the power of ten that divides, the number that
     /// is added before the division.
+    #[inline(never)] // Inlined in all its callers, it would take 36 KB on the Pico.
     fn binary(self, fraction_bits: u32, more: fn(u128) -> u128) -> Result<i64, OutOfRange> {
         if self.mantissa == 0 {
             return Ok(0);

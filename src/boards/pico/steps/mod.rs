@@ -108,6 +108,7 @@ pub struct Steps {
 /// Sets up the state machine and the channel; they start with the first events. Afterwards the pins
 /// are outputs and the drivers are off.
 pub fn set_up(nvic: &mut NVIC) -> Steps {
+    word_ring::clear();
     engine::set_up();
 
     let (heights, due) = HEIGHT_QUEUE.init(Queue::new()).split();

@@ -1,6 +1,6 @@
 //! The ring buffer of the words that wait, and the lengths of their steps.
 
-use core::sync::atomic::AtomicU32;
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use penup::motion::StepWay;
 
@@ -14,7 +14,9 @@ pub const GROUP: u32 = 16;
 pub struct Ring([AtomicU32; WORDS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
-/// The ring of the words that wait.
+/// The ring of the words that wait. It lies where its alignment leaves no gap (`boards/pico.x`), and
+/// nothing gives it a value before [`clear`].
+#[unsafe(link_section = ".ring")]
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 /// For each word of the ring that is a step: `around` of [`StepWay`] in the lower half and `behind`
 /// in the upper one. For other words: 0.
@@ -23,6 +25,13 @@ pub static LENGTHS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; 
 /// For each group of words, the number of length units that were queued up to its end; it wraps.
 static SUMS: [AtomicU32; (WORDS / GROUP) as usize] =
     [const { AtomicU32::new(0) }; (WORDS / GROUP) as usize];
+
+/// Sets all words of the ring to 0, as they have no value when the board starts.
+pub fn clear() {
+    for word in &RING.0 {
+        word.store(0, Ordering::Relaxed);
+    }
+}
 
 /// Returns the slot of the ring for word number `word`.
 pub fn slot(word: u32) -> &'static AtomicU32 {
