@@ -1,4 +1,4 @@
-//! Decides whether the plotter computes a drawing or this computer does, and computes it here.
+//! Decides whether the plotter computes a drawing or this computer does.
 //!
 //! What fits in the plotter's memory is sent as a model, and the plotter computes the drawing. What
 //! does not fit is computed here by the same library, and its strokes are sent while they are
@@ -10,9 +10,7 @@ use crate::table::BoardRow;
 use clap::ValueEnum;
 use penup::machine::Settings;
 use penup::protocol::CommandError;
-use penup_job::results::JobReport;
 use penup_job::room::Room;
-use penup_job::streamed::{Form, StreamedJob};
 use penup_readers::lines::Lines;
 
 /// Where a drawing is computed.
@@ -48,10 +46,9 @@ pub struct Known {
 }
 
 /// Where a drawing is computed, and why.
-#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Choice {
-    /// Whether this computer computes it.
-    pub by_host: bool,
+    /// The plotter in memory that is to compute it, with the file; `None` if the real one does.
+    pub host: Option<InMemory<u32>>,
     /// What the file and the drawing have, for the user.
     pub totals: String,
     /// A sentence for the user, if this program has chosen.
@@ -66,13 +63,16 @@ pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice
     let Capacity { vertices, corners } = known.capacity;
     // Settings of a newer firmware are not known here. Then the plotter itself decides.
     let Some(settings) = known.settings else {
-        let by_host = compute == Compute::Host;
-        return Ok(Choice { by_host, totals: String::new(), reason: None });
+        if compute == Compute::Host {
+            let reason = "this program does not know all settings of the plotter's firmware";
+            return Err(Error::NotStreamed { reason: reason.to_owned() });
+        }
+        return Ok(Choice { host: None, totals: String::new(), reason: None });
     };
     let mut plotter = InMemory::<u32>::new(Room::for_job(job), settings);
     if !plotter.take(job) {
         // The plotter names the line that it refuses.
-        return Ok(Choice { by_host: false, totals: String::new(), reason: None });
+        return Ok(Choice { host: None, totals: String::new(), reason: None });
     }
     let size = plotter.model_size();
     let totals = format!(
@@ -80,9 +80,9 @@ pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice
          vertices and {corners} corners",
         size.vertices, size.faces, size.bars, size.curves,
     );
-    let choice = |by_host, reason| Ok(Choice { by_host, totals: totals.clone(), reason });
+    let here = |plotter, reason| Ok(Choice { host: Some(plotter), totals: totals.clone(), reason });
     if compute == Compute::Host {
-        return choice(true, None);
+        return here(plotter, None);
     }
     let is_too_large = [("vertices", size.vertices, vertices), ("corners", size.corners, corners)]
         .into_iter()
@@ -91,7 +91,8 @@ pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice
         if compute == Compute::Board {
             return Err(Error::TooLarge { what, count, limit });
         }
-        return choice(true, Some(because(&format!("it has {count} {what} of {limit}"))));
+        let reason = because(&format!("{count} {what}, and it takes {limit}"));
+        return here(plotter, Some(reason));
     }
     let rehearsed = match known.board {
         // With the memory and the numbers of that board.
@@ -103,9 +104,12 @@ pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice
     };
     match rehearsed {
         Err(Error::NotDrawn { refusal }) if compute == Compute::Auto && is_for_memory(&refusal) => {
-            choice(true, Some(because(&refusal.to_string())))
+            here(plotter, Some(because(&refusal.to_string())))
         }
-        rehearsed => rehearsed.and_then(|()| choice(false, None)),
+        rehearsed => {
+            rehearsed?;
+            Ok(Choice { host: None, totals, reason: None })
+        }
     }
 }
 
@@ -120,22 +124,4 @@ fn because(reason: &str) -> String {
 /// Whether a plotter with more memory would not refuse the drawing so.
 fn is_for_memory(refusal: &CommandError) -> bool {
     matches!(refusal, CommandError::DrawingTooLarge(_) | CommandError::TooManyLines)
-}
-
-/// Computes a drawing by this computer, without its first `from` strokes. Returns its lines and the
-/// report on it.
-///
-/// # Errors
-/// The drawing is refused, does not fit the machine, or has no such form.
-pub fn compute(
-    settings: Settings,
-    job: &dyn Lines,
-    form: Form,
-    from: u32,
-) -> Result<(StreamedJob, Option<JobReport>), Error> {
-    let mut plotter = InMemory::<u32>::new(Room::for_job(job), settings);
-    if !plotter.take(job) {
-        return Err(Error::NotStreamed { reason: "the file is refused".to_owned() });
-    }
-    plotter.streamed(form, from)
 }

@@ -239,22 +239,16 @@ impl Plot<'_> {
         let choice = compute::choose(known, job, compute)?;
         let notes = [choice.totals].into_iter().filter(|totals| !totals.is_empty());
         self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
-        if !choice.by_host {
-            return draw_by(sender, job, progress);
-        }
-        let Some(settings) = known.settings else {
-            return Err(Error::NotStreamed {
-                reason: "this program does not know all settings of the plotter's firmware"
-                    .to_owned(),
-            });
-        };
+        let Some(mut host) = choice.host else { return draw_by(sender, job, progress) };
         let form = sender.form()?;
-        let shows_pen = settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser);
+        let shows_pen = known.settings.is_some_and(|settings| {
+            settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser)
+        });
         if form == Form::GCode && !shows_pen {
             let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
             return Err(Error::NotStreamed { reason: reason.to_owned() });
         }
-        let (streamed, report) = compute::compute(settings, job, form, self.args.from)?;
+        let (streamed, report) = host.streamed(form, self.args.from)?;
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(
             "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
@@ -298,8 +292,12 @@ impl Plot<'_> {
         };
         let busy = || Error::NotReady { state: "Run".to_owned() };
         let settings = simulated(&operate::read_settings(&mut sender)?).map_err(|_| busy())?;
-        let (mut streamed, report) =
-            compute::compute(settings, &self.source.job, Form::Strokes, self.args.from)?;
+        let job = &self.source.job;
+        let mut host = InMemory::<u32>::new(Room::for_job(job), settings);
+        if !host.take(job) {
+            return Err(busy());
+        }
+        let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
         if streamed.id() != taken.id || !streamed.skip(taken.targets) {
             return Err(busy());
         }

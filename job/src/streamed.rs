@@ -48,8 +48,10 @@ pub struct StreamedJob {
     text: String,
     /// Where each line begins in the text, and the number of targets before it.
     begins: Vec<(usize, u32)>,
-    /// The lines behind which the machine waits for a pen, and that pen, counted from 1.
-    pens: Vec<(usize, u8)>,
+    /// The lines of G-code behind which the machine waits for a pen.
+    pen_lines: Vec<usize>,
+    /// These pens, counted from 1.
+    pens: Vec<u8>,
     /// What is known of the drawing before its strokes come.
     header: StreamHeader,
     /// The number of lines that are not sent, behind the first one, because the plotter has them.
@@ -85,9 +87,9 @@ impl StreamedJob {
         if header.targets == 0 {
             header.least = header.greatest;
         }
-        let pens = Vec::new();
         let (text, begins) = (String::new(), Vec::new());
-        let mut job = Self { form, text, begins, pens, header, skipped: 0 };
+        let (pen_lines, pens) = (Vec::new(), Vec::new());
+        let mut job = Self { form, text, begins, pen_lines, pens, header, skipped: 0 };
         match form {
             Form::Strokes => job.write_strokes(path),
             Form::GCode => job.write_gcode(settings, path)?,
@@ -138,7 +140,8 @@ impl StreamedJob {
         for_each(path, &mut |StreamedTarget { target, pen: number }| {
             if pen.is_some_and(|pen| pen != number) {
                 self.push_line(&format!("T{}M6", number + 1), count);
-                self.pens.push((self.begins.len() - 1, number + 1));
+                self.pen_lines.push(self.begins.len() - 1);
+                self.pens.push(number + 1);
             }
             pen = Some(number);
             match target.ink {
@@ -195,11 +198,10 @@ impl StreamedJob {
         self.text.len()
     }
 
-    /// The pen, counted from 1, that the machine waits for behind the line with this index.
-    pub fn pen_behind(&self, index: usize) -> Option<u8> {
-        let index = index + self.skipped;
-        let found = self.pens.binary_search_by_key(&index, |(line, _)| *line).ok()?;
-        self.pens.get(found).map(|(_, pen)| *pen)
+    /// The pens, counted from 1, that the machine waits for behind the first `lines` lines of G-code.
+    pub fn pens_in_lines(&self, lines: usize) -> &[u8] {
+        let count = self.pen_lines.partition_point(|line| *line < lines);
+        self.pens.get(..count).unwrap_or_default()
     }
 
     /// How much of the drawing the first `lines` lines that are sent bring, as strokes of all.

@@ -100,6 +100,7 @@ impl Machine<'_> {
 
     /// Whether the machine still waits for a path that is late.
     #[cfg(feature = "stream")]
+    #[inline(always)] // It is called in every turn of the main loop.
     fn waits_for_path(&mut self, path: &mut dyn Path) -> bool {
         let Activity::Run(Source::Late(late)) = self.activity else { return false };
         self.waits_for_late(path, late)
@@ -267,8 +268,7 @@ impl Machine<'_> {
         while self.activity.reads_path() && self.has_room() {
             match path.next_target() {
                 Some(first) if path.pen() != self.pen => {
-                    self.activity.set_source(Source::PenChange { pen: path.pen(), first });
-                    self.runner.end_path();
+                    self.end_targets(Source::PenChange { pen: path.pen(), first });
                 }
                 // The whole path was measured at the start, so every move fits.
                 Some(target) => {
@@ -279,12 +279,16 @@ impl Machine<'_> {
                 }
                 #[cfg(feature = "stream")]
                 None if path.late().is_some() => return,
-                None => {
-                    self.activity.set_source(Source::PathEnd);
-                    self.runner.end_path();
-                }
+                None => self.end_targets(Source::PathEnd),
             }
         }
+    }
+
+    /// No target comes any more before the machine stands; then its moves come from `source`.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn end_targets(&mut self, source: Source) {
+        self.activity.set_source(source);
+        self.runner.end_path();
     }
 
     /// Computes the size of the job and checks every target against the travel.

@@ -31,6 +31,7 @@ pub(super) struct Streamed {
 
 impl Streamed {
     /// Whether there are targets that have not come yet.
+    #[inline(always)] // It is called in every turn of the main loop.
     fn is_open(&self) -> bool {
         self.taken < self.header.targets
     }
@@ -77,6 +78,7 @@ impl<I: Index> Strokes<'_, I> {
     }
 
     /// Whether the next target has not come yet, or not all of its stroke.
+    #[inline(never)] // As above.
     pub(super) fn lateness(&self) -> Option<Late> {
         let (streamed, read) = (self.streamed?, self.cursor.leg);
         if read < streamed.released as usize || read >= streamed.header.targets as usize {
@@ -104,10 +106,15 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Whether the next line must wait until the machine has read targets.
+    #[inline(always)] // It is called in every turn of the main loop.
     pub(super) fn waits_for_targets(&self) -> bool {
-        self.streamed.is_open()
-            && self.is_streamed()
-            && self.streamed.room(self.words.len(), self.cursor.leg) < MOST_TARGETS
+        self.streamed.is_open() && self.is_full()
+    }
+
+    /// Whether the ring has no room for another line of a job that is being sent.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn is_full(&self) -> bool {
+        self.is_streamed() && self.streamed.room(self.words.len(), self.cursor.leg) < MOST_TARGETS
     }
 
     /// Begins a job whose strokes will be sent.

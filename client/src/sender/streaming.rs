@@ -25,6 +25,10 @@ pub(super) struct Streaming<'j> {
     pub job: &'j StreamedJob,
     /// How far it is followed.
     pub followed: Followed,
+    /// How many changes of pens are over, where the plotter does not tell which pen it waits for.
+    pub pens_in: usize,
+    /// Whether the machine has been seen to wait for the next one.
+    pub waited: bool,
 }
 
 impl Streaming<'_> {
@@ -40,7 +44,7 @@ impl Streaming<'_> {
 
     /// The status with what a plotter that draws G-code cannot know: how much there is in all once
     /// it has taken the first `done` lines, and which pen comes next.
-    pub fn told(&self, mut status: Status, done: usize) -> Status {
+    pub fn told(&mut self, mut status: Status, done: usize) -> Status {
         if self.job.form() == Form::Strokes {
             return status;
         }
@@ -51,8 +55,13 @@ impl Streaming<'_> {
         status.strokes = Some(part(size.strokes.into()));
         status.ink = Some(part(size.drawn >> 18));
         status.seconds_left = Some(seconds as u64);
-        if status.is_standing && done > 0 {
-            status.pen_wanted = self.job.pen_behind(done - 1);
+        // Lines behind the change are taken before the pen is in.
+        let pens = self.job.pens_in_lines(done);
+        if status.is_standing && pens.len() > self.pens_in {
+            status.pen_wanted = pens.last().copied();
+            self.waited = true;
+        } else if self.waited && !status.is_holding() {
+            (self.pens_in, self.waited) = (self.pens_in + 1, false);
         }
         status
     }
@@ -113,7 +122,7 @@ impl<'a> Sender<'a> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         self.strokes = job.size().strokes.into();
-        let streaming = Streaming { job, followed: Followed::default() };
+        let streaming = Streaming { job, followed: Followed::default(), pens_in: 0, waited: false };
         self.deliver_as(job, Some(streaming), progress, &mut |_| {})?;
         match job.form() {
             Form::Strokes => self.watch(progress)?,
