@@ -18,7 +18,7 @@ const LINE = 5,
 const CHUNK = 500,
   FIRST_BUDGET = 3_000,
   LEAST_BUDGET = 1_000,
-  MOST_BUDGET = 20_000;
+  MOST_BUDGET = 8_000;
 /** How many arrows are drawn at once, and how many lines take as long as one. */
 const ARROWS = 64,
   ARROW_COST = 8;
