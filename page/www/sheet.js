@@ -14,10 +14,14 @@ const LEAST_PIXELS = 0.9;
 const LINE = 5,
   SAMPLE = 4;
 
-/** How many pieces are drawn at once, and how many in a frame at first and at least. */
+/** How many pieces are drawn at once, and how many in a frame at first, at least and at most. */
 const CHUNK = 500,
-  FIRST_BUDGET = 6_000,
-  LEAST_BUDGET = 2_000;
+  FIRST_BUDGET = 3_000,
+  LEAST_BUDGET = 1_000,
+  MOST_BUDGET = 8_000;
+/** How many arrows are drawn at once, and how many lines take as long as one. */
+const ARROWS = 64,
+  ARROW_COST = 8;
 /** The times between frames in ms that let the budget of a frame shrink, or grow. */
 const SLOW = 55,
   FAST = 25;
@@ -70,7 +74,7 @@ export class SheetView {
     requestAnimationFrame((next) => {
       // How long the browser takes for the lines is known when the next frame comes.
       if (next - now > SLOW) this.budget = Math.max(LEAST_BUDGET, Math.round(drawn / 2));
-      else if (next - now < FAST) this.budget = Math.round(drawn * 1.5);
+      else if (next - now < FAST) this.budget = Math.min(MOST_BUDGET, Math.round(drawn * 1.5));
       // Another picture may have begun.
       if (!step.done && this.rest === rest && !this.isDue) this.goOn(next);
     });
@@ -223,8 +227,8 @@ export class SheetView {
   *moves(brush, ends) {
     const size = Math.max(0.9, 4 * this.pixel);
     const count = ends.length / 4;
-    for (let first = 1; first < count; first += CHUNK) {
-      const end = Math.min(count, first + CHUNK);
+    for (let first = 1; first < count; first += ARROWS) {
+      const end = Math.min(count, first + ARROWS);
       const width = brush.lineWidth;
       brush.strokeStyle = brush.fillStyle = TRAVEL;
       brush.lineWidth = Math.max(0.15, 0.7 * this.pixel);
@@ -242,8 +246,7 @@ export class SheetView {
       }
       brush.fill();
       brush.lineWidth = width;
-      // An arrow takes as long as some lines.
-      yield 4 * (end - first);
+      yield ARROW_COST * (end - first);
     }
   }
 
