@@ -1,7 +1,7 @@
 //! The settings of the drivers' pins on the Raspberry Pi Pico, at its pins.
 #![cfg(feature = "emulator")]
 
-use penup_client::emulator::{EmulatedBoard as _, Pin, PinChange};
+use penup_client::emulator::{Pin, PinChange};
 use penup_host_tests::emulated_jobs::Line;
 use std::error::Error;
 use std::time::Duration;

@@ -70,6 +70,29 @@ fn answer(state: &str, sent: &str) -> String {
     heard
 }
 
+/// The time that homing takes, in milliseconds, with the settings. While the machine homes, its
+/// switches lie 5 mm from where it begins.
+fn homing_time(settings: &str) -> u32 {
+    let mut bench = Bench::small();
+    bench.say("$22=1\n$130=60\n$131=60\n$J=X30 Y20 F6000\n");
+    bench.finish();
+    bench.say(settings);
+    bench.heard();
+    bench.board.receive(b"$H\n");
+    for milliseconds in 0..60_000 {
+        while bench.plotter.poll(&mut bench.board) {}
+        let pins = bench.plotter.machine().position();
+        let home = bench.plotter.machine().state() == State::Home;
+        let contacts = Contacts { x: home && pins.x <= 400, y: home && pins.y <= 400, stop: false };
+        bench.board.set_contacts(contacts);
+        bench.board.wait();
+        if bench.heard().contains("ok") {
+            return milliseconds;
+        }
+    }
+    panic!("homing does not end");
+}
+
 /// Where the machine is after homing with `$23=MASK`, and how far its pins have moved from where it
 /// began. Its switches lie 5 mm away.
 fn homed(mask: u8) -> (String, [i32; 2]) {
