@@ -3,7 +3,7 @@
 //!
 //! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is
 //! the name of the terminal. Then each line of the input is answered by one line: `forget` forgets
-//! the ink so far; `judge FILE` compares the ink since then with the lines of FILE, each of which
+//! the ink so far; `judge SLACK FILE` compares the ink since then with the lines of FILE, each of which
 //! is a polyline of points `x,y` in steps, and answers `same` or what differs; `heard` prints what
 //! the board has been sent since the last call, escaped. It ends with its input.
 
@@ -77,15 +77,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         };
         match order.split_once(' ').unwrap_or((&order, "")) {
             ("forget", _) => {
-                ink.take_points();
+                ink.forget();
                 println!("forgotten");
             }
-            ("judge", file) => {
-                let points = ink.take_points();
-                let points: Vec<_> = points.iter().map(|point| point.map(f64::from)).collect();
-                // Both ends of a line are rounded to a step, and so is each point between them: together
-                // at most 1.07 steps across it.
-                let found = difference(&points, &figure(file)?, 0.07);
+            ("judge", rest) => {
+                let (slack, file) = rest.split_once(' ').ok_or("judge SLACK FILE")?;
+                let points: Vec<_> = ink.points().iter().map(|at| at.map(f64::from)).collect();
+                let found = difference(&points, &figure(file)?, slack.parse()?);
                 println!("{}", found.unwrap_or_else(|| "same".to_owned()));
             }
             ("heard", _) => println!("{}", std::mem::take(&mut sent).escape_ascii()),

@@ -37,14 +37,22 @@ class Board:
         """Forgets the ink so far."""
         self.ask("forget")
 
-    def differs(self, polylines):
-        """What differs between the ink and polylines in millimetres; nothing if it is the same."""
+    def differs(self, polylines, rounding=0):
+        """What differs between the ink and polylines in millimetres; nothing if it is the same. The
+        last moves may still be on their way when the machine says that it is idle.
+
+        Both ends of a line are rounded to a step, and so is each point between them: together that
+        is at most 1.07 steps across it. `rounding` is how far the program has rounded, in steps."""
         path = os.path.join(self.folder, "figure.txt")
         with open(path, "w") as file:
             for line in polylines:
                 file.write(" ".join(f"{x * STEPS},{y * STEPS}" for x, y in line) + "\n")
-        answer = self.ask("judge " + path)
-        return "" if answer == "same" else answer
+        for _ in range(20):
+            answer = self.ask(f"judge {rounding + 0.07} {path}")
+            if answer == "same":
+                return ""
+            time.sleep(0.5)
+        return answer
 
     def heard(self):
         """What the program has sent since the last call, with its other bytes escaped."""
@@ -55,12 +63,12 @@ class Board:
         self.server.wait(20)
 
 
-def figure():
+def figure(lines=240):
     """A square, and a spiral of many short lines, in millimetres."""
     square = [(10, 10), (40, 10), (40, 30), (10, 30), (10, 10)]
     spiral = []
-    for number in range(241):
-        angle, radius = number * math.pi / 30, 2 + number / 20
+    for number in range(lines + 1):
+        angle, radius = number * 8 * math.pi / lines, 2 + 12 * number / lines
         x, y = 60 + radius * math.cos(angle), 40 + radius * math.sin(angle)
         spiral.append((round(x, 3), round(y, 3)))
     return [square, spiral]

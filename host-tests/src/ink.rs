@@ -39,12 +39,18 @@ impl Ink {
     }
 
     /// The positions, in steps from where the machine stood at first, at which there is ink since
-    /// the last call, in their order.
-    pub fn take_points(&mut self) -> Vec<[i32; 2]> {
+    /// the last call of [`Ink::forget`], in their order.
+    pub fn points(&mut self) -> &[[i32; 2]] {
         if let Some(event) = self.machine.last() {
             self.take(event.kind);
         }
-        std::mem::take(&mut self.points)
+        &self.points
+    }
+
+    /// Forgets the ink so far.
+    pub fn forget(&mut self) {
+        self.points();
+        self.points.clear();
     }
 
     /// The sum of all steps.
@@ -60,8 +66,7 @@ pub fn inked(bench: &Bench) -> (Vec<[i32; 2]>, [i32; 2]) {
     for stamped in &bench.board.trace().changes() {
         ink.change(stamped.into());
     }
-    let points = ink.take_points();
-    (points, ink.position())
+    (ink.points().to_vec(), ink.position())
 }
 
 /// The same positions as numbers in whatever order, each once.

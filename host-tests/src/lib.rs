@@ -28,6 +28,7 @@ pub mod scene_files;
 pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
+pub mod grbl_lines;
 pub mod heaviest_jobs;
 pub mod ink;
 pub mod transcript;

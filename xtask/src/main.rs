@@ -131,7 +131,7 @@ enum Task {
         count: u32,
     },
     /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs them
-    /// into target/senders (some 15 minutes).
+    /// into target/senders (some 30 minutes).
     Senders(senders::Arguments),
     /// Lists, by file, the calls of panic functions that are left in the boards' images.
     Panics,

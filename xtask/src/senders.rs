@@ -81,6 +81,18 @@ struct Found {
     broke: Option<String>,
 }
 
+impl Found {
+    /// How many checks passed, of how many.
+    fn counts(&self) -> String {
+        format!("{} of {}", self.passed, self.passed as usize + self.failed.len())
+    }
+
+    /// All that went wrong.
+    fn told(self) -> impl Iterator<Item = String> {
+        self.failed.into_iter().chain(self.broke)
+    }
+}
+
 /// Installs the programs, tries each with each board, and prints a table.
 ///
 /// # Errors
@@ -94,6 +106,21 @@ pub fn try_all(arguments: &Arguments) -> Result<()> {
     let is_chosen =
         |chosen: &Option<String>, name| chosen.as_deref().is_none_or(|only| only == name);
     let (mut rows, mut failures, mut tried) = (Vec::new(), Vec::new(), 0);
+    for board in BOARDS {
+        if arguments.program.is_none() && is_chosen(&arguments.port, board.name) {
+            let mut lines = Command::new(server.with_file_name("grbl_lines"));
+            let found =
+                follow(lines.arg(board.name).stderr(Stdio::inherit()), "Grbl's lines", board.name)?;
+            rows.push(format!(
+                "| Grbl's lines | {} | {} | {} |",
+                found.version,
+                board.name,
+                found.counts()
+            ));
+            failures
+                .extend(found.told().map(|what| format!("Grbl's lines at {}: {what}", board.name)));
+        }
+    }
     for program in PROGRAMS.iter().filter(|program| is_chosen(&arguments.program, program.name)) {
         let folder = match install(program) {
             Ok(folder) => folder,
@@ -133,7 +160,7 @@ pub fn try_all(arguments: &Arguments) -> Result<()> {
 fn build_server() -> Result<PathBuf> {
     let mut build = cargo();
     build.current_dir(crate::root()).args(["build", "--quiet", "--package", "penup-host-tests"]);
-    run(build.args(["--example", "board_on_pty"]))?;
+    run(build.args(["--example", "board_on_pty", "--example", "grbl_lines"]))?;
     Ok(crate::root().join("target/debug/examples/board_on_pty"))
 }
 
@@ -185,10 +212,18 @@ fn try_program(program: &Program, folder: &Path, server: &Path, port: &str) -> R
         .env("PENUP_SENDER", folder)
         .env("PYTHONPYCACHEPREFIX", folder.join("bytecode"))
         .env_remove("DISPLAY")
-        .stdin(Stdio::null())
-        .stdout(Stdio::piped())
         .stderr(fs::File::create(files.join("errors.txt"))?);
-    let mut child = script.spawn().with_context(|| format!("cannot run {}", describe(&script)))?;
+    let mut found = follow(&mut script, program.name, port)?;
+    if let Some(reason) = &mut found.broke {
+        *reason += &format!(": see {}", files.join("errors.txt").display());
+    }
+    Ok(found)
+}
+
+/// Runs what prints a line for each check.
+fn follow(script: &mut Command, name: &str, port: &str) -> Result<Found> {
+    script.stdin(Stdio::null()).stdout(Stdio::piped());
+    let mut child = script.spawn().with_context(|| format!("cannot run {}", describe(script)))?;
     let lines = child.stdout.take().map(BufReader::new);
     let mut found =
         Found { version: "unknown".to_owned(), passed: 0, failed: Vec::new(), broke: None };
@@ -211,7 +246,7 @@ fn try_program(program: &Program, folder: &Path, server: &Path, port: &str) -> R
                 Some(("version", version)) => version.clone_into(&mut found.version),
                 Some(("pass", _)) => found.passed += 1,
                 Some(("fail", what)) => {
-                    say!("penup: {} at {port}: {what}", program.name)?;
+                    say!("penup: {name} at {port}: {what}")?;
                     found.failed.push(what.to_owned());
                 }
                 _ => {}
@@ -222,8 +257,7 @@ fn try_program(program: &Program, folder: &Path, server: &Path, port: &str) -> R
     })?;
     let status = child.wait()?;
     if !status.success() || found.passed == 0 {
-        let errors = files.join("errors.txt");
-        found.broke = Some(format!("its script broke ({status}): see {}", errors.display()));
+        found.broke = Some(format!("its script broke ({status})"));
     }
     Ok(found)
 }

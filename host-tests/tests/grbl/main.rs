@@ -6,32 +6,9 @@
 use penup::boards::host::Change;
 use penup::machine::{Contacts, State};
 use penup::plotter::Board;
+use penup_host_tests::grbl_lines::{Row, agrees, rows};
 use penup_host_tests::ink;
 use penup_host_tests::whole_jobs::Bench;
-
-/// A row of the list.
-struct Row<'a> {
-    state: &'a str,
-    sent: &'a str,
-    /// What Grbl answers.
-    grbl: &'a str,
-    /// What penup answers where it differs on purpose.
-    penup: Option<&'a str>,
-}
-
-/// All rows.
-fn rows() -> impl Iterator<Item = Row<'static>> {
-    let text = include_str!("lines.txt");
-    text.lines().filter(|line| !line.is_empty() && !line.starts_with('#')).map(|line| {
-        let mut fields = line.split(" | ");
-        let mut field = || fields.next();
-        let (state, sent) = (field().expect("a state"), field().expect("a line"));
-        let (grbl, penup) = (field().unwrap_or(""), field());
-        let has_reason = field().is_some_and(|reason| !reason.is_empty());
-        assert!(penup.is_none() || has_reason, "no reason: {line}");
-        Row { state, sent, grbl, penup }
-    })
-}
 
 /// A plotter in one of the states of the list.
 fn bench_in(state: &str) -> Bench {
@@ -91,28 +68,6 @@ fn answer(state: &str, sent: &str) -> String {
         }
     }
     heard
-}
-
-/// Whether the text is of this form, in which `*` stands for any text.
-fn is_like(text: &str, form: &str) -> bool {
-    let Some((first, mut form)) = form.split_once('*') else { return text == form };
-    let Some(mut text) = text.strip_prefix(first) else { return false };
-    while let Some((part, rest)) = form.split_once('*') {
-        let Some(at) = text.find(part) else { return false };
-        (text, form) = (&text[at + part.len()..], rest);
-    }
-    text.ends_with(form)
-}
-
-/// Whether the answer is the expected one. Messages count where the expected answer names them.
-fn agrees(heard: &str, expected: &str) -> bool {
-    let named = expected.contains("[MSG:");
-    let lines: Vec<&str> = heard
-        .lines()
-        .filter(|line| named || !line.starts_with("[MSG:"))
-        .skip_while(|line| line.is_empty())
-        .collect();
-    is_like(&lines.join("⏎"), expected.trim_start_matches('⏎'))
 }
 
 /// The time that homing takes, in milliseconds, with the settings. While the machine homes, its

@@ -270,7 +270,7 @@ fn a_polygon_that_does_not_fit_is_an_error_and_is_not_drawn() {
         text + ";PM2;FP;EP;OE;"
     };
     // The last place is that of the point that closes it.
-    for (points, error, inks) in [(255, "0", true), (256, "7", false), (5000, "7", false)] {
+    for (points, error, inks) in [(127, "0", true), (128, "7", false), (5000, "7", false)] {
         let mut bench = Bench::small();
         let heard = draw(&mut bench, polygon(points).as_bytes());
         assert_eq!(heard.trim(), error, "{points}");
@@ -282,9 +282,9 @@ fn a_polygon_that_does_not_fit_is_an_error_and_is_not_drawn() {
 fn a_fill_of_a_circle_covers_it_and_nothing_else() {
     for (style, spacing) in [("PT1", 40.0), ("FT2;PT0.5", 20.0), ("FT3,30,30", 30.0)] {
         let mut bench = Bench::small();
-        let text = format!("IN;SP1;{style};PU2000,2000;PM0;CI400,3;PM1;CI200,3;PM2;FP;");
+        let text = format!("IN;SP1;{style};PU2000,2000;PM0;CI400,6;PM1;CI200,6;PM2;FP;");
         draw(&mut bench, text.as_bytes());
-        // A chord of 3 degrees lies less than a fifth of a unit within the circle.
+        // A chord of 6 degrees lies less than a unit within the circle.
         let centre = [4000.0, 4000.0];
         let off = |[x, y]: [f64; 2]| (x - centre[0]).hypot(y - centre[1]) / 2.0;
         let ink = inked(&bench);
