@@ -120,6 +120,9 @@ pub struct Capacities {
     pub ports: usize,
     /// Number of straight moves that are planned ahead.
     pub blocks: usize,
+    /// Number of steps that wait for their time on a long path. The machine is never faster than it
+    /// could stop within 13/16 of them.
+    pub steps: u32,
 }
 
 /// A scene, and the size of the drawing that results from it.
@@ -193,7 +196,14 @@ pub const LM3S6965: BoardRow = BoardRow {
         stop: 6,
     },
     // Enough for a lattice of 125 cubes, and for a stack of 9,840 bytes besides.
-    memory: Capacities { vertices: 1000, corners: 3000, words: 4208, ports: 1, blocks: 16 },
+    memory: Capacities {
+        vertices: 1000,
+        corners: 3000,
+        words: 4208,
+        ports: 1,
+        blocks: 16,
+        steps: 619,
+    },
     scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
     emulator: Emulator::Qemu { machine: "lm3s6965evb" },
     flashing: None,
@@ -231,7 +241,14 @@ pub const PICO: BoardRow = BoardRow {
     // Enough for a lattice of 343 cubes. The ports are the UART and USB. At 50 mm/s and 200 mm/s²
     // the machine stops within 625 single steps of 0.01 mm. 128 blocks of six hold that, and all
     // that a bend may hide.
-    memory: Capacities { vertices: 4096, corners: 12288, words: 16384, ports: 2, blocks: 128 },
+    memory: Capacities {
+        vertices: 4096,
+        corners: 12288,
+        words: 16384,
+        ports: 2,
+        blocks: 128,
+        steps: 1776,
+    },
     scene: Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
     emulator: Emulator::Rp2040js,
     flashing: Some(Flashing {

@@ -28,7 +28,7 @@ macro_rules! memory_of {
 /// of strokes is improved.
 pub fn bench_like(board: &'static BoardRow) -> Bench {
     let memory: MemorySlices = if board == &PICO { memory_of!(PICO) } else { memory_of!(LM3S6965) };
-    let mut bench = Bench::with_memory(memory);
+    let mut bench = Bench::with_queue(memory, board.memory.steps);
     bench.heard();
     bench
 }

@@ -1,5 +1,6 @@
 //! Runs the library's own interrupt code on simulated pins that record their changes.
 
+use penup::board_table::LM3S6965;
 use penup::boards::host::{Stamped, traced_steps};
 use penup::drawing::PagePoint;
 use penup::machine::{EventRing, Machine, MachineError, Path, PulserState, Settings};
@@ -97,6 +98,8 @@ pub fn run_with(
     let state = PulserState::new();
     let mut ring = EventRing::new();
     let (mut queue, mut steps) = traced_steps(&mut ring, &state);
+    // Speeds are those that the smallest board's queue holds.
+    state.set_queue(LM3S6965.memory.steps);
     let mut blocks = [Block::EMPTY; 128];
     let mut machine = Machine::new(settings, &mut blocks, &state, 2_500_000);
     loop {

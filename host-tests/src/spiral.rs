@@ -25,6 +25,6 @@ pub fn lines(chords: u16, radius: f64, settings: &[&str]) -> Vec<String> {
 /// A spiral drawn at 2800 chords per second, of 180 moves on average: 510,000 steps per second, and
 /// 564,000 where one axis moves alone.
 pub fn at_half_a_million() -> Vec<String> {
-    let settings = ["$100=4000", "$101=4000", "$120=20000", "$121=20000", "$201=8460", "$202=8460"];
+    let settings = ["$100=4000", "$101=4000", "$120=32767", "$121=32767", "$201=8460", "$202=8460"];
     lines(1200, 4.0, &settings)
 }

@@ -1,5 +1,6 @@
 //! Runs whole jobs on the board in memory, over its serial line.
 
+use penup::board_table::PICO;
 use penup::boards::host::{HostBoard, Stamped, lend_memory};
 use penup::machine::{EventRing, PulserState};
 use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, MemorySlices, Plotter};
@@ -16,11 +17,18 @@ pub struct Bench {
 impl Bench {
     /// Starts a plotter with the capacities of `memory` and waits for its greeting.
     pub fn with_memory(memory: MemorySlices<'static>) -> Self {
+        Self::with_queue(memory, PICO.memory.steps)
+    }
+
+    /// The same for a plotter that is never faster than it could stop within 13/16 of so many
+    /// `steps`.
+    pub fn with_queue(memory: MemorySlices<'static>, steps: u32) -> Self {
         // The memory is leaked: the plotter borrows it until the test's process ends, which is
         // soon.
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
+        pins.set_queue(steps);
         let plotter = Plotter::new(memory, pins);
         plotter.greet(&mut board);
         Self { board, plotter }

@@ -5,7 +5,7 @@
 use penup::board_table::PICO;
 use penup_host_tests::emulated_jobs::{Line, begin, begin_on};
 use penup_host_tests::spiral;
-use penup_host_tests::step_edges::{Edge, HALF_A_MILLION, assert_in_time, of_changes, planned};
+use penup_host_tests::step_edges::{Edge, FASTEST, assert_in_time, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::time::Duration;
@@ -45,8 +45,8 @@ fn a_job_of_several_strokes_keeps_time_to_the_cycle() -> Result<(), Box<dyn Erro
 }
 
 #[test]
-fn a_long_diagonal_at_half_a_million_steps_a_second_keeps_time() -> Result<(), Box<dyn Error>> {
-    keeps_time("diagonal.obj", &HALF_A_MILLION, 300_000)
+fn a_long_diagonal_at_the_greatest_speed_keeps_time() -> Result<(), Box<dyn Error>> {
+    keeps_time("diagonal.obj", &FASTEST, 300_000)
 }
 
 /// The number of drawn events per second, without the tenths at the beginning and the end, in which
@@ -77,16 +77,15 @@ fn a_spiral_of_short_chords_at_half_a_million_steps_a_second_keeps_time()
     Ok(())
 }
 
-/// The maximum speed that can be set: 10,900 chords per second, of 45 moves on average.
+/// The maximum speed that can be set: 10,900 chords per second, of 13 moves on average.
 #[test]
 fn a_spiral_of_short_chords_at_the_greatest_speed_keeps_time() -> Result<(), Box<dyn Error>> {
-    let settings =
-        ["$100=1000", "$101=1000", "$120=32767", "$121=32767", "$201=32767", "$202=32767"];
+    let settings = ["$100=300", "$101=300", "$120=32767", "$121=32767", "$201=32767", "$202=32767"];
     let lines = spiral::lines(1500, 12.0, &settings);
     let pins = at_the_pins(&lines)?;
-    assert_in_time(&planned(&PICO, &lines), &pins, 100_000, Duration::ZERO);
+    assert_in_time(&planned(&PICO, &lines), &pins, 30_000, Duration::ZERO);
     let rate = events_a_second(&pins);
-    assert!(rate > 470_000.0, "{rate} steps a second");
+    assert!(rate > 140_000.0, "{rate} steps a second");
     Ok(())
 }
 

@@ -5,7 +5,7 @@ use penup::board_table::PICO;
 use penup_client::emulator::{self, EmulatedBoard, Pin, PinChange, image_path};
 use penup_host_tests::emulated_jobs::{Line, begin_on};
 use penup_host_tests::event_checker::greatest_acceleration;
-use penup_host_tests::step_edges::{HALF_A_MILLION, of_changes, planned};
+use penup_host_tests::step_edges::{FASTEST, of_changes, planned};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 
@@ -77,15 +77,16 @@ fn hardest(x: &[f64]) -> (f64, usize) {
     (worst, pauses)
 }
 
-/// The deceleration with the settings of [`HALF_A_MILLION`] when the queue runs dry: 546 mm/s
-/// within 13/16 of a quarter of the ring, 444 steps of 1/1300 mm. Each axis has 1/√2 of it.
+/// The deceleration in steps/s² with the settings of [`FASTEST`] when the queue runs dry. The speed
+/// is that from which 32767 mm/s² stop within 13/16 of the ring, and the machine brakes within a
+/// quarter of that. Each axis has 1/√2 of it.
 fn hardest_allowed() -> f64 {
-    546.1 * 546.1 / (2.0 * 360.75 / 1300.0) * 1300.0 / 2f64.sqrt()
+    32_767.0 * 4.0 * 4000.0 / 2f64.sqrt()
 }
 
 #[test]
 fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), Box<dyn Error>> {
-    let (changes, _) = disturbed(&HALF_A_MILLION, &[], b"$\n$\n")?;
+    let (changes, _) = disturbed(&FASTEST, &[], b"$\n$\n")?;
     let (worst, pauses) = hardest(&steps_of_x(&changes));
     println!("{pauses} pauses, {:.3} of the limit", worst / hardest_allowed());
     // There, eight steps at a time are decelerated equally, which makes a staircase: up to 1.7
@@ -98,7 +99,7 @@ fn lists_do_not_stop_half_a_million_steps_a_second_with_a_jerk() -> Result<(), B
 #[test]
 fn half_a_million_steps_a_second_are_braked_within_what_the_ring_holds()
 -> Result<(), Box<dyn Error>> {
-    let (changes, status) = disturbed(&HALF_A_MILLION, &[(40_000, 5), (100_000, 20)], b"")?;
+    let (changes, status) = disturbed(&FASTEST, &[(40_000, 5), (100_000, 20)], b"")?;
     let (worst, pauses) = hardest(&steps_of_x(&changes));
     println!("{pauses} pauses, {:.3} of the limit, {status}", worst / hardest_allowed());
     assert!(status.contains("|Late:2"), "{status}");

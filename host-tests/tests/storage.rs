@@ -241,16 +241,16 @@ fn settings_that_are_too_fast_are_kept_and_the_user_hears_how_fast_the_machine_i
     };
     let (flash, _) = switch_on(empty_flash(), |plotter| {
         assert!(!plotter.heard().contains("MSG"));
-        // 13/16 of 619 steps of 1/80 mm, at 800 and at 400 mm/s².
+        // 13/16 of 1776 steps of 1/80 mm, at 800 and at 400 mm/s².
         assert_eq!(plotter.say("$110=32000"), "ok\n");
         assert_eq!(plotter.say("$111=32000"), "ok\n");
-        assert_eq!(plotter.say("$202=20000"), held(6017) + "ok\n");
-        assert_eq!(plotter.say("$120=400"), held(4255) + "ok\n");
+        assert_eq!(plotter.say("$202=20000"), held(10_192) + "ok\n");
+        assert_eq!(plotter.say("$120=400"), held(7207) + "ok\n");
         assert_eq!(plotter.say("$121=400"), "ok\n");
         assert_eq!(plotter.say("$220=2"), "ok\n");
     });
     switch_on(flash, |plotter| {
-        assert!(plotter.heard().contains(&held(4255)));
+        assert!(plotter.heard().contains(&held(7207)));
         let settings = plotter.say("$$");
         for line in ["$110=32000.000 ", "$120=400.000 ", "$202=20000.000 "] {
             assert!(settings.contains(line), "{settings}");

@@ -28,8 +28,8 @@ use std::vec::Vec;
 /// The number of serial ports of this board, which has no hardware.
 pub const PORTS: usize = 2;
 
-/// The number of slots in the queue, as many as in the smallest board's queue.
-pub const QUEUE_LENGTH: usize = 624;
+/// The number of slots in the queue: as many steps as on the Pico fit.
+pub const QUEUE_LENGTH: usize = crate::board_table::PICO.memory.steps as usize + 5;
 
 /// Where the records lie in the flash of this board: as on the board with the largest ones.
 pub const LAYOUT: Layout = Layout::from(0, 132 << 10);

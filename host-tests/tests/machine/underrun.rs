@@ -1,6 +1,7 @@
 //! A main loop that is late: the queue runs dry while the machine moves.
 
 use crate::fixtures::{ink, is_ready, to, with, with_backlash};
+use penup::board_table::PICO;
 use penup::boards::host::traced_steps;
 use penup::machine::{
     Alarm, EventRing, Machine, PulserState, Setting, SettingError, Settings, Target, TargetList,
@@ -111,7 +112,7 @@ fn what_the_queue_cannot_hold_is_not_braked_harder() {
     starve_often(with_jerk, too_fast(), 20);
 }
 
-/// The speed from which the machine can stop within 13/16 of the 619 steps of the queue, and the
+/// The speed from which the machine can stop within 13/16 of the steps of the queue, and the
 /// greatest that the settings ask for, in mm/min.
 fn held_and_asked(settings: &Settings) -> [f64; 2] {
     let value = |setting| settings.get(setting).to_num::<f64>();
@@ -128,7 +129,7 @@ fn held_and_asked(settings: &Settings) -> [f64; 2] {
         1 => value(Setting::StepsPerMmX) * 2f64.sqrt(),
         _ => value(Setting::StepsPerMmX),
     };
-    let held = 619.0 * 13.0 / 16.0 / motor_steps;
+    let held = f64::from(PICO.memory.steps) * 13.0 / 16.0 / motor_steps;
     [60.0 * (2.0 * acceleration * held).sqrt(), asked]
 }
 

@@ -23,10 +23,11 @@ use super::pins::{AxisPins, MotorPins, PenPin};
 use super::registers::{SYSTEM_CONTROL, TIMER1, TIMER2};
 use super::{HAPPENED, clock, critical};
 use crate::boards::handler::Owned;
+use penup::board_table::LM3S6965;
 
 /// The number of slots in the queue, one of which stays empty; each takes 4 bytes. At the default
 /// travel speed, 100 mm/s, the machine stops within 500 steps.
-const EVENT_PLACES: usize = 624;
+const EVENT_PLACES: usize = LM3S6965.memory.steps as usize + 5;
 
 /// The cycles of the core's clock in one tick, the unit of time of step events.
 const CYCLES_PER_TICK: u32 = clock::HERTZ / TICKS_PER_SECOND;

@@ -51,7 +51,8 @@ impl Settings {
         let held = limits.greatest_rate();
         // A speed is rounded by less than that.
         let is_less = asked - held > const { Value::lit("0.001") };
-        (limits.brake(Kinematics::properties(self).longest_step), is_less.then_some(held))
+        let longest_step = Kinematics::properties(self).longest_step;
+        (limits.brake(longest_step, queue), is_less.then_some(held))
     }
 
     /// Returns the length of the dots of a dotted line.

@@ -30,6 +30,7 @@ use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::peripheral::NVIC;
 use heapless::spsc::{Producer, Queue};
+use penup::board_table::PICO;
 use penup::machine::PulserState;
 use penup::motion::{Brake, Runner, StepEvent, StepLength, TICKS_PER_SECOND};
 use rp2040_hal::pac::Interrupt;
@@ -50,9 +51,9 @@ pub(super) use target::PULSE;
 /// The words that may still be on their way from the ring to the state machine, and the additional
 /// words that waits may take.
 const RESERVED: u32 = 16 + Runner::ROOM as u32 * WAIT_WORDS;
-/// The number of steps that can be counted on to wait on a long path: 7/8 of the ring, which leaves
-/// 1.9 ms at 400,000 steps a second until the main loop fills it again.
-const STOPPING_STEPS: u32 = WORDS / 8 * 7;
+/// The number of steps that wait on a long path.
+const STOPPING_STEPS: u32 = WORDS - RESERVED;
+const _: () = assert!(STOPPING_STEPS == PICO.memory.steps);
 /// The duration, 2 ms, after which a block ends. A longer block would fix the times of its steps
 /// too early, when more steps may still come.
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
