@@ -6,6 +6,7 @@ use crate::cli::{
     TapeEncodeArgs, TapeShowArgs, ViewArgs,
 };
 use crate::error::Error;
+use crate::export::{self, Retracing};
 use crate::files;
 use crate::fit::fit_obj;
 use crate::interrupt::MovingPlotter;
@@ -28,11 +29,12 @@ use penup::index::Index;
 use penup::machine::Setting;
 use penup::step::tape::BadCode;
 use penup_job::picture::Picture;
-use penup_job::results::JobReport;
+use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;
 use penup_job::{Job, Settings};
 use penup_readers::lines::Lines;
 use penup_readers::{Arrangement, ReadError, SourceFile};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -77,6 +79,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
             operate::restore(file, plotter, interrupt)
         }
         Command::Again(args) => operate::again(args, quiet, interrupt),
+        Command::Setup(args) => operate::setup(args, interrupt),
         Command::Console(args) => operate::console(&args.port, args.format.json, interrupt),
         Command::Completions { shell, .. } => Ok(manual::completions(*shell)),
         Command::Man { folder, .. } => manual::pages(folder.as_deref()),
@@ -87,7 +90,7 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     // Without a file, a small example is drawn.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
-    let outputs = Outputs::of(&args.pictures, None, None);
+    let outputs = Outputs::of(&args.pictures, None);
     if args.port.is_none() {
         output::check(&file, &outputs.files())?;
     }
@@ -96,19 +99,22 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
         let mut link = ports::open(device)?;
+        link.rejoin(&args.rejoin, quiet);
         let _moving = MovingPlotter::new();
         if link.obey_keys() && !quiet {
             note_keys();
         }
         let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
-        let drawn =
-            operate::rehearse(&mut sender, job).and_then(|()| draw_by(&mut sender, job, &mut bar));
+        let drawn = operate::rehearse(&mut sender, job)
+            .and_then(|()| draw_by(&mut sender, job, args.passes.multipass, &mut bar));
         sender.end();
         let report = drawn?;
         drop(bar);
         let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
-        let json = json!({ "file": file.display().to_string(), "drawn": report });
-        let drawn = Outcome::done(format!("{} is drawn{text}", file.display()), json);
+        let passes = args.passes.multipass;
+        let json = json!({ "file": file.display().to_string(), "drawn": report, "passes": passes });
+        let times = if passes > 1 { format!(" {passes} times") } else { String::new() };
+        let drawn = Outcome::done(format!("{} is drawn{times}{text}", file.display()), json);
         return Ok(source.bounded(drawn));
     }
     // On Linux the kernel ends the emulator together with this program. On other systems this
@@ -117,7 +123,7 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    let drawn = draw(board.as_mut(), job, interrupt, &mut bar);
+    let drawn = draw_passes(board.as_mut(), job, args.passes.multipass, interrupt, &mut bar);
     let report = drawn.map_err(|error| board.explain(error))?;
     let pen = board.pen_runs()?;
     drop(board);
@@ -129,7 +135,7 @@ fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome,
 }
 
 fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
-    let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
+    let outputs = Outputs::of(&args.pictures, Some(args));
     output::check(&args.file, &outputs.files())?;
     let source = read(&args.file, &args.view, quiet)?;
     let mut machine = match &args.machine {
@@ -163,8 +169,19 @@ fn show<I: Index>(
     mut bar: Bar,
     interrupt: &AtomicBool,
 ) -> Result<Outcome, Error> {
+    let passes = args.passes.multipass;
     let report = draw(&mut plotter, &source.job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
+    if passes > 1 {
+        // The pictures show the first pass. Each other one begins where one has ended.
+        let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;
+        let drawn = sender.plot(&mut bar);
+        sender.end();
+        drawn?;
+        let other = plotter.result()?;
+        result.steps += u64::from(passes - 1) * other.steps;
+        result.duration_s += f64::from(passes - 1) * other.duration_s;
+    }
     for _ in 1..args.repeat {
         result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
     }
@@ -172,8 +189,11 @@ fn show<I: Index>(
     let page = source.settings.page;
     let picture = Picture { page, runs: result.pen.runs.clone(), step: result.pen.step };
     let mut files = write_pictures(&picture, outputs)?;
+    files.extend(write_exports(&picture, args, plotter.draw_speed())?);
     if let Some(path) = &outputs.json {
-        let text = serde_json::to_string(&result).map_err(|error| Error::Write {
+        let whole =
+            PreviewResult { result: &result, passes, bounds: source.extent, drawn: &report };
+        let text = serde_json::to_string(&whole).map_err(|error| Error::Write {
             file: path.display().to_string(),
             source: error.into(),
         })?;
@@ -185,9 +205,46 @@ fn show<I: Index>(
         files.push(path);
     }
     let mut outcome = source.bounded(summary(&files, report));
+    if passes > 1 {
+        outcome.text += &format!(", {passes} passes");
+    }
     let time = duration(result.duration_s.round() as u64);
     outcome.text += &format!(", {time} to draw");
     Ok(outcome)
+}
+
+/// What is written by `penup preview --json`.
+#[derive(Serialize)]
+struct PreviewResult<'a> {
+    #[serde(flatten)]
+    result: &'a JobResult,
+    /// How often everything is drawn; the lengths are those of one pass, and the steps and the
+    /// duration those of all.
+    passes: u32,
+    /// The least and the greatest coordinates of the model, or of the plan in mm.
+    bounds: Option<[[f64; 3]; 2]>,
+    /// The plotter's own report on one pass.
+    drawn: &'a Option<JobReport>,
+}
+
+/// Writes the drawing for other machines. Returns the names of the files written.
+fn write_exports<'a>(
+    picture: &Picture,
+    args: &'a PreviewArgs,
+    speed: f64,
+) -> Result<Vec<&'a Path>, Error> {
+    let mut files = Vec::new();
+    let retracing = Retracing { passes: args.passes.multipass, reloops: args.reloop };
+    let lines = export::lines(&picture.runs, picture.step, retracing);
+    if let Some(path) = &args.gcode {
+        output::write(path, export::gcode(&lines, speed).as_bytes())?;
+        files.push(path.as_path());
+    }
+    if let Some(path) = &args.hpgl {
+        output::write(path, export::hpgl(&lines).as_bytes())?;
+        files.push(path.as_path());
+    }
+    Ok(files)
 }
 
 /// Says which keys act from now on.
@@ -239,7 +296,7 @@ fn encode_tape(
 }
 
 fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
-    let outputs = Outputs::of(&args.pictures, None, None);
+    let outputs = Outputs::of(&args.pictures, None);
     output::check(&args.file, &outputs.files())?;
     let tape = read_tape(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
@@ -247,7 +304,8 @@ fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
     let files = write_pictures(&picture, &outputs)?;
     let names = names(&files);
     let text = format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len());
-    Ok(Outcome::done(text, json!({ "files": names, "moves": moves, "bytes": tape.len() })))
+    let json = json!({ "files": names, "moves": moves, "bytes": tape.len() });
+    Ok(Outcome::done(text, json))
 }
 
 fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
@@ -270,8 +328,19 @@ pub fn draw(
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
+    draw_passes(link, job, 1, interrupt, progress)
+}
+
+/// As [`draw`], with all of it drawn so many times.
+fn draw_passes(
+    link: &mut dyn Link,
+    job: &dyn Lines,
+    passes: u32,
+    interrupt: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<Option<JobReport>, Error> {
     let mut sender = Sender::open(link, Patience::default(), interrupt)?;
-    let drawn = draw_by(&mut sender, job, progress);
+    let drawn = draw_by(&mut sender, job, passes, progress);
     sender.end();
     drawn
 }
@@ -279,10 +348,13 @@ pub fn draw(
 fn draw_by(
     sender: &mut Sender<'_>,
     job: &dyn Lines,
+    passes: u32,
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
     sender.stream(job, progress)?;
-    sender.plot(progress)?;
+    for _ in 0..passes {
+        sender.plot(progress)?;
+    }
     sender.report()
 }
 
@@ -341,15 +413,19 @@ struct Outputs {
     png: Option<PathBuf>,
     json: Option<PathBuf>,
     motion: Option<PathBuf>,
+    gcode: Option<PathBuf>,
+    hpgl: Option<PathBuf>,
 }
 
 impl Outputs {
-    fn of(pictures: &PictureArgs, json: Option<&Path>, motion: Option<&Path>) -> Self {
+    fn of(pictures: &PictureArgs, preview: Option<&PreviewArgs>) -> Self {
         let mut named = Self {
             svg: pictures.svg.clone(),
             png: pictures.png.clone(),
-            json: json.map(Path::to_owned),
-            motion: motion.map(Path::to_owned),
+            json: preview.and_then(|args| args.json.clone()),
+            motion: preview.and_then(|args| args.motion.clone()),
+            gcode: preview.and_then(|args| args.gcode.clone()),
+            hpgl: preview.and_then(|args| args.hpgl.clone()),
         };
         if named.files().is_empty() {
             named.svg = Some("plot.svg".into());
@@ -359,7 +435,7 @@ impl Outputs {
     }
 
     fn files(&self) -> Vec<&Path> {
-        let all = [&self.svg, &self.png, &self.json, &self.motion];
+        let all = [&self.svg, &self.png, &self.json, &self.motion, &self.gcode, &self.hpgl];
         all.into_iter().flatten().map(PathBuf::as_path).collect()
     }
 }

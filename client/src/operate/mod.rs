@@ -5,6 +5,7 @@ mod orders;
 mod rehearsal;
 mod settings;
 mod settings_file;
+mod setup;
 mod status;
 
 pub use console::console;
@@ -12,6 +13,7 @@ pub use orders::{abort, again, home, jog, pause, pen, resume, unlock, watch};
 pub use rehearsal::rehearse;
 pub use settings::{restore, save, set, show};
 pub use settings_file::{SavedSettings, SettingsFileError};
+pub use setup::setup;
 pub use status::{ports, status};
 
 use crate::cli::{PlotterArgs, PortArgs};
