@@ -5,8 +5,8 @@ pub mod page;
 mod view;
 
 pub use machine::{
-    ConsoleArgs, FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, PortArgs,
-    PortsArgs, ResumeArgs, SetArgs, SettingsCommand, WatchArgs,
+    AgainArgs, ConsoleArgs, FormatArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs,
+    PortArgs, PortsArgs, RejoinArgs, ResumeArgs, SetArgs, SettingsCommand, WatchArgs,
 };
 pub use page::PageArgs;
 pub use view::ViewArgs;
@@ -18,7 +18,7 @@ use crate::files::STANDARD_INPUT;
 use crate::fit::{FitError, TOLERANCES};
 use crate::machine_settings::AssignedSetting;
 use crate::table::BoardRow;
-use clap::{Args, Parser, Subcommand};
+use clap::{ArgGroup, Args, Parser, Subcommand};
 use clap_complete::Shell;
 use penup::machine::Setting;
 use penup_readers::page::Page;
@@ -90,7 +90,9 @@ pub enum Command {
     #[command(subcommand)]
     Settings(SettingsCommand),
     /// Draw the last job again, which the plotter has kept
-    Again(PlotterArgs),
+    Again(AgainArgs),
+    /// Set up a new machine step by step: directions, steps in a mm, pen, origin, test square
+    Setup(PlotterArgs),
     /// Talk to a plotter line by line
     Console(ConsoleArgs),
     /// Print the completions for a shell
@@ -122,7 +124,8 @@ impl Command {
             Self::Tape(TapeCommand::Encode(args)) => &args.format,
             Self::Tape(TapeCommand::Show(args)) => &args.format,
             Self::Ports(args) => &args.format,
-            Self::Watch(WatchArgs { plotter })
+            Self::Watch(WatchArgs { plotter, .. })
+            | Self::Again(AgainArgs { plotter, .. })
             | Self::Pause(PauseArgs { plotter, .. })
             | Self::Resume(ResumeArgs { plotter, .. })
             | Self::Jog(JogArgs { plotter, .. })
@@ -137,7 +140,7 @@ impl Command {
             | Self::Abort(plotter)
             | Self::Home(plotter)
             | Self::Unlock(plotter)
-            | Self::Again(plotter) => &plotter.format,
+            | Self::Setup(plotter) => &plotter.format,
             Self::Tape(TapeCommand::Decode { format, .. })
             | Self::Completions { format, .. }
             | Self::Man { format, .. } => format,
@@ -269,10 +272,33 @@ pub struct PlotArgs {
     /// The pictures to write.
     #[command(flatten)]
     pub pictures: PictureArgs,
+    /// How often everything is drawn.
+    #[command(flatten)]
+    pub passes: PassesArgs,
+    /// How long a plotter that is gone is waited for.
+    #[command(flatten)]
+    pub rejoin: RejoinArgs,
+}
+
+/// How often everything is drawn.
+#[derive(Debug, Args)]
+pub struct PassesArgs {
+    /// Draw everything this many times; a plotter draws the whole again, and --gcode and --hpgl draw
+    /// each line again without lifting the pen
+    #[arg(
+        long,
+        value_name = "N",
+        default_value = "1",
+        value_parser = clap::value_parser!(u32).range(1..=100),
+        allow_hyphen_values = true,
+        help_heading = "Drawing"
+    )]
+    pub multipass: u32,
 }
 
 /// Options of `penup preview`.
 #[derive(Debug, Args)]
+#[command(group = ArgGroup::new("export").multiple(true))]
 pub struct PreviewArgs {
     /// The file to show.
     #[arg(value_name = "FILE", help = file_help("The file to show"))]
@@ -286,9 +312,22 @@ pub struct PreviewArgs {
     /// The pictures to write.
     #[command(flatten)]
     pub pictures: PictureArgs,
-    /// Write the segments, strokes, lengths and computing times to this file as JSON
+    /// How often everything is drawn.
+    #[command(flatten)]
+    pub passes: PassesArgs,
+    /// Write the segments, strokes, lengths, bounds and times to this file as JSON
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
+    /// Write the drawing for a Grbl machine whose M3 lowers the pen
+    #[arg(long, value_name = "FILE", help_heading = "Output", group = "export")]
+    pub gcode: Option<PathBuf>,
+    /// Write the drawing as HP-GL, in units of 0.025 mm
+    #[arg(long, value_name = "FILE", help_heading = "Output", group = "export")]
+    pub hpgl: Option<PathBuf>,
+    /// Begin closed lines at random points in --gcode and --hpgl, so that the marks of the pen do not
+    /// stand in a row; else they begin where the moves between lines become short
+    #[arg(long, requires = "export", help_heading = "Output")]
+    pub reloop: bool,
     /// Plot speed, acceleration and jerk over time to this SVG file
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub motion: Option<PathBuf>,
@@ -338,10 +377,12 @@ pub struct FitArgs {
     pub output: Option<PathBuf>,
 }
 
-/// The pictures to write; `plot.svg` and `plot.png` if no output is named.
+/// The pictures to write; `plot.svg` and `plot.png` if no output is named. `-` is the standard
+/// output.
 #[derive(Debug, Args)]
 pub struct PictureArgs {
-    /// Write the picture as SVG [default: plot.svg and plot.png if no output is named]
+    /// Write the picture as SVG; - is the standard output, here and for every other file [default:
+    /// plot.svg and plot.png if no output is named]
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub svg: Option<PathBuf>,
     /// Write the picture as PNG

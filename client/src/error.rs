@@ -111,6 +111,12 @@ pub enum Error {
     /// The motion of a machine that is not Cartesian is not plotted.
     #[error("the motion is plotted for machines with setting 230=0 only: leave out --motion")]
     MotionOfOtherMachine,
+    /// `penup setup` is for machines whose motors move straight along the page.
+    #[error(
+        "`penup setup` leads through machines with setting 230=0 or 230=1, and this one hangs on \
+         belts\nSet it up by hand: see docs/first-plot.md"
+    )]
+    SetupOfPolargraph,
     /// There is no machine with these settings.
     #[error("{0}")]
     NoSuchMachine(#[from] NoSuchMachine),
@@ -221,6 +227,17 @@ pub enum Error {
          power supply"
     )]
     Restarted,
+    /// A job that was followed has stopped before its end.
+    #[error(
+        "the job has stopped after {done} of {all} strokes: it was given up, or the plotter was \
+         reset or lost its power\n`penup resume` goes on with it"
+    )]
+    JobStopped {
+        /// The number of strokes that are drawn.
+        done: u64,
+        /// The number of all strokes.
+        all: u64,
+    },
     /// The serial line corrupts so many bytes that a line of the job never arrives intact.
     #[error(
         "the line to the plotter damages too many bytes: {times} times a line did not arrive \
@@ -363,11 +380,13 @@ impl Error {
             | Self::NothingToDo { .. }
             | Self::WithoutNumbers
             | Self::NotSet { .. }
+            | Self::SetupOfPolargraph
             | Self::Refused { .. } => REFUSED,
             Self::Silent { line: Some(_), .. }
             | Self::LostLine { .. }
             | Self::Alarm { .. }
             | Self::Restarted
+            | Self::JobStopped { .. }
             | Self::Damaged { .. }
             | Self::OtherContents
             | Self::Held

@@ -1,6 +1,8 @@
 //! Reads the file to draw from the disk, or from the standard input.
 
 use crate::error::Error;
+use fontdb::Database;
+use penup_readers::fonts::Fonts;
 use penup_readers::{
     Arrangement, BEGINNING, ReadError, SIZE_LIMIT, SourceFile, check_beginning, takes_deep_stack,
 };
@@ -57,18 +59,25 @@ pub fn parse(
     bytes: Vec<u8>,
     arrangement: &Arrangement,
 ) -> Result<SourceFile, ReadError> {
+    let arrangement = arrangement.clone().with_fonts(Fonts::found_by(fonts_of_this_computer));
     if !takes_deep_stack(&name, &bytes) {
-        return SourceFile::arranged(name, bytes, arrangement);
+        return SourceFile::arranged(name, bytes, &arrangement);
     }
     let broken =
         |reason: &str| ReadError::Content { file: name.clone(), reason: reason.to_owned() };
     let reader = thread::Builder::new().stack_size(STACK).spawn({
-        let (name, arrangement) = (name.clone(), arrangement.clone());
+        let name = name.clone();
         move || SourceFile::arranged(name, bytes, &arrangement)
     });
     let reader = reader.map_err(|error| broken(&error.to_string()))?;
     let damaged = "this file cannot be read: simplify it, for example with Inkscape";
     reader.join().map_err(|_| broken(damaged))?
+}
+
+fn fonts_of_this_computer() -> Database {
+    let mut fonts = Database::new();
+    fonts.load_system_fonts();
+    fonts
 }
 
 fn open(path: &Path) -> io::Result<(File, Metadata)> {

@@ -3,7 +3,7 @@
 //! While a [`Keyboard`] exists, the terminal hands over each key at once and shows none. Ctrl-C
 //! still interrupts. The terminal is as before when the keyboard is dropped, or when the program
 //! ends by Ctrl-C. There is no keyboard where the standard input or the standard error is no
-//! terminal, and on Windows.
+//! terminal.
 
 use crate::link::Order;
 
@@ -96,28 +96,62 @@ mod terminal {
     }
 }
 
-#[cfg(not(unix))]
+#[cfg(windows)]
 mod terminal {
     use super::Key;
+    use crossterm::event::{Event, KeyCode, KeyEventKind, read};
+    use std::io::{IsTerminal as _, stderr, stdin};
+    use std::sync::mpsc::{self, Receiver};
+    use std::thread;
 
-    /// No keys of the terminal; see the [module](super).
+    /// The keys of the console; see the [module](super). Its modes are left alone: who reads keys
+    /// rather than lines gets them at once, and Ctrl-C interrupts.
     #[derive(Debug)]
-    pub struct Keyboard(());
+    pub struct Keyboard {
+        keys: Receiver<Key>,
+    }
 
     impl Keyboard {
-        /// There is no keyboard on this system.
+        /// Takes the keys of the console; `None` if there is none.
         pub fn take() -> Option<Self> {
-            None
+            if !stdin().is_terminal() || !stderr().is_terminal() {
+                return None;
+            }
+            let (sender, keys) = mpsc::channel();
+            // The thread waits for a key until the program ends.
+            thread::spawn(move || {
+                while let Ok(event) = read() {
+                    let key = pressed(&event).and_then(Key::of);
+                    if key.is_some_and(|key| sender.send(key).is_err()) {
+                        break;
+                    }
+                }
+            });
+            Some(Self { keys })
         }
 
-        /// No key.
+        /// The next key that was pressed, if any.
         pub fn key(&mut self) -> Option<Key> {
-            None
+            self.keys.try_recv().ok()
+        }
+    }
+
+    /// The byte of the key that an event tells of.
+    fn pressed(event: &Event) -> Option<u8> {
+        let Event::Key(key) = event else { return None };
+        match key.code {
+            _ if key.kind == KeyEventKind::Release => None,
+            KeyCode::Enter => Some(b'\n'),
+            KeyCode::Char(letter) => u8::try_from(letter).ok(),
+            _ => None,
         }
     }
 
     /// Nothing was changed.
     pub fn restore() {}
 }
+
+#[cfg(not(any(unix, windows)))]
+compile_error!("there is no keyboard for this system");
 
 pub use terminal::{Keyboard, restore};

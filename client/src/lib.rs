@@ -6,11 +6,12 @@
 //! send. [`sender`] sends these lines over a [`link`] and follows the plotter's replies with
 //! [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an [`emulator`] of
 //! one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
-//! [`penup_job::picture`] renders its path, [`png`] the image of that, and [`output`] writes the
+//! [`penup_job::picture`] renders its path, [`png`] the image of that, [`export`] writes it for
+//! other machines, and [`output`] writes the
 //! files. [`penup_job::results`] are what is known about a job afterwards.
 //!
-//! [`operate`] are the commands for the machine itself, [`ports`] finds it, and [`keyboard`] are
-//! the keys that act while it draws. Every command returns an [`outcome`].
+//! [`operate`] are the commands for the machine itself, [`ports`] finds it, [`rejoin`] waits for it
+//! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command returns an [`outcome`].
 //!
 //! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a job as single motor steps, and
 //! [`motion_plot`] plots its speed.
@@ -21,6 +22,7 @@ pub mod cli;
 pub mod compute;
 pub mod emulator;
 pub mod error;
+pub mod export;
 pub mod fake;
 pub mod files;
 pub mod fit;
@@ -34,10 +36,12 @@ pub mod motion_plot;
 pub mod operate;
 pub mod outcome;
 pub mod output;
+pub mod plot;
 pub mod png;
 pub mod ports;
 pub mod preview;
 pub mod progress;
+pub mod rejoin;
 pub mod run;
 pub mod sender;
 pub mod serve;

@@ -4,7 +4,12 @@
 //! port, an emulated board, the library in memory and the fake plotter of the tests are therefore
 //! all driven by the same code.
 
+use crate::cli::RejoinArgs;
 use crate::keyboard::{Key, Keyboard};
+use crate::ports;
+use crate::rejoin::Rejoining;
+use penup_job::protocol::ABORT;
+use serialport::SerialPort;
 use std::collections::VecDeque;
 use std::io;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
@@ -81,7 +86,7 @@ pub trait Link {
 
 /// A plotter at a serial port, 115200 baud, 8 data bits, no parity, 1 stop bit.
 pub struct SerialLink {
-    port: Box<dyn serialport::SerialPort>,
+    port: Rejoining<Box<dyn SerialPort>>,
     requested_pen: Option<u8>,
     /// Receives a message for each line that the user types; created when the user is asked for the
     /// first time.
@@ -115,6 +120,9 @@ impl SerialLink {
     /// There is no such port, another program uses it, or the user has no permission to open it.
     pub fn open(device: &str) -> Result<Self, serialport::Error> {
         let port = serialport::new(device, BAUD).open()?;
+        let device = device.to_owned();
+        let again = move || serialport::new(device.as_str(), BAUD).open().ok();
+        let port = Rejoining::new(port, Box::new(again));
         let orders = VecDeque::new();
         Ok(Self {
             port,
@@ -124,6 +132,18 @@ impl SerialLink {
             orders,
             is_answered: false,
         })
+    }
+
+    /// The same link, whose plotter is also looked for at other ports when it is gone.
+    #[must_use]
+    pub fn found_again_by_search(mut self) -> Self {
+        self.port.also_open(Box::new(|| ports::find().ok()?.port.into_wire()));
+        self
+    }
+
+    /// From now on, waits for a plotter that has answered and is gone; see [`crate::rejoin`].
+    pub fn rejoin(&mut self, args: &RejoinArgs, is_quiet: bool) {
+        self.port.wait(Duration::from_secs(args.rejoin), is_quiet);
     }
 
     /// Obeys the keys of the terminal from now on ([`crate::keyboard`]). Returns whether there is a
@@ -146,20 +166,16 @@ impl SerialLink {
 
 impl Link for SerialLink {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-        // This is a generous limit: sending a full receive window takes about 25 ms at this speed.
-        self.port.set_timeout(Duration::from_secs(2))?;
-        self.port.write_all(bytes)
+        // An abort must not be lost: who sends it thinks that the machine stops.
+        self.port.send(bytes, bytes.contains(&ABORT))
     }
 
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.port.set_timeout(patience)?;
-        match self.port.read(buffer) {
-            Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
-            Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(0),
-            // A port that is ready to be read but has no data is disconnected.
-            Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
-            result => result,
-        }
+        self.port.receive(buffer, patience)
+    }
+
+    fn now(&self) -> Instant {
+        self.port.now()
     }
 
     /// Asks the user to change the pen, and assumes that it is in when the user has pressed Enter.

@@ -5,6 +5,7 @@ use penup_client::cli::Cli;
 use penup_client::error::Error;
 use penup_client::interrupt;
 use penup_client::outcome::Outcome;
+use penup_client::output::standard_holds_a_file;
 use penup_client::run::run;
 use serde_json::json;
 use std::io::{self, Write};
@@ -46,6 +47,11 @@ fn say(cli: &Cli, outcome: &Outcome) -> Result<(), Error> {
 }
 
 fn print(text: &str) -> Result<(), Error> {
+    if standard_holds_a_file() {
+        // If the standard error cannot be written to, the exit code still tells the outcome.
+        let _ = writeln!(io::stderr(), "{text}");
+        return Ok(());
+    }
     let mut stdout = io::stdout();
     match writeln!(stdout, "{text}").and_then(|()| stdout.flush()) {
         // The reader of the pipe closed it early, as `head` does. This is no error.

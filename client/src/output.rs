@@ -1,10 +1,12 @@
-//! Writes output files atomically: completely or not at all.
+//! Writes output files atomically: completely or not at all. `-` is the standard output; after that
+//! the program says everything else on the standard error.
 
 use crate::error::Error;
 use crate::interrupt::while_unfinished;
 use std::fs;
-use std::io;
+use std::io::{self, Write as _};
 use std::path::{Path, PathBuf, is_separator};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Checks that all outputs can be written, before the work that produces them.
 ///
@@ -15,7 +17,8 @@ use std::path::{Path, PathBuf, is_separator};
 /// The first problem that is found, with the name of the file.
 pub fn check(input: &Path, outputs: &[&Path]) -> Result<(), Error> {
     let input = identity(input);
-    if let Some(output) = outputs.iter().find(|output| identity(output) == input) {
+    let is_input = |output: &&&Path| !is_standard(output) && identity(output) == input;
+    if let Some(output) = outputs.iter().find(is_input) {
         return Err(Error::OutputIsInput { output: output.display().to_string() });
     }
     check_outputs(outputs)
@@ -37,6 +40,22 @@ pub fn check_outputs(outputs: &[&Path]) -> Result<(), Error> {
     Ok(())
 }
 
+/// The name that stands for the standard output.
+const STANDARD_OUTPUT: &str = "-";
+
+/// Whether a file was written to the standard output.
+static STANDARD_HOLDS_A_FILE: AtomicBool = AtomicBool::new(false);
+
+/// Whether a file was written to the standard output, where nothing else belongs then.
+pub fn standard_holds_a_file() -> bool {
+    STANDARD_HOLDS_A_FILE.load(Ordering::Relaxed)
+}
+
+/// Whether `path` stands for the standard output.
+fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_OUTPUT
+}
+
 /// The canonical path of a file, which need not exist yet.
 fn identity(path: &Path) -> PathBuf {
     let beside = || {
@@ -51,6 +70,9 @@ fn identity(path: &Path) -> PathBuf {
 fn try_to_write(path: &Path) -> io::Result<()> {
     if path.is_dir() || path.to_string_lossy().ends_with(is_separator) {
         return Err(io::ErrorKind::IsADirectory.into());
+    }
+    if is_standard(path) {
+        return Ok(());
     }
     match fs::metadata(path) {
         // Pipes are not tested, because opening one would wait for its reader.
@@ -80,6 +102,15 @@ fn unfinished(path: &Path) -> io::Result<PathBuf> {
 /// The operating system's error, with the name of the file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
     let result = match fs::metadata(path) {
+        _ if is_standard(path) => {
+            STANDARD_HOLDS_A_FILE.store(true, Ordering::Relaxed);
+            let mut stdout = io::stdout().lock();
+            match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
+                // The reader of the pipe closed it early, as `head` does. This is no error.
+                Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
+                written => written,
+            }
+        }
         Ok(there) if !there.is_file() => fs::write(path, bytes),
         _ => write_beside(path, bytes),
     };

@@ -80,6 +80,14 @@ pub fn open(device: &str) -> Result<SerialLink, Error> {
         let link = SerialLink::open(device);
         return link.map_err(|source| Error::Port { device: device.to_owned(), source });
     }
+    find().map(SerialLink::found_again_by_search)
+}
+
+/// Finds the only plotter.
+///
+/// # Errors
+/// There is no plotter, or more than one.
+pub fn find() -> Result<SerialLink, Error> {
     let mut asked = ask_all(&candidates()?);
     let is_plotter = |port: &Port| matches!(port.found, Found::Plotter { .. });
     let plotters = asked.iter().filter(|(port, _)| is_plotter(port)).count();

@@ -178,6 +178,11 @@ impl<I: Index> InMemory<I> {
         Ok((job, report))
     }
 
+    /// The speed with the pen down, in mm/min.
+    pub fn draw_speed(&self) -> f64 {
+        self.plotter.machine().settings().get(Setting::DrawSpeed).to_num()
+    }
+
     /// Computes the drawing and measures its moves, as the plotter does before the first move.
     ///
     /// # Errors

@@ -2,40 +2,33 @@
 
 use crate::cli::page;
 use crate::cli::{
-    Cli, Command, FitArgs, PictureArgs, PlotArgs, PreviewArgs, SettingsCommand, TapeCommand,
-    TapeEncodeArgs, TapeShowArgs, ViewArgs,
+    Cli, Command, FitArgs, PictureArgs, PreviewArgs, SettingsCommand, TapeCommand, TapeEncodeArgs,
+    TapeShowArgs, ViewArgs,
 };
-use crate::compute::{self, Capacity, Compute, Known};
 use crate::error::Error;
+use crate::export::{self, Retracing};
 use crate::files;
 use crate::fit::fit_obj;
-use crate::interrupt::MovingPlotter;
-use crate::keyboard::KEYS;
-use crate::link::Link;
 use crate::machine_settings::simulated;
-use crate::machines;
 use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
 use crate::output;
+use crate::plot::{draw, plot};
 use crate::png::png;
-use crate::ports;
 use crate::preview::InMemory;
-use crate::progress::{Bar, Progress, duration};
+use crate::progress::{Bar, duration};
 use crate::sender::{Patience, Sender};
 use crate::tape;
-use crate::workspace;
 use penup::index::Index;
-use penup::machine::{self, Setting};
+use penup::machine::Setting;
 use penup::step::tape::BadCode;
 use penup_job::picture::Picture;
-use penup_job::protocol::Status;
-use penup_job::results::JobReport;
+use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;
-use penup_job::streamed::{Form, StreamedJob};
 use penup_job::{Job, Settings};
-use penup_readers::lines::Lines;
 use penup_readers::{Arrangement, ReadError, SourceFile};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -80,78 +73,15 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
             operate::restore(file, plotter, interrupt)
         }
         Command::Again(args) => operate::again(args, quiet, interrupt),
+        Command::Setup(args) => operate::setup(args, interrupt),
         Command::Console(args) => operate::console(&args.port, args.format.json, interrupt),
         Command::Completions { shell, .. } => Ok(manual::completions(*shell)),
         Command::Man { folder, .. } => manual::pages(folder.as_deref()),
     }
 }
 
-fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
-    // Without a file, a small example is drawn.
-    let example = || workspace::root().join("scenes/interpen.obj");
-    let file = args.file.clone().unwrap_or_else(example);
-    let outputs = Outputs::of(&args.pictures, None, None);
-    if args.port.is_none() {
-        output::check(&file, &outputs.files())?;
-    }
-    let source = read(&file, &args.view, quiet)?;
-    let settings = &source.settings;
-    let mut bar = Bar::new(quiet);
-    if let Some(device) = &args.port {
-        let mut link = ports::open(device)?;
-        let _moving = MovingPlotter::new();
-        if link.obey_keys() && !quiet {
-            note_keys();
-        }
-        let plot = Plot { args, source: &source, file: &file, quiet };
-        let rejoined = plot.rejoin(&mut link, interrupt, &mut bar)?;
-        let report = match rejoined {
-            Some(report) => report,
-            None => {
-                let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
-                let drawn = operate::limits(&mut sender)
-                    .and_then(|known| plot.draw(&mut sender, &known, &mut bar));
-                sender.end();
-                drawn?
-            }
-        };
-        drop(bar);
-        let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
-        let json = json!({ "file": file.display().to_string(), "drawn": report });
-        let drawn = Outcome::done(format!("{} is drawn{text}", file.display()), json);
-        return Ok(source.bounded(drawn));
-    }
-    // On Linux the kernel ends the emulator together with this program. On other systems this
-    // program must end it, so Ctrl-C must not exit at once.
-    let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
-    let mut board = machines::emulate(args.board)?;
-    let moving = MovingPlotter::new();
-    drop(booting);
-    let memory = args.board.memory;
-    let known = Known {
-        capacity: Capacity { vertices: memory.vertices, corners: memory.corners },
-        board: Some(args.board),
-        settings: Some(machine::Settings::default()),
-    };
-    let plot = Plot { args, source: &source, file: &file, quiet };
-    let drawn =
-        Sender::open(board.as_mut(), Patience::default(), interrupt).and_then(|mut sender| {
-            let drawn = plot.draw(&mut sender, &known, &mut bar);
-            sender.end();
-            drawn
-        });
-    let report = drawn.map_err(|error| board.explain(error))?;
-    let pen = board.pen_runs()?;
-    drop(board);
-    drop(moving);
-    let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
-    drop(bar);
-    let files = write_pictures(&picture, &outputs)?;
-    Ok(source.bounded(summary(&files, report)))
-}
-
 fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
-    let outputs = Outputs::of(&args.pictures, args.json.as_deref(), args.motion.as_deref());
+    let outputs = Outputs::of(&args.pictures, Some(args));
     output::check(&args.file, &outputs.files())?;
     let source = read(&args.file, &args.view, quiet)?;
     let mut machine = match &args.machine {
@@ -185,8 +115,19 @@ fn show<I: Index>(
     mut bar: Bar,
     interrupt: &AtomicBool,
 ) -> Result<Outcome, Error> {
+    let passes = args.passes.multipass;
     let report = draw(&mut plotter, &source.job, interrupt, &mut bar)?;
     let mut result = plotter.result()?;
+    if passes > 1 {
+        // The pictures show the first pass. Each other one begins where one has ended.
+        let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;
+        let drawn = sender.plot(&mut bar);
+        sender.end();
+        drawn?;
+        let other = plotter.result()?;
+        result.steps += u64::from(passes - 1) * other.steps;
+        result.duration_s += f64::from(passes - 1) * other.duration_s;
+    }
     for _ in 1..args.repeat {
         result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
     }
@@ -194,8 +135,11 @@ fn show<I: Index>(
     let page = source.settings.page;
     let picture = Picture { page, runs: result.pen.runs.clone(), step: result.pen.step };
     let mut files = write_pictures(&picture, outputs)?;
+    files.extend(write_exports(&picture, args, plotter.draw_speed())?);
     if let Some(path) = &outputs.json {
-        let text = serde_json::to_string(&result).map_err(|error| Error::Write {
+        let whole =
+            PreviewResult { result: &result, passes, bounds: source.extent, drawn: &report };
+        let text = serde_json::to_string(&whole).map_err(|error| Error::Write {
             file: path.display().to_string(),
             source: error.into(),
         })?;
@@ -207,137 +151,46 @@ fn show<I: Index>(
         files.push(path);
     }
     let mut outcome = source.bounded(summary(&files, report));
+    if passes > 1 {
+        outcome.text += &format!(", {passes} passes");
+    }
     let time = duration(result.duration_s.round() as u64);
     outcome.text += &format!(", {time} to draw");
     Ok(outcome)
 }
 
-/// A drawing that is to be plotted.
-struct Plot<'p> {
-    args: &'p PlotArgs,
-    source: &'p Source,
-    file: &'p Path,
-    quiet: bool,
+/// What is written by `penup preview --json`.
+#[derive(Serialize)]
+struct PreviewResult<'a> {
+    #[serde(flatten)]
+    result: &'a JobResult,
+    /// How often everything is drawn; the lengths are those of one pass, and the steps and the
+    /// duration those of all.
+    passes: u32,
+    /// The least and the greatest coordinates of the model, or of the plan in mm.
+    bounds: Option<[[f64; 3]; 2]>,
+    /// The plotter's own report on one pass.
+    drawn: &'a Option<JobReport>,
 }
 
-impl Plot<'_> {
-    fn note(&self, notes: &[String]) {
-        if !self.quiet {
-            note(self.file, notes);
-        }
+/// Writes the drawing for other machines. Returns the names of the files written.
+fn write_exports<'a>(
+    picture: &Picture,
+    args: &'a PreviewArgs,
+    speed: f64,
+) -> Result<Vec<&'a Path>, Error> {
+    let mut files = Vec::new();
+    let retracing = Retracing { passes: args.passes.multipass, reloops: args.reloop };
+    let lines = export::lines(&picture.runs, picture.step, retracing);
+    if let Some(path) = &args.gcode {
+        output::write(path, export::gcode(&lines, speed).as_bytes())?;
+        files.push(path.as_path());
     }
-
-    /// Draws it by a plotter that is idle and of which so much is `known`.
-    fn draw(
-        &self,
-        sender: &mut Sender<'_>,
-        known: &Known,
-        progress: &mut dyn Progress,
-    ) -> Result<Option<JobReport>, Error> {
-        let job = &self.source.job;
-        let compute = if self.args.from > 0 { Compute::Host } else { self.args.compute };
-        let choice = compute::choose(known, job, compute)?;
-        let notes = [choice.totals].into_iter().filter(|totals| !totals.is_empty());
-        self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
-        let Some(mut host) = choice.host else { return draw_by(sender, job, progress) };
-        let form = sender.form()?;
-        let shows_pen = known.settings.is_some_and(|settings| {
-            settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser)
-        });
-        if form == Form::GCode && !shows_pen {
-            let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
-            return Err(Error::NotStreamed { reason: reason.to_owned() });
-        }
-        let (streamed, report) = host.streamed(form, self.args.from)?;
-        let (strokes, points) = (streamed.size().strokes, streamed.targets());
-        self.note(&[format!(
-            "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
-            streamed.bytes() as f64 / f64::from(points.max(1))
-        )]);
-        self.send(sender, &streamed, progress)?;
-        Ok(report)
+    if let Some(path) = &args.hpgl {
+        output::write(path, export::hpgl(&lines).as_bytes())?;
+        files.push(path.as_path());
     }
-
-    /// Sends strokes while they are drawn.
-    fn send(
-        &self,
-        sender: &mut Sender<'_>,
-        streamed: &StreamedJob,
-        progress: &mut dyn Progress,
-    ) -> Result<(), Error> {
-        let mut followed = Followed { progress, begun: 0 };
-        let sent = sender.draw_streamed(streamed, &mut followed);
-        let begun = followed.begun;
-        if sent.is_err() && begun > 0 {
-            // The last stroke that was begun may not be whole.
-            let left_out = u64::from(self.args.from) + begun - 1;
-            self.note(&[format!(
-                "to go on at the stroke that was begun last, add --from {left_out}"
-            )]);
-        }
-        sent
-    }
-
-    /// If the plotter waits for more strokes of this drawing, sends them. `None` if it does
-    /// something else.
-    fn rejoin(
-        &self,
-        link: &mut dyn Link,
-        interrupt: &AtomicBool,
-        progress: &mut dyn Progress,
-    ) -> Result<Option<Option<JobReport>>, Error> {
-        let Some((mut sender, taken)) = Sender::rejoin(link, Patience::default(), interrupt)?
-        else {
-            return Ok(None);
-        };
-        let busy = || Error::NotReady { state: "Run".to_owned() };
-        let settings = simulated(&operate::read_settings(&mut sender)?).map_err(|_| busy())?;
-        let job = &self.source.job;
-        let mut host = InMemory::<u32>::new(Room::for_job(job), settings);
-        if !host.take(job) {
-            return Err(busy());
-        }
-        let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
-        if streamed.id() != taken.id || !streamed.skip(taken.targets) {
-            return Err(busy());
-        }
-        let left = streamed.targets() - taken.targets;
-        self.note(&[format!("the plotter draws this already: the last {left} points are sent")]);
-        let sent = self.send(&mut sender, &streamed, progress);
-        sender.end();
-        sent.map(|()| Some(report))
-    }
-}
-
-/// Notes how many strokes were begun while it passes reports on.
-struct Followed<'p> {
-    progress: &'p mut dyn Progress,
-    begun: u64,
-}
-
-impl Progress for Followed<'_> {
-    fn lines_sent(&mut self, done: usize, all: usize) {
-        self.progress.lines_sent(done, all);
-    }
-
-    fn drawn(&mut self, status: &Status) {
-        self.begun = status.strokes.map_or(self.begun, |(done, _)| done);
-        self.progress.drawn(status);
-    }
-
-    fn state(&mut self, state: &str) {
-        self.progress.state(state);
-    }
-
-    fn note(&mut self, note: &str) {
-        self.progress.note(note);
-    }
-}
-
-/// Says which keys act from now on.
-fn note_keys() {
-    // A closed standard error is no reason to fail.
-    let _ = writeln!(io::stderr(), "penup: while it draws, {KEYS}");
+    Ok(files)
 }
 
 fn fit(args: &FitArgs, quiet: bool) -> Result<Outcome, Error> {
@@ -383,7 +236,7 @@ fn encode_tape(
 }
 
 fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
-    let outputs = Outputs::of(&args.pictures, None, None);
+    let outputs = Outputs::of(&args.pictures, None);
     output::check(&args.file, &outputs.files())?;
     let tape = read_tape(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
@@ -391,7 +244,8 @@ fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
     let files = write_pictures(&picture, &outputs)?;
     let names = names(&files);
     let text = format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len());
-    Ok(Outcome::done(text, json!({ "files": names, "moves": moves, "bytes": tape.len() })))
+    let json = json!({ "files": names, "moves": moves, "bytes": tape.len() });
+    Ok(Outcome::done(text, json))
 }
 
 fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
@@ -403,35 +257,8 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
     move |BadCode { row, code }| Error::Tape { file: file.display().to_string(), row, code }
 }
 
-/// Sends a whole job over `link`, draws it and returns the plotter's report on it, if
-/// it gives one.
-///
-/// # Errors
-/// See [`Sender`].
-pub fn draw(
-    link: &mut dyn Link,
-    job: &dyn Lines,
-    interrupt: &AtomicBool,
-    progress: &mut dyn Progress,
-) -> Result<Option<JobReport>, Error> {
-    let mut sender = Sender::open(link, Patience::default(), interrupt)?;
-    let drawn = draw_by(&mut sender, job, progress);
-    sender.end();
-    drawn
-}
-
-fn draw_by(
-    sender: &mut Sender<'_>,
-    job: &dyn Lines,
-    progress: &mut dyn Progress,
-) -> Result<Option<JobReport>, Error> {
-    sender.stream(job, progress)?;
-    sender.plot(progress)?;
-    sender.report()
-}
-
 /// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.
-fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> {
+pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> {
     let source = files::read(file, view.arrangement())?;
     let settings = view
         .settings_for(&source)
@@ -446,9 +273,11 @@ fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> {
 }
 
 /// A file that was read, with its settings.
-struct Source {
-    job: Job<SourceFile>,
-    settings: Settings,
+pub struct Source {
+    /// What is sent.
+    pub job: Job<SourceFile>,
+    /// The settings of the drawing.
+    pub settings: Settings,
     /// The least and the greatest coordinates.
     extent: Option<[[f64; 3]; 2]>,
     is_plan: bool,
@@ -456,7 +285,7 @@ struct Source {
 
 impl Source {
     /// Adds the bounding box to what is said about the job.
-    fn bounded(&self, mut outcome: Outcome) -> Outcome {
+    pub fn bounded(&self, mut outcome: Outcome) -> Outcome {
         let Some(corners) = self.extent else { return outcome };
         let axes = if self.is_plan { 2 } else { 3 };
         let [low, high] = corners.map(|corner| {
@@ -473,27 +302,33 @@ impl Source {
 }
 
 /// Prints notes on `file` to the standard error.
-fn note(file: &Path, notes: &[String]) {
+pub fn note(file: &Path, notes: &[String]) {
     for note in notes {
         // A closed standard error is no reason to fail.
         let _ = writeln!(io::stderr(), "penup: note: {}: {note}", file.display());
     }
 }
 
-struct Outputs {
+/// The files that a command writes; those that are not named are not written.
+pub struct Outputs {
     svg: Option<PathBuf>,
     png: Option<PathBuf>,
     json: Option<PathBuf>,
     motion: Option<PathBuf>,
+    gcode: Option<PathBuf>,
+    hpgl: Option<PathBuf>,
 }
 
 impl Outputs {
-    fn of(pictures: &PictureArgs, json: Option<&Path>, motion: Option<&Path>) -> Self {
+    /// The files that the arguments name. If there are none, two pictures in the working directory.
+    pub fn of(pictures: &PictureArgs, preview: Option<&PreviewArgs>) -> Self {
         let mut named = Self {
             svg: pictures.svg.clone(),
             png: pictures.png.clone(),
-            json: json.map(Path::to_owned),
-            motion: motion.map(Path::to_owned),
+            json: preview.and_then(|args| args.json.clone()),
+            motion: preview.and_then(|args| args.motion.clone()),
+            gcode: preview.and_then(|args| args.gcode.clone()),
+            hpgl: preview.and_then(|args| args.hpgl.clone()),
         };
         if named.files().is_empty() {
             named.svg = Some("plot.svg".into());
@@ -502,14 +337,15 @@ impl Outputs {
         named
     }
 
-    fn files(&self) -> Vec<&Path> {
-        let all = [&self.svg, &self.png, &self.json, &self.motion];
+    /// The names of all files that will be written.
+    pub fn files(&self) -> Vec<&Path> {
+        let all = [&self.svg, &self.png, &self.json, &self.motion, &self.gcode, &self.hpgl];
         all.into_iter().flatten().map(PathBuf::as_path).collect()
     }
 }
 
 /// Renders all pictures before it writes the first file. Returns the names of the files written.
-fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a Path>, Error> {
+pub fn write_pictures<'a>(picture: &Picture, outputs: &'a Outputs) -> Result<Vec<&'a Path>, Error> {
     let svg = picture.svg();
     let png = match outputs.png.as_deref() {
         Some(path) => Some((path, png(&svg)?)),
@@ -531,7 +367,8 @@ fn names(files: &[&Path]) -> Vec<String> {
     files.iter().map(|path| path.display().to_string()).collect()
 }
 
-fn summary(files: &[&Path], report: Option<JobReport>) -> Outcome {
+/// Says which files were written, and what the plotter reports.
+pub fn summary(files: &[&Path], report: Option<JobReport>) -> Outcome {
     let names = names(files);
     let text = report.as_ref().map_or("drawn".to_owned(), |report| report.to_string());
     let json = json!({ "files": names, "drawn": report });

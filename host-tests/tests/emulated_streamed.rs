@@ -5,9 +5,9 @@
 use penup::board_table::{BoardRow, LM3S6965, PICO};
 use penup::machine::Settings;
 use penup_client::machines::emulate;
+use penup_client::plot::draw;
 use penup_client::preview::InMemory;
 use penup_client::progress::{Progress, Quiet};
-use penup_client::run::draw;
 use penup_client::sender::{Patience, Sender};
 use penup_host_tests::whole_jobs::job_lines;
 use penup_job::path::Run;

@@ -1,5 +1,7 @@
 //! Directions from which a model is seen, in a frame that follows what is up.
 
+use penup_readers::sine_cosine;
+
 /// A point or a direction in space.
 pub type Vector = [f64; 3];
 
@@ -108,17 +110,6 @@ impl Viewpoint {
             elevation if elevation <= -90.0 => [cosine, sine, 0.0],
             _ => [0.0, 0.0, 1.0],
         }
-    }
-}
-
-/// The sine and the cosine of an angle in degrees; exact for quarter turns.
-fn sine_cosine(degrees: f64) -> (f64, f64) {
-    match degrees.rem_euclid(360.0) {
-        0.0 => (0.0, 1.0),
-        90.0 => (1.0, 0.0),
-        180.0 => (0.0, -1.0),
-        270.0 => (-1.0, 0.0),
-        degrees => degrees.to_radians().sin_cos(),
     }
 }
 

@@ -5,7 +5,8 @@
 //! file they come from. [`words`] says in the terms of the command line why one is refused.
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
-//! WebAssembly, the page. A large format is a feature: `dxf`, `ply`, `svg`.
+//! WebAssembly, the page. A large format is a feature: `dxf`, `ply`, `svg`; and `text`
+//! is that of fonts for the texts of SVG files.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
@@ -15,6 +16,7 @@ mod arrange;
 #[cfg(feature = "dxf")]
 mod dxf;
 mod error;
+pub mod fonts;
 mod format;
 mod gcode;
 mod hpgl;
@@ -31,7 +33,7 @@ mod svg;
 mod tape;
 pub mod words;
 
-pub use arrange::{Arrangement, PLAN_OPTIONS, PlanOption, Turn};
+pub use arrange::{Arrangement, PLAN_OPTIONS, PlanOption, Turn, sine_cosine};
 pub use error::ReadError;
 pub use format::SIZE_LIMIT;
 

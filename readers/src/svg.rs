@@ -5,8 +5,9 @@
 //! [`pens`] chooses pens by layers or colours, and [`Plan`] writes the lines that are sent.
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
-//! a shape that is only filled is drawn as its outline. What has neither is not drawn. Text,
-//! images, masks, filters and clip paths that are not convex are counted, and the user is told.
+//! a shape that is only filled is drawn as its outline. What has neither is not drawn. Texts are
+//! drawn as the outlines of their letters, if the caller knows fonts. Images, masks, filters and
+//! clip paths that are not convex are counted, and the user is told.
 //!
 //! The names of layers may hold the codes of AxiDraw ([`axidraw`]).
 //!
@@ -19,6 +20,8 @@ mod drawing;
 mod flatten;
 mod markup;
 mod pens;
+#[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
+mod text;
 
 use super::arrange::Arrangement;
 use super::counted;
@@ -28,6 +31,7 @@ use super::plan::{Area, Plan};
 use crate::page::Page;
 use drawing::{Drawing, PIXEL};
 use markup::Markup;
+use text::TextFonts;
 use usvg::roxmltree::Error as XmlError;
 use usvg::{Error, ImageHrefResolver, Options, Tree};
 
@@ -83,7 +87,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let not_xml = |error| format!("this is not a well-formed SVG: {error}");
     let text = markup::with_ids(text, &markup::parsed(text).map_err(not_xml)?);
     let document = markup::parsed(&text).map_err(not_xml)?;
-    let options = Options {
+    let mut options = Options {
         // Neither is an image drawn, nor any other file read.
         image_href_resolver: ImageHrefResolver {
             resolve_data: Box::new(|_, _, _| None),
@@ -91,6 +95,10 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         },
         ..Options::default()
     };
+    let fonts = markup::has_text(&document).then(|| TextFonts::find(arrangement.fonts)).flatten();
+    if let Some(fonts) = &fonts {
+        fonts.serve(&mut options);
+    }
     let tree = Tree::from_xmltree(&document, &options).map_err(|error| match error {
         Error::InvalidSize => "the SVG has no size: width and height must be above 0".to_owned(),
         Error::ElementsLimitReached | Error::ParsingFailed(XmlError::NodesLimitReached) => {
@@ -124,7 +132,8 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     }
     plan.layers = chosen.layers;
     plan.areas = Some(areas);
-    let mut notes = markup.left_out(&drawing.seen);
+    let mut notes = markup.left_out(&drawing.seen, fonts.is_some());
+    notes.extend(fonts.iter().flat_map(|fonts| fonts.notes(&drawing.texts)));
     notes.extend(pens::not_obeyed(&marks));
     notes.extend(not_as_it_is(&drawing));
     if plan.is_empty() {
@@ -144,7 +153,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
 }
 
 /// What is drawn otherwise than the file says, in sentences for the user.
-fn not_as_it_is(drawing: &Drawing<'_, '_>) -> impl Iterator<Item = String> {
+fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
     [
         (
             drawing.documentation,

@@ -38,6 +38,22 @@ pub struct ConsoleArgs {
     pub format: FormatArgs,
 }
 
+/// How long a plotter that is gone is waited for.
+#[derive(Debug, Args)]
+pub struct RejoinArgs {
+    /// How long to wait for the plotter if its port vanishes or it falls silent in the middle of a
+    /// job; 0 gives up at once
+    #[arg(
+        long,
+        value_name = "SECONDS",
+        default_value = "300",
+        value_parser = clap::value_parser!(u64).range(..=604_800),
+        allow_hyphen_values = true,
+        help_heading = "Plotter"
+    )]
+    pub rejoin: u64,
+}
+
 /// How an answer is printed.
 #[derive(Debug, Args)]
 pub struct FormatArgs {
@@ -68,6 +84,21 @@ pub struct WatchArgs {
     /// The plotter.
     #[command(flatten)]
     pub plotter: PlotterArgs,
+    /// How long a plotter that is gone is waited for.
+    #[command(flatten)]
+    pub rejoin: RejoinArgs,
+}
+
+/// Options of `penup again`.
+#[derive(Debug, Args)]
+#[command(after_help = format!("Keys: {KEYS}, and Ctrl-C stops with the pen up."))]
+pub struct AgainArgs {
+    /// The plotter.
+    #[command(flatten)]
+    pub plotter: PlotterArgs,
+    /// How long a plotter that is gone is waited for.
+    #[command(flatten)]
+    pub rejoin: RejoinArgs,
 }
 
 /// Options of `penup pause`.
@@ -95,6 +126,9 @@ pub struct ResumeArgs {
     /// The plotter.
     #[command(flatten)]
     pub plotter: PlotterArgs,
+    /// How long a plotter that is gone is waited for.
+    #[command(flatten)]
+    pub rejoin: RejoinArgs,
 }
 
 /// Options of `penup jog`.

@@ -5,6 +5,7 @@ mod orders;
 mod rehearsal;
 mod settings;
 mod settings_file;
+mod setup;
 mod status;
 
 pub use console::console;
@@ -13,6 +14,7 @@ pub use rehearsal::limits;
 pub(crate) use settings::read as read_settings;
 pub use settings::{restore, save, set, show};
 pub use settings_file::{SavedSettings, SettingsFileError};
+pub use setup::setup;
 pub use status::{ports, status};
 
 use crate::cli::{PlotterArgs, PortArgs};

@@ -2,7 +2,9 @@
 
 use super::status::{as_json, described};
 use super::{converse, open};
-use crate::cli::{JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, ResumeArgs, WatchArgs};
+use crate::cli::{
+    AgainArgs, JogArgs, PauseArgs, PenArgs, PenPosition, PlotterArgs, ResumeArgs, WatchArgs,
+};
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::outcome::Outcome;
@@ -52,6 +54,7 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
         return Ok(done("it goes on", &sender.resume()?));
     }
     let _moving = MovingPlotter::new();
+    link.rejoin(&args.rejoin, is_quiet);
     link.obey_keys();
     let mut progress = progress(args.plotter.format.json, is_quiet);
     let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
@@ -158,6 +161,7 @@ fn progress(json: bool, is_quiet: bool) -> Box<dyn Progress> {
 /// See [`Sender::watch`].
 pub fn watch(args: &WatchArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.plotter.port)?;
+    link.rejoin(&args.rejoin, is_quiet);
     link.obey_keys();
     let mut progress = progress(args.plotter.format.json, is_quiet);
     let (mut sender, first) = Sender::join(&mut link, Patience::default(), interrupt)?;
@@ -172,11 +176,12 @@ pub fn watch(args: &WatchArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result
 ///
 /// # Errors
 /// The plotter keeps no job, or as [`Sender::again`].
-pub fn again(args: &PlotterArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
-    let mut link = open(&args.port)?;
+pub fn again(args: &AgainArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    let mut link = open(&args.plotter.port)?;
+    link.rejoin(&args.rejoin, is_quiet);
     let _moving = MovingPlotter::new();
     link.obey_keys();
-    let mut progress = progress(args.format.json, is_quiet);
+    let mut progress = progress(args.plotter.format.json, is_quiet);
     let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
     let drawn = sender.again(progress.as_mut()).and_then(|()| sender.status());
     sender.end();

@@ -93,7 +93,7 @@ fn told(changed: usize, wanted: &[AssignedSetting], all: &[AssignedSetting]) -> 
     Outcome::done(text, as_json(&now))
 }
 
-fn as_json(settings: &[AssignedSetting]) -> Value {
+pub(super) fn as_json(settings: &[AssignedSetting]) -> Value {
     let value = |it: &AssignedSetting| it.value.parse::<f64>().map_or(Value::Null, |it| json!(it));
     let pairs = settings.iter().map(|it| (it.number.to_string(), value(it)));
     json!({ "settings": pairs.collect::<Map<_, _>>() })
@@ -101,7 +101,7 @@ fn as_json(settings: &[AssignedSetting]) -> Value {
 
 /// Sets those settings that differ, and checks that the machine then has them. Returns how many
 /// differed.
-fn change(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<usize, Error> {
+pub(super) fn change(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<usize, Error> {
     let before = read(sender)?;
     let differs = |all: &[AssignedSetting], it: &AssignedSetting| {
         !all.iter().any(|now| now.number == it.number && is_same(&now.value, &it.value))
@@ -135,7 +135,7 @@ fn change(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<usize, 
 }
 
 /// Whether two values are the same setting. The plotter rounds to 2^-16 and writes three decimals.
-fn is_same(a: &str, b: &str) -> bool {
+pub(super) fn is_same(a: &str, b: &str) -> bool {
     match (a.parse::<f64>(), b.parse::<f64>()) {
         (Ok(a), Ok(b)) => (a - b).abs() <= 0.0006,
         _ => false,

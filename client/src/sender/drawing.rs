@@ -90,9 +90,15 @@ impl Sender<'_> {
     /// Returns the last status.
     ///
     /// # Errors
-    /// The machine stops with an alarm, stays in feed hold, or falls silent.
+    /// The machine stops with an alarm or before the end of the job, stays in feed hold, or falls
+    /// silent.
     pub fn watch(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
-        self.follow_drawing(None, progress)
+        let status = self.follow_drawing(None, progress)?;
+        let is_done = status.strokes.is_some_and(|(done, all)| done == all && all > 0);
+        match status.stopped {
+            Some((done, all)) if !is_done => Err(Error::JobStopped { done, all }),
+            _ => Ok(status),
+        }
     }
 
     /// Asks for the status until the machine is idle, and lets it go on after pauses. `began` are

@@ -5,10 +5,14 @@ use penup::boards::host::{CutFlash, LAYOUT};
 use penup_client::link::Link as _;
 use penup_client::preview::InMemory;
 use penup_job::room::Room;
-use serialport::{SerialPort as _, TTYPort};
+use rustix::io::ioctl_fionbio;
+use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
+use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
 use std::io::{Read as _, Write as _};
+use std::path::PathBuf;
+use std::process::{Child, Stdio};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -23,46 +27,122 @@ struct Library {
     slow: Arc<AtomicBool>,
     /// Its power is cut, and comes back.
     cut: Arc<AtomicBool>,
+    /// Its cable is pulled, and plugged in again at another port behind the same name.
+    replug: Arc<AtomicBool>,
+    /// It neither hears nor answers.
+    deaf: Arc<AtomicBool>,
+    /// The number of bytes that it has heard.
+    heard: Arc<AtomicUsize>,
     thread: Option<JoinHandle<()>>,
 }
 
 impl Library {
     fn new() -> Self {
-        let (mut wire, terminal) = TTYPort::pair().expect("a pseudo-terminal");
-        wire.set_timeout(Duration::from_millis(1)).expect("set");
-        let device = terminal.name().expect("a name");
-        drop(terminal);
+        let (wire, device) = pseudo_terminal();
+        Self::behind(wire, device, None)
+    }
+
+    /// A plotter whose port has a name in `folder` that stays when it is plugged in again, and whose
+    /// line damages a byte now and then.
+    fn at_a_bad_line(folder: &Path) -> Self {
+        let (wire, device) = pseudo_terminal();
+        let name = folder.join("plotter");
+        std::os::unix::fs::symlink(&device, &name).expect("linked");
+        Self::behind(wire, name.to_string_lossy().into_owned(), Some(name))
+    }
+
+    fn behind(mut wire: fs::File, device: String, name: Option<PathBuf>) -> Self {
         let unplug = Arc::new(AtomicBool::new(false));
         let (drawing, slow) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
         let cut = Arc::new(AtomicBool::new(false));
         let (unplugged, draws, is_slow) = (unplug.clone(), drawing.clone(), slow.clone());
         let is_cut = cut.clone();
+        let (replug, deaf) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicBool::new(false)));
+        let heard = Arc::new(AtomicUsize::new(0));
+        let (is_replugged, is_deaf, counter) = (replug.clone(), deaf.clone(), heard.clone());
+        let mut damaged = 0;
         let thread = std::thread::spawn(move || {
             let room = || Room::of_board(&penup::board_table::PICO);
             let flash = CutFlash::new(LAYOUT.end() as usize);
             let mut plotter = InMemory::<u16>::with_flash(room(), flash);
             let mut heard = Vec::new();
             let mut buffer = [0; 64];
+            let is_bad = name.is_some();
+            // Only what stands in lines is damaged: other bytes may stop the machine.
+            let mut damage = |bytes: &mut [u8]| {
+                for byte in bytes.iter_mut().filter(|byte| is_bad && byte.is_ascii_alphanumeric()) {
+                    damaged += 1;
+                    if damaged % 4999 == 0 {
+                        *byte = b'_';
+                    }
+                }
+            };
             while !unplugged.load(Ordering::Relaxed) {
                 if is_cut.swap(false, Ordering::Relaxed) {
                     let flash = plotter.cut_power().expect("it has flash");
                     plotter = InMemory::with_flash(room(), flash.powered());
                 }
+                if let (true, Some(name)) = (is_replugged.load(Ordering::Relaxed), &name) {
+                    fs::remove_file(name).expect("removed");
+                    let (other, device) = pseudo_terminal();
+                    // The client finds no port for a while.
+                    drop(std::mem::replace(&mut wire, other));
+                    for _ in 0..300 {
+                        plotter.receive(&mut buffer, Duration::ZERO).expect("memory");
+                        std::thread::sleep(Duration::from_millis(1));
+                    }
+                    std::os::unix::fs::symlink(device, name).expect("linked");
+                    is_replugged.store(false, Ordering::Relaxed);
+                }
                 // An error says that the program does not hold its end.
                 if let Ok(count) = wire.read(&mut buffer) {
+                    counter.fetch_add(count, Ordering::Relaxed);
+                    if is_deaf.load(Ordering::Relaxed) {
+                        continue;
+                    }
+                    damage(&mut buffer[..count]);
                     plotter.send(&buffer[..count]).expect("memory");
                     heard.extend_from_slice(&buffer[..count]);
                     if heard.windows(5).any(|bytes| bytes == b"$plot") {
                         draws.store(true, Ordering::Relaxed);
                     }
                 }
+                std::thread::sleep(Duration::from_millis(1));
                 let count = plotter.receive(&mut buffer, Duration::ZERO).expect("memory");
-                let _ = wire.write_all(&buffer[..count]);
+                if !is_deaf.load(Ordering::Relaxed) {
+                    damage(&mut buffer[..count]);
+                    let _ = wire.write_all(&buffer[..count]);
+                }
                 let pause = if is_slow.load(Ordering::Relaxed) { 20 } else { 1 };
                 std::thread::sleep(Duration::from_millis(pause));
             }
         });
-        Self { device, unplug, drawing, slow, cut, thread: Some(thread) }
+        Self { device, unplug, drawing, slow, cut, replug, deaf, heard, thread: Some(thread) }
+    }
+
+    /// Starts to plot a job of twelve metres, four minutes of the plotter's time.
+    fn plot_rows(&self, folder: &Path, options: &[&str]) -> Child {
+        let rows: String =
+            (0..120).map(|row| format!("v 50 {0} 0\nv 150 {0} 0\n", 50 + row)).collect();
+        let lines: String =
+            (0..120).map(|row| format!("l {} {}\n", 2 * row + 1, 2 * row + 2)).collect();
+        fs::write(folder.join("rows.obj"), rows + &lines).expect("written");
+        Command::new(env!("CARGO_BIN_EXE_penup"))
+            .args(["plot", "rows.obj", "--port", &self.device])
+            .args(options)
+            .current_dir(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs")
+    }
+
+    /// Waits until the plot command of this client has come.
+    fn wait_for_drawing(&self, client: &mut Child) {
+        while !self.drawing.load(Ordering::Relaxed) {
+            assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     /// Runs a command that finds this plotter by itself.
@@ -77,6 +157,22 @@ impl Library {
         assert!(!last.is_empty(), "{error}");
         (code, serde_json::from_str(last).expect("JSON"))
     }
+}
+
+/// A pseudo-terminal: the plotter's end, and the name of the other, which nobody holds.
+///
+/// No other program inherits the plotter's end, so the port is gone when that is closed.
+fn pseudo_terminal() -> (fs::File, String) {
+    let flags = OpenptFlags::RDWR | OpenptFlags::NOCTTY | OpenptFlags::CLOEXEC;
+    let wire = openpt(flags).expect("a pseudo-terminal");
+    grantpt(&wire).and_then(|()| unlockpt(&wire)).expect("a terminal");
+    let name = ptsname(&wire, Vec::new()).expect("a name").into_string().expect("text");
+    let terminal = fs::File::open(&name).expect("opened");
+    let mut modes = tcgetattr(&terminal).expect("modes");
+    modes.make_raw();
+    tcsetattr(&terminal, OptionalActions::Now, &modes).expect("set");
+    ioctl_fionbio(&wire, true).expect("set");
+    (wire.into(), name)
 }
 
 impl Drop for Library {
@@ -102,9 +198,7 @@ fn with_ports(folder: &Path, ports: &[&str], arguments: &[&str]) -> (Option<i32>
 #[test]
 fn the_only_plotter_is_found_and_two_are_not_chosen_from() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (_wire, silent) = TTYPort::pair().expect("a pseudo-terminal");
-    let silent_name = silent.name().expect("a name");
-    drop(silent);
+    let (_wire, silent_name) = pseudo_terminal();
     let (first, second) = (Library::new(), Library::new());
     let one = [first.device.as_str(), &silent_name, "/dev/none"];
     let (code, said, error) = with_ports(folder.path(), &one, &["ports"]);
@@ -195,30 +289,12 @@ fn settings_are_saved_changed_and_restored() {
     assert!(error.starts_with("penup: bad.toml: [settings] holds speed"), "{error}");
 }
 
-/// Writes a job of twelve metres, four minutes of the plotter's time, to rows.obj.
-fn write_rows(folder: &Path) {
-    let rows: String = (0..120).map(|row| format!("v 50 {0} 0\nv 150 {0} 0\n", 50 + row)).collect();
-    let lines: String =
-        (0..120).map(|row| format!("l {} {}\n", 2 * row + 1, 2 * row + 2)).collect();
-    fs::write(folder.join("rows.obj"), rows + &lines).expect("written");
-}
-
 #[test]
 fn a_job_goes_on_after_a_loss_of_power() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
-    write_rows(folder.path());
-    let mut client = Command::new(env!("CARGO_BIN_EXE_penup"))
-        .args(["plot", "rows.obj", "--port", &plotter.device])
-        .current_dir(folder.path())
-        .stdout(std::process::Stdio::null())
-        .stderr(std::process::Stdio::null())
-        .spawn()
-        .expect("the program runs");
-    while !plotter.drawing.load(Ordering::Relaxed) {
-        assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let mut client = plotter.plot_rows(folder.path(), &[]);
+    plotter.wait_for_drawing(&mut client);
     client.kill().expect("killed");
     client.wait().expect("it ends");
     // It draws some strokes before its power is cut.
@@ -248,20 +324,11 @@ fn a_job_goes_on_after_a_loss_of_power() {
 fn a_job_goes_on_without_its_client_and_is_joined_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
-    write_rows(folder.path());
-    let mut client = Command::new(env!("CARGO_BIN_EXE_penup"))
-        .args(["plot", "rows.obj", "--port", &plotter.device])
-        .current_dir(folder.path())
-        .stdout(std::process::Stdio::null())
-        .spawn()
-        .expect("the program runs");
+    let mut client = plotter.plot_rows(folder.path(), &[]);
     // The port is the client's as long as it lives.
     let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
     plotter.slow.store(true, Ordering::Relaxed);
-    while !plotter.drawing.load(Ordering::Relaxed) {
-        assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    plotter.wait_for_drawing(&mut client);
     assert_eq!(client.try_wait().expect("a state"), None, "it has drawn already");
     let (code, _, _) = run(&["status"]);
     assert_eq!(code, Some(3), "two programs at one port");
@@ -289,14 +356,179 @@ fn a_job_goes_on_without_its_client_and_is_joined_again() {
     assert_eq!(run(&["watch"]).1, "nothing is being drawn\n");
 }
 
+/// What a program has said when it has ended: its exit code, its answer and its notes.
+fn ended(client: Child) -> (Option<i32>, String, String) {
+    let output = client.wait_with_output().expect("it ends");
+    let text = |bytes: Vec<u8>| String::from_utf8(bytes).expect("text");
+    (output.status.code(), text(output.stdout), text(output.stderr))
+}
+
+#[test]
+fn a_cable_that_is_pulled_costs_neither_the_upload_nor_the_job() {
+    for bytes in [300, 1500, 4000, usize::MAX] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let plotter = Library::at_a_bad_line(folder.path());
+        let mut client = plotter.plot_rows(folder.path(), &[]);
+        let is_due = || match bytes {
+            usize::MAX => plotter.drawing.load(Ordering::Relaxed),
+            bytes => plotter.heard.load(Ordering::Relaxed) >= bytes,
+        };
+        while !is_due() {
+            assert_eq!(client.try_wait().expect("a state"), None, "it ended before");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        plotter.replug.store(true, Ordering::Relaxed);
+        let (code, said, noted) = ended(client);
+        assert_eq!(code, Some(0), "{bytes}: {noted}");
+        assert!(said.starts_with("rows.obj is drawn: 120 strokes, 12000.0 mm drawn"), "{said}");
+        assert!(noted.contains("penup: the port of the plotter is gone: waiting up to 300 s"));
+        assert!(noted.contains("penup: the plotter is back"), "{noted}");
+    }
+}
+
+#[test]
+fn a_plotter_that_falls_silent_is_watched_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::at_a_bad_line(folder.path());
+    let mut client = plotter.plot_rows(folder.path(), &[]);
+    plotter.wait_for_drawing(&mut client);
+    plotter.deaf.store(true, Ordering::Relaxed);
+    // Longer than a client waits for an answer that never comes.
+    std::thread::sleep(Duration::from_secs(6));
+    plotter.deaf.store(false, Ordering::Relaxed);
+    let (code, _, noted) = ended(client);
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("penup: the plotter does not answer: waiting up to 300 s"), "{noted}");
+    assert!(noted.contains("penup: the plotter is back"), "{noted}");
+}
+
+#[test]
+fn a_port_that_stays_away_ends_the_waiting_in_time() {
+    for (seconds, is_told) in [("1", true), ("0", false)] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let plotter = Library::new();
+        let mut client = plotter.plot_rows(folder.path(), &["--rejoin", seconds]);
+        plotter.slow.store(true, Ordering::Relaxed);
+        plotter.wait_for_drawing(&mut client);
+        drop(plotter);
+        let (code, _, noted) = ended(client);
+        assert_eq!(code, Some(5), "{noted}");
+        assert!(noted.contains("the line to the plotter broke: "), "{noted}");
+        assert_eq!(noted.contains("waiting up to 1 s"), is_told, "{noted}");
+    }
+}
+
+#[test]
+fn a_job_that_a_loss_of_power_has_stopped_is_not_taken_for_done() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let mut client = plotter.plot_rows(folder.path(), &[]);
+    plotter.wait_for_drawing(&mut client);
+    client.kill().expect("killed");
+    client.wait().expect("it ends");
+    plotter.slow.store(true, Ordering::Relaxed);
+    let strokes = |status: &serde_json::Value| status["strokes"]["done"].as_u64().unwrap_or(0);
+    while strokes(&plotter.json(folder.path(), &["status"]).1) < 3 {}
+    let watch = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["watch", "--port", &plotter.device])
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let heard = plotter.heard.load(Ordering::Relaxed);
+    while plotter.heard.load(Ordering::Relaxed) < heard + 5 {}
+    plotter.cut.store(true, Ordering::Relaxed);
+    let (code, _, noted) = ended(watch);
+    assert_eq!(code, Some(5), "{noted}");
+    assert!(noted.contains("again") || noted.contains("the job has stopped after "), "{noted}");
+}
+
+#[test]
+fn everything_is_drawn_so_many_times() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nl 1 2\n").expect("written");
+    let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
+    let (code, said, error) = run(&["plot", "a.obj", "--port", "auto", "--multipass", "3"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(said.starts_with("a.obj is drawn 3 times: 1 strokes, 50.0 mm drawn"), "{said}");
+}
+
+/// Runs `penup setup` with these answers.
+fn set_up(plotter: &Library, answers: &str) -> (Option<i32>, serde_json::Value, String) {
+    let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["setup", "--json", "--port", &plotter.device])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let mut typed = program.stdin.take().expect("a pipe");
+    typed.write_all(answers.as_bytes()).expect("written");
+    drop(typed);
+    let (code, said, noted) = ended(program);
+    (code, serde_json::from_str(&said).expect(&noted), noted)
+}
+
+#[test]
+fn a_machine_is_set_up_by_questions() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    // x runs the other way, 100 mm are 98 and 101, and the pen is lowered less.
+    let answers = "\nleft\nup\nbanana\nright\nup\n\n98\n\n101,0\n\n200\n90\n\n\nyes\n";
+    let (code, said, noted) = set_up(&plotter, answers);
+    assert_eq!(code, Some(0), "{noted}");
+    let expected = serde_json::json!({ "3": 1.0, "100": 81.633, "101": 79.208, "211": 90.0 });
+    assert_eq!(said["settings"], expected, "{noted}");
+    assert!(noted.contains("Please type right, left, up, down, not at all."), "{noted}");
+    assert!(noted.contains("Please type a number from 0 to 127."), "{noted}");
+    assert!(noted.contains("both diagonals are the same"), "{noted}");
+    let (_, shown, _) = plotter.run(folder.path(), &["settings", "show"]);
+    for setting in ["  3 = 1 ", "100 = 81.633 ", "101 = 79.20", " 20 = 1 ", "211 = 90 "] {
+        assert!(shown.contains(setting), "{setting}: {shown}");
+    }
+    let (_, status) = plotter.json(folder.path(), &["status"]);
+    assert_eq!(status["strokes"], serde_json::json!({ "done": 1, "all": 1 }));
+}
+
+#[test]
+fn a_setup_that_is_broken_off_says_what_is_stored() {
+    let all = "\nleft\nup\nright\nup\n\n98\n\n101\n\n90\n\n\n";
+    let ends = all.match_indices('\n').map(|(at, _)| at + 1);
+    let folder = tempfile::tempdir().expect("a folder");
+    for end in std::iter::once(0).chain(ends) {
+        let plotter = Library::new();
+        let (code, said, noted) = set_up(&plotter, &all[..end]);
+        assert_eq!(code, Some(0), "{noted}");
+        let (_, now) = plotter.json(folder.path(), &["settings", "show"]);
+        let fresh = Library::new();
+        let (_, new) = fresh.json(folder.path(), &["settings", "show"]);
+        let (now, new) = (now["settings"].as_object().expect("a table"), new["settings"].clone());
+        // What differs from a new machine is what was told.
+        let differs: serde_json::Map<_, _> = now
+            .iter()
+            .filter(|(number, value)| new[number.as_str()] != **value)
+            .map(|(number, value)| (number.clone(), value.clone()))
+            .collect();
+        let told = said["settings"].as_object().expect("a table");
+        assert_eq!(differs.len(), told.len(), "{end}: {differs:?} {told:?}");
+        for (number, value) in told {
+            let (told, now) =
+                (value.as_f64().expect("one"), differs[number].as_f64().expect("one"));
+            assert!((told - now).abs() < 0.001, "{number}: {told} {now}");
+        }
+        assert_eq!(now["20"], 1.0, "soft limits are on as before");
+    }
+}
+
 #[test]
 fn the_console_sends_lines_and_prints_the_answers() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
     let mut console = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(["console", "--port", &plotter.device])
-        .stdin(std::process::Stdio::piped())
-        .stdout(std::process::Stdio::piped())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
         .spawn()
         .expect("the program runs");
     let mut typed = console.stdin.take().expect("a pipe");

@@ -176,12 +176,12 @@ fn an_svg_is_drawn_at_its_place_with_two_pens() {
     let folder = tempfile::tempdir().expect("a folder");
     let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='90mm' height='60mm' \
                viewBox='0 0 90 60'><path d='M0 0H20' stroke='red'/>\
-               <circle cx='70' cy='40' r='20' fill='none' stroke='blue'/><text>a</text></svg>";
+               <circle cx='70' cy='40' r='20' fill='none' stroke='blue'/><image href='a.png' width='9' height='9'/></svg>";
     fs::write(folder.path().join("a.svg"), svg).expect("written");
     let (code, said, noted) = penup(folder.path(), &["preview", "a.svg", "--json", "a.json"]);
     assert_eq!(code, Some(0), "{noted}");
     assert!(said.starts_with("a.json: "), "{said}");
-    assert!(noted.contains("note: a.svg: 1 text is not read"), "{noted}");
+    assert!(noted.contains("note: a.svg: 1 image is not drawn"), "{noted}");
     let json = fs::read_to_string(folder.path().join("a.json")).expect("readable");
     let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
     assert_eq!(result["stroke_pens"], serde_json::json!([1, 2]));
@@ -496,4 +496,98 @@ fn a_broken_emulator_is_reported_in_a_sentence() {
     let details = said.trim().rsplit(' ').next().expect("a file");
     let details = fs::read_to_string(details).expect("kept");
     assert!(details.contains("Object.<anonymous>"), "{details}");
+}
+
+#[test]
+fn a_drawing_is_written_for_other_machines() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let square = "v 10 10 0\nv 60 10 0\nv 60 60 0\nv 10 60 0\nv 80 20 0\nv 80 70 0\n\
+                  usemtl pen1\nl 1 2 3 4 1\nusemtl pen2\nl 5 6\n";
+    fs::write(folder.path().join("a.obj"), square).expect("written");
+    let export = |options: &[&str]| {
+        let all =
+            [&["preview", "a.obj", "--gcode", "a.gcode", "--hpgl", "a.plt"], options].concat();
+        let (code, said, error) = penup(folder.path(), &all);
+        assert_eq!(code, Some(0), "{error}");
+        assert!(said.starts_with("a.gcode, a.plt: 2 strokes, 250.0 mm drawn"), "{said}");
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("readable");
+        (read("a.gcode"), read("a.plt"))
+    };
+    let ink = |file: &str| {
+        let (code, _, error) = penup(folder.path(), &["preview", file, "--json", "ink.json"]);
+        assert_eq!(code, Some(0), "{error}");
+        let json = fs::read_to_string(folder.path().join("ink.json")).expect("readable");
+        let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        result["pen_down_mm"].as_f64().expect("a number")
+    };
+    let (gcode, hpgl) = export(&[]);
+    assert!(gcode.contains("(pen 2)\nM0\n") && hpgl.contains("SP2;"), "{gcode}{hpgl}");
+    for file in ["a.gcode", "a.plt"] {
+        // The files draw the same when they are read again.
+        assert!((ink(file) - 250.0).abs() < 0.1, "{file}");
+    }
+    let (thrice, _) = export(&["--multipass", "3"]);
+    let draws = |text: &str| text.matches("G1 ").count();
+    assert_eq!((draws(&gcode), draws(&thrice)), (5, 15));
+    assert_eq!(thrice.matches("M3").count(), 2, "{thrice}");
+    let (looped, _) = export(&["--reloop"]);
+    assert_eq!(draws(&looped), 5);
+    let (code, _, error) = penup(folder.path(), &["preview", "a.obj", "--reloop"]);
+    assert_eq!(code, Some(2), "{error}");
+}
+
+#[test]
+fn the_standard_output_takes_one_file_and_nothing_else() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nl 1 2\n").expect("written");
+    for (option, begin, end) in [
+        ("--svg", "<svg ", "</svg>\n"),
+        ("--gcode", "(penup ", "M2\n"),
+        ("--hpgl", "IN;", "SP0;\n"),
+        ("--json", "{", "}\n"),
+    ] {
+        let (code, said, error) = penup(folder.path(), &["preview", "a.obj", option, "-"]);
+        assert_eq!(code, Some(0), "{error}");
+        assert!(said.starts_with(begin) && said.ends_with(end), "{said}");
+        assert!(error.starts_with("-: 1 strokes, 50.0 mm drawn"), "{error}");
+    }
+    let (code, _, error) = penup(folder.path(), &["preview", "a.obj", "--svg=-", "--hpgl=-"]);
+    assert_eq!(code, Some(1));
+    assert!(error.contains("give each result a file of its own"), "{error}");
+    assert_eq!(files(folder.path()), ["a.obj"]);
+}
+
+#[test]
+fn what_a_preview_says_stands_in_its_json() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nv 60 35 0\nl 1 2\nl 2 3\n")
+        .expect("written");
+    let json = |options: &[&str]| {
+        let (code, said, error) =
+            penup(folder.path(), &[&["preview", "a.obj", "--json", "a.json"], options].concat());
+        assert_eq!(code, Some(0), "{error}");
+        let json = fs::read_to_string(folder.path().join("a.json")).expect("readable");
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        (said, json)
+    };
+    let (said, once) = json(&[]);
+    assert_eq!(once["bounds"], serde_json::json!([[10.0, 10.0, 0.0], [60.0, 35.0, 0.0]]));
+    assert_eq!(once["passes"], 1);
+    let drawn = &once["drawn"];
+    let figures = format!(
+        "a.json: {} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %; the \
+         drawing reaches from 10, 10 to 60, 35 mm, 0:{:02.0} to draw\n",
+        drawn["strokes"],
+        drawn["pen_down_mm"].as_f64().expect("a number"),
+        drawn["pen_up_mm"].as_f64().expect("a number"),
+        drawn["efficiency_percent"].as_f64().expect("a number"),
+        once["duration_s"].as_f64().expect("a number").round(),
+    );
+    assert_eq!(said, figures);
+    let (said, twice) = json(&["--multipass", "2"]);
+    assert!(said.contains(", 2 passes, "), "{said}");
+    let of = |json: &serde_json::Value, name: &str| json[name].as_f64().expect("a number");
+    assert_eq!(of(&twice, "pen_down_mm"), of(&once, "pen_down_mm"));
+    assert!(of(&twice, "duration_s") > 1.8 * of(&once, "duration_s"));
+    assert!(of(&twice, "steps") > 1.8 * of(&once, "steps"));
 }

@@ -21,6 +21,7 @@ mod table;
 pub(crate) use crop::clip_outline;
 pub use table::{PLAN_OPTIONS, PlanOption};
 
+use crate::fonts::Fonts;
 use crate::page::{A4, Page};
 use crate::plan::{Plan, Point};
 
@@ -57,6 +58,8 @@ pub(crate) struct Hatch {
 /// What is done with a plan before it is drawn.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Arrangement {
+    /// The fonts in which texts are drawn.
+    pub(crate) fonts: Fonts,
     /// The page that the user has named.
     page: Option<Page>,
     turn: Turn,
@@ -79,6 +82,12 @@ impl Arrangement {
     /// nothing stays free on the page of the file, and 10 mm on any other.
     pub fn on(page: Option<Page>, turn: Turn, margin: Option<f64>) -> Self {
         Self { page, turn, margin, ..Self::default() }
+    }
+
+    /// The same, with texts drawn in these fonts.
+    #[must_use]
+    pub fn with_fonts(self, fonts: Fonts) -> Self {
+        Self { fonts, ..self }
     }
 
     /// Whether the user says what stays free on each side of the page.
@@ -182,7 +191,11 @@ fn about_middle(plan: &mut Plan, map: impl Fn(Point) -> Point) {
 }
 
 /// The sine and the cosine of an angle in degrees; exact for quarter turns.
-fn sine_cosine(degrees: f64) -> (f64, f64) {
+///
+/// ```
+/// assert_eq!(penup_readers::sine_cosine(-90.0), (-1.0, 0.0));
+/// ```
+pub fn sine_cosine(degrees: f64) -> (f64, f64) {
     match degrees.rem_euclid(360.0) {
         0.0 => (0.0, 1.0),
         90.0 => (1.0, 0.0),

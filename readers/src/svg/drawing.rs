@@ -9,7 +9,7 @@ use kurbo::{Affine, Point};
 use std::collections::HashSet;
 use usvg::roxmltree::NodeId;
 use usvg::tiny_skia_path::StrokeDash;
-use usvg::{Group, Node, Paint, Path, Transform, Tree};
+use usvg::{Group, Node, Paint, Path, Text, Transform, Tree};
 
 /// The length of a pixel of CSS in mm: there are 96 in an inch.
 pub(super) const PIXEL: f64 = 25.4 / 96.0;
@@ -40,7 +40,7 @@ pub(super) struct Shape {
 
 /// All paths of an SVG, and what could not be drawn as the file says.
 #[derive(Debug)]
-pub(super) struct Drawing<'a, 'input> {
+pub(super) struct Drawing<'a, 'input, 'tree> {
     markup: &'a Markup<'a, 'input>,
     page: ConvexArea,
     with_areas: bool,
@@ -63,6 +63,8 @@ pub(super) struct Drawing<'a, 'input> {
     pub(super) filters: usize,
     /// The number of strokes with so many dashes that they are drawn as full lines.
     pub(super) undashed: usize,
+    /// The texts that are drawn.
+    pub(super) texts: Vec<&'tree Text>,
 }
 
 /// What applies to the contents of a group.
@@ -70,18 +72,20 @@ pub(super) struct Drawing<'a, 'input> {
 struct Context {
     to_page: Affine,
     areas: Vec<ConvexArea>,
-    /// The innermost group that is an element of the file.
+    /// The innermost group or text that is an element of the file.
     element: Option<NodeId>,
+    /// Whether it is the outline of letters.
+    is_text: bool,
 }
 
-impl<'a, 'input> Drawing<'a, 'input> {
+impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
     /// Collects the paths of `tree`, whose page has this size in mm, and their areas if the caller
     /// asks.
     ///
     /// # Errors
     /// There are too many points for the memory, or the page has no area.
     pub(super) fn new(
-        tree: &Tree,
+        tree: &'tree Tree,
         [width, height]: [f64; 2],
         markup: &'a Markup<'a, 'input>,
         with_areas: bool,
@@ -102,14 +106,15 @@ impl<'a, 'input> Drawing<'a, 'input> {
             masks: 0,
             filters: 0,
             undashed: 0,
+            texts: Vec::new(),
         };
         let to_page = Affine::new([PIXEL, 0.0, 0.0, -PIXEL, 0.0, height]);
-        let context = Context { to_page, areas: Vec::new(), element: None };
+        let context = Context { to_page, areas: Vec::new(), element: None, is_text: false };
         drawing.group(tree.root(), &context)?;
         Ok(drawing)
     }
 
-    fn group(&mut self, group: &Group, outside: &Context) -> Result<(), TooManyPoints> {
+    fn group(&mut self, group: &'tree Group, outside: &Context) -> Result<(), TooManyPoints> {
         let mut context = outside.clone();
         if let Some(element) = self.markup.element(group.id()) {
             self.seen.insert(element);
@@ -139,11 +144,23 @@ impl<'a, 'input> Drawing<'a, 'input> {
             match node {
                 Node::Group(group) => self.group(group, &context)?,
                 Node::Path(path) => self.path(path, &context)?,
-                // They are counted in the markup, and `usvg` is built without them.
-                Node::Image(_) | Node::Text(_) => {}
+                Node::Text(text) => self.text(text, &context)?,
+                // They are counted in the markup.
+                Node::Image(_) => {}
             }
         }
         Ok(())
+    }
+
+    /// Draws the outlines of the letters of a text.
+    fn text(&mut self, text: &'tree Text, outside: &Context) -> Result<(), TooManyPoints> {
+        let mut context = Context { is_text: true, ..outside.clone() };
+        if let Some(element) = self.markup.element(text.id()) {
+            self.seen.insert(element);
+            context.element = Some(element);
+        }
+        self.texts.push(text);
+        self.group(text.flattened(), &context)
     }
 
     /// Notes that the contents of a group were found, although they are not drawn.
@@ -196,12 +213,15 @@ impl<'a, 'input> Drawing<'a, 'input> {
             }
         };
         // A path without an id comes from a `use`, where any element may lie behind it.
-        let arcs = if dashed.is_some() { Arcs::None } else { self.markup.arcs(own) };
+        let arcs = match context.is_text {
+            true => Arcs::None,
+            false => self.markup.arcs(own),
+        };
+        let arcs_drawn = if dashed.is_some() { Arcs::None } else { arcs };
         let data = dashed.as_ref().unwrap_or(path.data());
-        let mut polylines = flatten(data, context.to_page, arcs, &mut self.budget)?;
+        let mut polylines = flatten(data, context.to_page, arcs_drawn, &mut self.budget)?;
         let outlines = match fill.map(|fill| fill.paint()) {
             Some(paint) if self.with_areas && !is_white(paint) => {
-                let arcs = self.markup.arcs(own);
                 let whole = flatten(path.data(), context.to_page, arcs, &mut self.budget)?;
                 let areas = context.areas.iter().chain([&self.page]);
                 let sides: Vec<_> = areas.flat_map(ConvexArea::sides).collect();

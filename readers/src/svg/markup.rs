@@ -1,7 +1,7 @@
 //! What the XML of an SVG says and `usvg` does not tell: layers, and what is not drawn.
 //!
-//! `usvg` keeps nothing of an element but its `id`. So every group and shape without one is given
-//! an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
+//! `usvg` keeps nothing of an element but its `id`. So every group, shape and text without one is
+//! given an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
 
 use super::axidraw::Control;
 use super::flatten::Arcs;
@@ -45,14 +45,15 @@ fn is_one_of(node: Node<'_, '_>, names: &[&str]) -> bool {
         && names.contains(&node.tag_name().name())
 }
 
-/// A copy of `text` in which every group, reference and shape has an `id`.
+/// A copy of `text` in which every group, reference, shape and text has an `id`.
 pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let own: HashSet<&str> =
         document.descendants().filter_map(|node| node.attribute("id")).collect();
     let mut copy = String::with_capacity(text.len() + text.len() / 4);
     let (mut copied, mut number) = (0, 0_u32);
     for node in document.descendants() {
-        let is_traced = is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg"]);
+        let is_traced =
+            is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text"]);
         if !is_traced || node.attribute("id").is_some() || node.parent_element().is_none() {
             continue;
         }
@@ -157,8 +158,8 @@ impl<'a, 'input> Markup<'a, 'input> {
     }
 
     /// Counts what the file has that is never drawn, in sentences for the user. `drawn` are the
-    /// elements that were found in the drawing.
-    pub(super) fn left_out(&self, drawn: &HashSet<NodeId>) -> Vec<String> {
+    /// elements that were found in the drawing, and `reads_text` says whether there are fonts.
+    pub(super) fn left_out(&self, drawn: &HashSet<NodeId>, reads_text: bool) -> Vec<String> {
         let mut texts = Count::default();
         let mut images = Count::default();
         let mut foreign = Count::default();
@@ -169,6 +170,10 @@ impl<'a, 'input> Markup<'a, 'input> {
                 continue;
             }
             let counted = if is_one_of(node, &["text"]) {
+                let is_expected = has_letters(node) && !is_within(node, &NOT_DRAWN);
+                if drawn.contains(&node.id()) || !is_expected {
+                    continue;
+                }
                 &mut texts
             } else if is_one_of(node, &["image"]) {
                 &mut images
@@ -190,7 +195,11 @@ impl<'a, 'input> Markup<'a, 'input> {
             }
         }
         let mut said = Vec::new();
-        texts.say(&mut said, ["text is", "texts are"], "not read: convert text to paths");
+        let what = match reads_text {
+            true => "not drawn, because no font for it is found: convert text to paths",
+            false => "not read: convert text to paths",
+        };
+        texts.say(&mut said, ["text is", "texts are"], what);
         images.say(&mut said, ["image is", "images are"], "not drawn");
         let what = "not drawn: it is not SVG";
         foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
@@ -226,6 +235,17 @@ impl Count {
             _ => said.push(format!("{number} {many} {what} (the first in line {line})")),
         }
     }
+}
+
+/// Whether the file has a text.
+pub(super) fn has_text(document: &Document<'_>) -> bool {
+    document.descendants().any(|node| is_one_of(node, &["text"]))
+}
+
+/// Whether a text has letters.
+fn has_letters(text: Node<'_, '_>) -> bool {
+    let mut letters = text.descendants().filter_map(|node| node.text());
+    letters.any(|letters| !letters.trim().is_empty())
 }
 
 fn is_within(node: Node<'_, '_>, names: &[&str]) -> bool {

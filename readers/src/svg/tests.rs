@@ -465,3 +465,6 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
     let error = SourceFile::new("a.svg".to_owned(), b"<svg>\xFF".to_vec()).expect_err("no text");
     assert!(error.to_string().contains("UTF-8"), "{error}");
 }
+
+#[cfg(feature = "text")]
+mod texts;

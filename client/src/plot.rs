@@ -1,0 +1,269 @@
+//! The command `plot`: who computes the drawing, and how it is sent.
+
+use crate::cli::PlotArgs;
+use crate::compute::{self, Capacity, Compute, Known};
+use crate::error::Error;
+use crate::interrupt::MovingPlotter;
+use crate::keyboard::KEYS;
+use crate::link::Link;
+use crate::machine_settings::simulated;
+use crate::machines;
+use crate::operate;
+use crate::outcome::Outcome;
+use crate::output;
+use crate::ports;
+use crate::preview::InMemory;
+use crate::progress::{Bar, Progress};
+use crate::run::{Outputs, Source, note, read, summary, write_pictures};
+use crate::sender::{Patience, Sender};
+use crate::workspace;
+use penup::machine::{self, Setting};
+use penup_job::picture::Picture;
+use penup_job::protocol::Status;
+use penup_job::results::JobReport;
+use penup_job::room::Room;
+use penup_job::streamed::{Form, StreamedJob};
+use penup_readers::lines::Lines;
+use serde_json::json;
+use std::io::{self, Write as _};
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+
+/// Draws a file by a plotter at a port, or by an emulated board.
+///
+/// # Errors
+/// See [`Error`].
+pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    // Without a file, a small example is drawn.
+    let example = || workspace::root().join("scenes/interpen.obj");
+    let file = args.file.clone().unwrap_or_else(example);
+    let outputs = Outputs::of(&args.pictures, None);
+    if args.port.is_none() {
+        output::check(&file, &outputs.files())?;
+    }
+    let source = read(&file, &args.view, quiet)?;
+    let settings = &source.settings;
+    let mut bar = Bar::new(quiet);
+    if let Some(device) = &args.port {
+        let mut link = ports::open(device)?;
+        link.rejoin(&args.rejoin, quiet);
+        let _moving = MovingPlotter::new();
+        if link.obey_keys() && !quiet {
+            note_keys();
+        }
+        let plot = Plot { args, source: &source, file: &file, quiet };
+        let rejoined = plot.rejoin(&mut link, interrupt, &mut bar)?;
+        let (report, passes) = match rejoined {
+            // Nobody knows which pass it was.
+            Some(report) => (report, 1),
+            None => {
+                let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+                let drawn = operate::limits(&mut sender)
+                    .and_then(|known| plot.draw(&mut sender, &known, &mut bar));
+                sender.end();
+                (drawn?, args.passes.multipass)
+            }
+        };
+        drop(bar);
+        if passes < args.passes.multipass {
+            plot.note(&["this pass is drawn to its end; begin the others anew".to_owned()]);
+        }
+        let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
+        let json = json!({ "file": file.display().to_string(), "drawn": report, "passes": passes });
+        let times = if passes > 1 { format!(" {passes} times") } else { String::new() };
+        let drawn = Outcome::done(format!("{} is drawn{times}{text}", file.display()), json);
+        return Ok(source.bounded(drawn));
+    }
+    // On Linux the kernel ends the emulator together with this program. On other systems this
+    // program must end it, so Ctrl-C must not exit at once.
+    let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
+    let mut board = machines::emulate(args.board)?;
+    let moving = MovingPlotter::new();
+    drop(booting);
+    let memory = args.board.memory;
+    let known = Known {
+        capacity: Capacity { vertices: memory.vertices, corners: memory.corners },
+        board: Some(args.board),
+        settings: Some(machine::Settings::default()),
+    };
+    let plot = Plot { args, source: &source, file: &file, quiet };
+    let drawn =
+        Sender::open(board.as_mut(), Patience::default(), interrupt).and_then(|mut sender| {
+            let drawn = plot.draw(&mut sender, &known, &mut bar);
+            sender.end();
+            drawn
+        });
+    let report = drawn.map_err(|error| board.explain(error))?;
+    let pen = board.pen_runs()?;
+    drop(board);
+    drop(moving);
+    let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
+    drop(bar);
+    let files = write_pictures(&picture, &outputs)?;
+    Ok(source.bounded(summary(&files, report)))
+}
+
+/// A drawing that is to be plotted.
+struct Plot<'p> {
+    args: &'p PlotArgs,
+    source: &'p Source,
+    file: &'p Path,
+    quiet: bool,
+}
+
+impl Plot<'_> {
+    fn note(&self, notes: &[String]) {
+        if !self.quiet {
+            note(self.file, notes);
+        }
+    }
+
+    /// Draws it by a plotter that is idle and of which so much is `known`.
+    fn draw(
+        &self,
+        sender: &mut Sender<'_>,
+        known: &Known,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<JobReport>, Error> {
+        let job = &self.source.job;
+        let compute = if self.args.from > 0 { Compute::Host } else { self.args.compute };
+        let choice = compute::choose(known, job, compute)?;
+        let notes = [choice.totals].into_iter().filter(|totals| !totals.is_empty());
+        self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
+        let passes = self.args.passes.multipass;
+        let Some(mut host) = choice.host else { return draw_by(sender, job, passes, progress) };
+        let form = sender.form()?;
+        let shows_pen = known.settings.is_some_and(|settings| {
+            settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser)
+        });
+        if form == Form::GCode && !shows_pen {
+            let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
+            return Err(Error::NotStreamed { reason: reason.to_owned() });
+        }
+        let (streamed, report) = host.streamed(form, self.args.from)?;
+        let (strokes, points) = (streamed.size().strokes, streamed.targets());
+        self.note(&[format!(
+            "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
+            streamed.bytes() as f64 / f64::from(points.max(1))
+        )]);
+        self.send(sender, &streamed, progress)?;
+        // Strokes that were left out once are drawn from then on.
+        let whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
+        for _ in 1..passes {
+            self.send(sender, &whole, progress)?;
+        }
+        Ok(report)
+    }
+
+    /// Sends strokes while they are drawn.
+    fn send(
+        &self,
+        sender: &mut Sender<'_>,
+        streamed: &StreamedJob,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
+        let mut followed = Followed { progress, begun: 0 };
+        let sent = sender.draw_streamed(streamed, &mut followed);
+        let begun = followed.begun;
+        if sent.is_err() && begun > 0 {
+            // The last stroke that was begun may not be whole.
+            let left_out = u64::from(self.args.from) + begun - 1;
+            self.note(&[format!(
+                "to go on at the stroke that was begun last, add --from {left_out}"
+            )]);
+        }
+        sent
+    }
+
+    /// If the plotter waits for more strokes of this drawing, sends them. `None` if it does
+    /// something else.
+    fn rejoin(
+        &self,
+        link: &mut dyn Link,
+        interrupt: &AtomicBool,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<Option<JobReport>>, Error> {
+        let Some((mut sender, taken)) = Sender::rejoin(link, Patience::default(), interrupt)?
+        else {
+            return Ok(None);
+        };
+        let busy = || Error::NotReady { state: "Run".to_owned() };
+        let settings = simulated(&operate::read_settings(&mut sender)?).map_err(|_| busy())?;
+        let job = &self.source.job;
+        let mut host = InMemory::<u32>::new(Room::for_job(job), settings);
+        if !host.take(job) {
+            return Err(busy());
+        }
+        let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
+        if streamed.id() != taken.id || !streamed.skip(taken.targets) {
+            return Err(busy());
+        }
+        let left = streamed.targets() - taken.targets;
+        self.note(&[format!("the plotter draws this already: the last {left} points are sent")]);
+        let sent = self.send(&mut sender, &streamed, progress);
+        sender.end();
+        sent.map(|()| Some(report))
+    }
+}
+
+/// Notes how many strokes were begun while it passes reports on.
+struct Followed<'p> {
+    progress: &'p mut dyn Progress,
+    begun: u64,
+}
+
+impl Progress for Followed<'_> {
+    fn lines_sent(&mut self, done: usize, all: usize) {
+        self.progress.lines_sent(done, all);
+    }
+
+    fn drawn(&mut self, status: &Status) {
+        self.begun = status.strokes.map_or(self.begun, |(done, _)| done);
+        self.progress.drawn(status);
+    }
+
+    fn state(&mut self, state: &str) {
+        self.progress.state(state);
+    }
+
+    fn note(&mut self, note: &str) {
+        self.progress.note(note);
+    }
+}
+
+/// Says which keys act from now on.
+fn note_keys() {
+    // A closed standard error is no reason to fail.
+    let _ = writeln!(io::stderr(), "penup: while it draws, {KEYS}");
+}
+
+/// Sends a whole job over `link`, draws it and returns the plotter's report on it, if
+/// it gives one.
+///
+/// # Errors
+/// See [`Sender`].
+pub fn draw(
+    link: &mut dyn Link,
+    job: &dyn Lines,
+    interrupt: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<Option<JobReport>, Error> {
+    let mut sender = Sender::open(link, Patience::default(), interrupt)?;
+    let drawn = draw_by(&mut sender, job, 1, progress);
+    sender.end();
+    drawn
+}
+
+/// Sends a whole job, and draws all of it so many times.
+fn draw_by(
+    sender: &mut Sender<'_>,
+    job: &dyn Lines,
+    passes: u32,
+    progress: &mut dyn Progress,
+) -> Result<Option<JobReport>, Error> {
+    sender.stream(job, progress)?;
+    for _ in 0..passes {
+        sender.plot(progress)?;
+    }
+    sender.report()
+}

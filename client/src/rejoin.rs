@@ -1,0 +1,268 @@
+//! A plotter at a serial port that may vanish and come back: a cable that was pulled, a computer
+//! that slept.
+//!
+//! While the plotter is gone, its clock stands still for the program, so that no time runs out; what
+//! is sent is lost, as on a bad cable, and sent again by the rules for damaged lines. The port is
+//! opened again as soon as it is there, and the plotter is asked until it answers.
+
+use std::io::{self, Write as _};
+use std::time::{Duration, Instant};
+
+/// The time without a byte after which a plotter that was asked is gone.
+const SILENCE: Duration = Duration::from_secs(3);
+
+/// The time between two attempts to reach the plotter.
+const PAUSE: Duration = Duration::from_millis(250);
+
+/// A wait that takes so much longer than it should was a sleep of the computer.
+const SLEEP: Duration = Duration::from_secs(2);
+
+/// The stream of bytes of an open port.
+pub trait Wire: io::Read + io::Write {
+    /// Sets the longest time that a call of `read` or `write` takes.
+    ///
+    /// # Errors
+    /// The port is gone.
+    fn set_patience(&mut self, patience: Duration) -> io::Result<()>;
+}
+
+impl Wire for Box<dyn serialport::SerialPort> {
+    fn set_patience(&mut self, patience: Duration) -> io::Result<()> {
+        Ok(self.set_timeout(patience)?)
+    }
+}
+
+/// Opens the port of the plotter again; `None` while it is not there.
+pub type Open<W> = Box<dyn FnMut() -> Option<W> + Send>;
+
+/// Why a plotter is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Why {
+    Port,
+    Silence,
+}
+
+/// The time since which a plotter is gone, and why.
+#[derive(Debug, Clone, Copy)]
+struct Gone {
+    since: Instant,
+    why: Why,
+    last_attempt: Instant,
+}
+
+/// A port, and what is done when the plotter at its other end is gone.
+pub struct Rejoining<W> {
+    wire: Option<W>,
+    open: Open<W>,
+    /// The longest time for which the plotter is waited for; none if the caller has not asked for
+    /// it.
+    limit: Option<Duration>,
+    is_quiet: bool,
+    gone: Option<Gone>,
+    /// How long the plotter was gone in all.
+    lost: Duration,
+    /// When the last byte came; `None` before the first.
+    heard: Option<Instant>,
+    /// Whether the plotter was asked for something since then.
+    is_asked: bool,
+}
+
+impl<W: Wire> Rejoining<W> {
+    /// Takes an open port. It does not wait for a plotter that is gone until [`Rejoining::wait`]
+    /// says so.
+    pub fn new(wire: W, open: Open<W>) -> Self {
+        Self {
+            wire: Some(wire),
+            open,
+            limit: None,
+            is_quiet: false,
+            gone: None,
+            lost: Duration::ZERO,
+            heard: None,
+            is_asked: false,
+        }
+    }
+
+    /// Opens the port by `other` where it is not there any more.
+    pub fn also_open(&mut self, mut other: Open<W>)
+    where
+        W: 'static,
+    {
+        let mut first = std::mem::replace(&mut self.open, Box::new(|| None));
+        self.open = Box::new(move || first().or_else(&mut *other));
+    }
+
+    /// The open port.
+    pub fn into_wire(self) -> Option<W> {
+        self.wire
+    }
+
+    /// From now on, waits so long for a plotter that has answered and is gone. Says so on the
+    /// standard error unless the user wants quiet.
+    pub fn wait(&mut self, limit: Duration, is_quiet: bool) {
+        self.limit = Some(limit).filter(|limit| !limit.is_zero());
+        self.is_quiet = is_quiet;
+    }
+
+    /// The time as a conversation counts it: it stands still while the plotter is gone.
+    pub fn now(&self) -> Instant {
+        let now = self.gone.map_or_else(Instant::now, |gone| gone.since);
+        now.checked_sub(self.lost).unwrap_or(now)
+    }
+
+    /// Sends all of `bytes`. While the plotter is gone they are lost, unless `must_arrive`.
+    ///
+    /// # Errors
+    /// The port is gone and is not waited for, or the bytes must arrive.
+    pub fn send(&mut self, bytes: &[u8], must_arrive: bool) -> io::Result<()> {
+        if self.gone.is_some() {
+            return if must_arrive { Err(gone_for_good()) } else { Ok(()) };
+        }
+        self.is_asked = true;
+        match self.write(bytes) {
+            Err(_) if self.may_wait() && !must_arrive => {
+                self.leave(Why::Port);
+                Ok(())
+            }
+            result => result,
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let Some(wire) = &mut self.wire else { return Err(gone_for_good()) };
+        // This is a generous limit: sending a full receive window takes about 25 ms.
+        wire.set_patience(Duration::from_secs(2))?;
+        wire.write_all(bytes)
+    }
+
+    /// Waits up to `patience` for bytes, and for a plotter that is gone. Returns 0 if none came.
+    ///
+    /// # Errors
+    /// The port is gone, and is not waited for any longer.
+    pub fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let begin = Instant::now();
+        if self.gone.is_some() {
+            self.look_for(patience)?;
+            if self.wire.is_none() {
+                return Ok(0);
+            }
+        }
+        match self.read(buffer, patience) {
+            Ok(0) => {
+                self.note_silence(begin, patience);
+                Ok(0)
+            }
+            Ok(count) => {
+                self.join();
+                (self.heard, self.is_asked) = (Some(Instant::now()), false);
+                Ok(count)
+            }
+            Err(_) if self.may_wait() => {
+                self.leave(Why::Port);
+                Ok(0)
+            }
+            Err(error) => Err(error),
+        }
+    }
+
+    fn read(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let Some(wire) = &mut self.wire else { return Ok(0) };
+        wire.set_patience(patience)?;
+        match wire.read(buffer) {
+            Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(0),
+            // A port that is ready to be read but has no data is disconnected.
+            Ok(0) => Err(io::ErrorKind::BrokenPipe.into()),
+            result => result,
+        }
+    }
+
+    /// Whether a plotter that is gone is waited for.
+    fn may_wait(&self) -> bool {
+        self.limit.is_some() && self.heard.is_some()
+    }
+
+    /// Notices that the plotter has fallen silent, or that the computer slept.
+    fn note_silence(&mut self, begin: Instant, patience: Duration) {
+        let slept = begin.elapsed().saturating_sub(patience);
+        if slept > SLEEP {
+            self.lost += slept;
+            self.heard = self.heard.map(|heard| heard + slept);
+        }
+        let is_silent = self.heard.is_some_and(|heard| heard.elapsed() > SILENCE);
+        if self.gone.is_none() && self.is_asked && is_silent && self.may_wait() {
+            self.leave(Why::Silence);
+        }
+    }
+
+    /// The plotter is gone from now on.
+    fn leave(&mut self, why: Why) {
+        let now = Instant::now();
+        let since = self.gone.map_or(now, |gone| gone.since);
+        let is_new = self.gone.is_none();
+        self.gone = Some(Gone { since, why, last_attempt: now });
+        if why == Why::Port {
+            // An open port keeps its name from the plotter that comes back.
+            self.wire = None;
+        }
+        if is_new {
+            let limit = self.limit.unwrap_or_default().as_secs();
+            self.say(&match why {
+                Why::Port => format!("the port of the plotter is gone: waiting up to {limit} s"),
+                Why::Silence => format!("the plotter does not answer: waiting up to {limit} s"),
+            });
+        }
+    }
+
+    /// The plotter is back.
+    fn join(&mut self) {
+        if let Some(gone) = self.gone.take() {
+            self.lost += gone.since.elapsed();
+            self.say("the plotter is back");
+        }
+    }
+
+    /// Tries to reach the plotter again, after a pause since the last time.
+    fn look_for(&mut self, patience: Duration) -> io::Result<()> {
+        let Some(mut gone) = self.gone else { return Ok(()) };
+        if self.limit.is_some_and(|limit| gone.since.elapsed() > limit) {
+            return Err(match gone.why {
+                Why::Port => gone_for_good(),
+                Why::Silence => {
+                    io::Error::new(io::ErrorKind::TimedOut, "the plotter does not answer any more")
+                }
+            });
+        }
+        if gone.last_attempt.elapsed() < PAUSE {
+            if self.wire.is_none() {
+                std::thread::sleep(patience);
+            }
+            return Ok(());
+        }
+        gone.last_attempt = Instant::now();
+        self.gone = Some(gone);
+        // The line end terminates what is left of a line that was cut.
+        let question: &[u8] = if self.wire.is_none() { b"\n?" } else { b"?" };
+        if self.wire.is_none() {
+            self.wire = (self.open)();
+        }
+        if self.wire.is_some() && self.write(question).is_err() {
+            self.leave(Why::Port);
+        }
+        Ok(())
+    }
+
+    fn say(&self, text: &str) {
+        if !self.is_quiet {
+            // A progress bar stands in this line. A closed standard error is no reason to fail.
+            let _ = writeln!(io::stderr(), "\r\x1b[2Kpenup: {text}");
+        }
+    }
+}
+
+fn gone_for_good() -> io::Error {
+    io::Error::new(
+        io::ErrorKind::BrokenPipe,
+        "the port of the plotter is gone; once it is back, `penup watch` follows the job",
+    )
+}
