@@ -2,12 +2,12 @@
 //! plotter, what the plotter answers, and what it then draws.
 //!
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
-//! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a user
-//! wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes what the
-//! plotter must then contain, and [`room`] the memory that takes. [`streamed`] makes lines of what
-//! this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], of which
-//! [`sampled`] keeps what a page shows; [`strokes`] and [`results`] tell what was drawn, [`picture`]
-//! shows it, and [`export`] writes it for other machines.
+//! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a
+//! user wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes
+//! what the plotter must then contain, and [`room`] the memory that takes. [`streamed`] makes lines
+//! of what this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], of
+//! which [`sampled`] keeps what a page shows. [`strokes`] and [`results`] tell what was drawn,
+//! [`picture`] shows it, and [`export`] writes it for other machines.
 //!
 //! Nothing here opens a file or a port, starts a thread, or reads a clock.
 

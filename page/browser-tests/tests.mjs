@@ -308,7 +308,8 @@ test("without a network it works once it was loaded", async () => {
 
 /** Starts `penup page` with these arguments. Returns its address, and how to end it. */
 async function program(...more) {
-  const started = spawn(PENUP, ["page", ...more, "--no-browser", "--folder", process.env.PENUP_PAGE]);
+  const own = ["--no-browser", "--folder", process.env.PENUP_PAGE];
+  const started = spawn(PENUP, ["page", ...more, ...own]);
   let said = "";
   started.stderr.on("data", (text) => (said += text));
   const address = await new Promise((done, fail) => {
@@ -536,8 +537,8 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
   const depth = 60_000;
   await writeFile(
     nested,
-    `<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">${"<g>".repeat(depth)}<path d="M0 0H9"/>` +
-      `${"</g>".repeat(depth)}</svg>`,
+    '<svg xmlns="http://www.w3.org/2000/svg" width="9" height="9">' +
+      `${"<g>".repeat(depth)}<path d="M0 0H9"/>${"</g>".repeat(depth)}</svg>`,
   );
   await page.setInputFiles("#file", nested);
   await page.waitForFunction(() => /nested/.test(document.querySelector("#error p").textContent));

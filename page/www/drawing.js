@@ -183,7 +183,8 @@ export class Drawing {
     const { path, ends, seconds } = this.computed;
     const { time, view } = this;
     const end = indexAt(path, time);
-    if (time < seconds) yield* view.path(brush, path, path.length / SAMPLE, { first: end, faint: true });
+    const rest = { first: end, faint: true };
+    if (time < seconds) yield* view.path(brush, path, path.length / SAMPLE, rest);
     if ($("show-up").checked) yield* view.moves(brush, ends);
     yield* view.path(brush, path, end);
     const now = penAt(path, time);

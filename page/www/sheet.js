@@ -221,8 +221,8 @@ export class SheetView {
   }
 
   /**
-   * Draws the moves with the pen up between strokes, with an arrow at the middle of each. `ends` are
-   * x and y where each stroke begins and where it ends.
+   * Draws the moves with the pen up between strokes, with an arrow at the middle of each. `ends`
+   * are x and y where each stroke begins and where it ends.
    */
   *moves(brush, ends) {
     const size = Math.max(0.9, 4 * this.pixel);
