@@ -397,7 +397,7 @@ impl Interpreter {
             if fill.is_solid() {
                 // The lines at the borders lie within them.
                 let pitch = fill.thickness.max(LEAST_PITCH);
-                let count = (most - least + pitch - 1) / pitch; // at least 1
+                let count = ((most - least + pitch - 1) / pitch).max(1);
                 hatch.pitch = ((most - least) / count).max(1);
                 hatch.base = least + hatch.pitch / 2;
             } else {
