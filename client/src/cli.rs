@@ -283,8 +283,8 @@ pub struct PlotArgs {
 /// How often everything is drawn.
 #[derive(Debug, Args)]
 pub struct PassesArgs {
-    /// Draw everything this many times; a plotter draws the whole again, and --gcode and --hpgl draw
-    /// each line again without lifting the pen
+    /// Draw everything this many times; a plotter draws the whole again, and --gcode and --hpgl
+    /// draw each line again without lifting the pen
     #[arg(
         long,
         value_name = "N",
@@ -324,8 +324,8 @@ pub struct PreviewArgs {
     /// Write the drawing as HP-GL, in units of 0.025 mm
     #[arg(long, value_name = "FILE", help_heading = "Output", group = "export")]
     pub hpgl: Option<PathBuf>,
-    /// Begin closed lines at random points in --gcode and --hpgl, so that the marks of the pen do not
-    /// stand in a row; else they begin where the moves between lines become short
+    /// Begin closed lines at random points in --gcode and --hpgl, so that the marks of the pen do
+    /// not stand in a row; else they begin where the moves between lines become short
     #[arg(long, requires = "export", help_heading = "Output")]
     pub reloop: bool,
     /// Plot speed, acceleration and jerk over time to this SVG file

@@ -11,7 +11,8 @@
 //! files. [`penup_job::results`] are what is known about a job afterwards.
 //!
 //! [`operate`] are the commands for the machine itself, [`ports`] finds it, [`rejoin`] waits for it
-//! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command returns an [`outcome`].
+//! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command
+//! returns an [`outcome`].
 //!
 //! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a job as single motor steps, and
 //! [`motion_plot`] plots its speed.

@@ -1,9 +1,9 @@
 //! A plotter at a serial port that may vanish and come back: a cable that was pulled, a computer
 //! that slept.
 //!
-//! While the plotter is gone, its clock stands still for the program, so that no time runs out; what
-//! is sent is lost, as on a bad cable, and sent again by the rules for damaged lines. The port is
-//! opened again as soon as it is there, and the plotter is asked until it answers.
+//! While the plotter is gone, its clock stands still for the program, so that no time runs out;
+//! what is sent is lost, as on a bad cable, and sent again by the rules for damaged lines. The port
+//! is opened again as soon as it is there, and the plotter is asked until it answers.
 
 use std::io::{self, Write as _};
 use std::time::{Duration, Instant};

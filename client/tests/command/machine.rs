@@ -42,8 +42,8 @@ impl Library {
         Self::behind(wire, device, None)
     }
 
-    /// A plotter whose port has a name in `folder` that stays when it is plugged in again, and whose
-    /// line damages a byte now and then.
+    /// A plotter whose port has a name in `folder` that stays when it is plugged in again, and
+    /// whose line damages a byte now and then.
     fn at_a_bad_line(folder: &Path) -> Self {
         let (wire, device) = pseudo_terminal();
         let name = folder.join("plotter");
