@@ -9,7 +9,7 @@ use penup::checksum::CRC_16;
 use penup::machine::Settings;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use penup_job::protocol::{
-    ABORT, AGAIN, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SETTINGS, SLOWER,
+    ABORT, AGAIN, BUILD, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SETTINGS, SLOWER,
 };
 use penup_job::twin;
 use penup_readers::lines::JobLine;
@@ -233,7 +233,7 @@ impl FakePlotter {
                 self.lines.clear();
                 self.reply(Ok(()), label);
             }
-            Received::Line("" | END, label) => self.reply(Ok(()), label),
+            Received::Line("" | END | BUILD, label) => self.reply(Ok(()), label),
             Received::Line(text, label) => {
                 self.lines.push(text.to_owned());
                 let outcome = match self.fault {

@@ -1,12 +1,12 @@
 //! Asks a plotter for all that decides whether a drawing fits, before its first line is sent.
 
-use super::settings::{agreed, firmware, read};
+use super::settings::{agreed, read};
 use crate::compute::{Capacity, Known};
 use crate::error::Error;
 use crate::machine_settings::simulated;
 use crate::sender::Sender;
 use crate::table::BoardRow;
-use penup_job::protocol::{MODEL, Reply};
+use penup_job::protocol::{BUILD, MODEL, Reply};
 
 /// What decides whether a drawing fits the plotter at the other end. The machine must be idle.
 ///
@@ -15,16 +15,21 @@ use penup_job::protocol::{MODEL, Reply};
 pub fn limits(sender: &mut Sender<'_>) -> Result<Known, Error> {
     let capacity = agreed(sender, |sender| Ok(capacity_in(&sender.ask(MODEL)?)))?;
     let settings = simulated(&read(sender)?).ok();
-    let version = firmware(sender)?;
-    // The text after the colon is the user's own.
-    let version = version.split(':').next().unwrap_or_default();
-    let board = version.rsplit(' ').next().and_then(BoardRow::named);
+    // A board whose name is not known, or was damaged, is rehearsed with this computer's numbers.
+    let board = sender.ask(BUILD)?.iter().find_map(board_in);
     // A board of the name that was built with other limits is another board.
     let is_same = |board: &&BoardRow| {
         let memory = board.memory;
         capacity == Capacity { vertices: memory.vertices, corners: memory.corners }
     };
     Ok(Known { capacity, board: board.filter(is_same), settings })
+}
+
+/// The board in the answer to `$I`: `[VER:1.1h.penup 0.1.0 pico:a text of the user's]`.
+fn board_in(reply: &Reply) -> Option<&'static BoardRow> {
+    let Reply::Other(line) = reply else { return None };
+    let (version, _) = line.strip_prefix("[VER:")?.split_once(':')?;
+    BoardRow::named(version.rsplit(' ').next()?)
 }
 
 /// The limits in the answer to `$model`: `[MODEL:vertices 0 of 4000]` and

@@ -159,7 +159,7 @@ fn setting_in(reply: &Reply) -> Option<AssignedSetting> {
 }
 
 /// The version of the firmware and the board that it runs on.
-pub(super) fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
+fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
     agreed(sender, |sender| {
         let version = |reply: &Reply| match reply {
             Reply::Other(line) => Some(line.strip_prefix("[VER:")?.strip_suffix(']')?.to_owned()),
