@@ -6,9 +6,9 @@
 //! send. [`sender`] sends these lines over a [`link`] and follows the plotter's replies with
 //! [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an [`emulator`] of
 //! one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
-//! [`penup_job::picture`] renders its path, [`png`] the image of that, [`export`] writes it for
-//! other machines, and [`output`] writes the
-//! files. [`penup_job::results`] are what is known about a job afterwards.
+//! [`penup_job::picture`] renders its path, [`png`] the image of that, [`penup_job::export`] writes
+//! it for other machines, and [`output`] writes the files. [`penup_job::results`] are what is known
+//! about a job afterwards.
 //!
 //! [`operate`] are the commands for the machine itself, [`ports`] finds it, [`rejoin`] waits for it
 //! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command
@@ -23,7 +23,6 @@ pub mod cli;
 pub mod compute;
 pub mod emulator;
 pub mod error;
-pub mod export;
 pub mod fake;
 pub mod files;
 pub mod fit;

@@ -6,7 +6,6 @@ use crate::cli::{
     TapeShowArgs, ViewArgs,
 };
 use crate::error::Error;
-use crate::export::{self, Retracing};
 use crate::files;
 use crate::fit::fit_obj;
 use crate::machine_settings::simulated;
@@ -23,6 +22,7 @@ use crate::tape;
 use penup::index::Index;
 use penup::machine::Setting;
 use penup::step::tape::BadCode;
+use penup_job::export::{self, Retracing};
 use penup_job::picture::Picture;
 use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;

@@ -31,7 +31,7 @@ pub struct Line {
 ///
 /// ```
 /// use penup_job::export::{Line, Retracing, lines};
-/// use crate::path::Run;
+/// use penup_job::path::Run;
 /// let points = vec![[0.0, 0.0], [2.0, 0.0], [2.0, 1.0]];
 /// let run = Run { pen_down: true, pen: 1, points: points.clone() };
 /// let twice = Retracing { passes: 2, reloops: false };
