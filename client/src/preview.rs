@@ -68,6 +68,7 @@ impl<I: Index> InMemory<I> {
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
+        pins.set_queue(room.steps);
         let plotter = Plotter::with_settings(room.lend(), pins, settings).without_undo();
         plotter.greet(&mut board);
         Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
@@ -80,6 +81,7 @@ impl<I: Index> InMemory<I> {
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
         board.set_flash(flash);
+        pins.set_queue(room.steps);
         let plotter = penup::plotter::start(&mut board, room.lend(), pins);
         Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
     }

@@ -1,7 +1,7 @@
 //! How much memory a plotter in this process needs for a job, so that nothing but the computer's
 //! memory limits the size of a drawing.
 
-use penup::board_table::BoardRow;
+use penup::board_table::{BoardRow, PICO};
 use penup::boards::host::lend_memory_of;
 use penup::index::Index;
 use penup::plotter::EMPTY_LOOKAHEAD;
@@ -20,6 +20,9 @@ pub struct Room {
     words: usize,
     /// The number of moves planned ahead.
     blocks: usize,
+    /// The number of steps that wait. The machine is never faster than it could stop within 13/16
+    /// of them.
+    pub steps: u32,
 }
 
 impl Room {
@@ -30,12 +33,15 @@ impl Room {
     /// The bytes to work in for each corner: the grid of the page, the lines of up to two stretches
     /// of an edge, and the order of their strokes.
     const BYTES_A_CORNER: usize = 256;
+    /// The number of steps that wait, where no board is named: those of the fastest one.
+    const STEPS: u32 = PICO.memory.steps;
     /// The number of chords into which the piece of a curve at one control point may be divided.
     const CHORDS: usize = 64;
 
     /// Returns what is enough for any model that a board holds in its working memory.
     pub fn usual() -> Self {
-        Self { vertices: 1 << 15, corners: 1 << 16, words: 1 << 19, blocks: EMPTY_LOOKAHEAD.len() }
+        let blocks = EMPTY_LOOKAHEAD.len();
+        Self { vertices: 1 << 15, corners: 1 << 16, words: 1 << 19, blocks, steps: Self::STEPS }
     }
 
     /// Returns what is enough for the model that `lines` send.
@@ -59,7 +65,8 @@ impl Room {
         let bytes = Self::LEAST_BYTES
             + Self::BYTES_A_VERTEX * (vertices + chords)
             + Self::BYTES_A_CORNER * (corners + 2 * chords);
-        Self { vertices, corners, words: bytes / 8, blocks: EMPTY_LOOKAHEAD.len() }
+        let blocks = EMPTY_LOOKAHEAD.len();
+        Self { vertices, corners, words: bytes / 8, blocks, steps: Self::STEPS }
     }
 
     /// The same with so many times the memory to work in, for numbers that are so much wider.
@@ -84,6 +91,7 @@ impl Room {
             corners: memory.corners,
             words: memory.words,
             blocks: memory.blocks,
+            steps: memory.steps,
         }
     }
 

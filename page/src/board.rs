@@ -52,6 +52,7 @@ impl Board {
         let ring = Box::leak(Box::new(EventRing::new()));
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
+        pins.set_queue(room.steps);
         let plotter = Plotter::new(room.lend(), pins);
         plotter.greet(&mut board);
         let steps = plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>());

@@ -270,7 +270,7 @@ fn a_polygon_that_does_not_fit_is_an_error_and_is_not_drawn() {
         text + ";PM2;FP;EP;OE;"
     };
     // The last place is that of the point that closes it.
-    for (points, error, inks) in [(127, "0", true), (128, "7", false), (5000, "7", false)] {
+    for (points, error, inks) in [(255, "0", true), (256, "7", false), (5000, "7", false)] {
         let mut bench = Bench::small();
         let heard = draw(&mut bench, polygon(points).as_bytes());
         assert_eq!(heard.trim(), error, "{points}");
