@@ -1,7 +1,7 @@
 //! Hidden-line removal on all cores of a computer.
 //!
 //! The scene is made ready on one core. Then the edges and the seams are divided into parts, which
-//! the cores work through with marks of their own ([`Marks`]). The stretches of the parts are handed
+//! the cores work through with marks of their own (`Marks`). The stretches of the parts are handed
 //! over in the order of the model, by the thread that called, so the result does not depend on the
 //! number of cores.
 //!
