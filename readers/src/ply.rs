@@ -10,6 +10,7 @@ use super::format::{Contents, Format};
 use super::mesh::{Coordinate, Mesh};
 use ply_rs_bw::parser::Parser;
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
+use std::borrow::Cow;
 
 /// The format itself.
 #[derive(Debug)]
@@ -73,6 +74,24 @@ fn corners(property: Property) -> Option<Vec<i64>> {
     })
 }
 
+/// A text file without the empty lines and the comments among its elements, for which the crate
+/// does not look there. A binary file stays as it is.
+fn without_empty_lines(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let lines = || bytes.split_inclusive(|byte| *byte == b'\n');
+    let word = |line: &[u8], number: usize| {
+        let mut words = line.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty());
+        words.nth(number).map(<[u8]>::to_vec)
+    };
+    // Nothing stands before the format but the first word of the file, and comments.
+    let has = |line: &[u8], wanted: &[u8]| word(line, 0).is_some_and(|word| word == wanted);
+    let format = lines().take_while(|line| !has(line, b"end_header")).find(|l| has(l, b"format"));
+    if format.and_then(|line| word(line, 1)).is_none_or(|kind| kind != b"ascii") {
+        return Cow::Borrowed(bytes);
+    }
+    let has_meaning = |line: &&[u8]| word(line, 0).is_some_and(|word| word != b"comment");
+    Cow::Owned(lines().filter(has_meaning).flatten().copied().collect())
+}
+
 impl Format for Ply {
     fn name(&self) -> &'static str {
         "PLY"
@@ -88,7 +107,8 @@ impl Format for Ply {
 
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let refused = |reason| ReadError::Content { file: file.clone(), reason };
-        let ply = Parser::<Element>::new().read_ply(&mut bytes.as_slice());
+        let bytes = without_empty_lines(&bytes);
+        let ply = Parser::<Element>::new().read_ply(&mut &*bytes);
         let ply = ply.map_err(|error| {
             // The crate's messages have several lines, with whole lines of the file.
             let said = error.to_string();
@@ -154,6 +174,16 @@ mod tests {
             bytes.extend((0..4).flat_map(four));
             assert_eq!(sent("a.ply", &bytes), expected(), "{name}");
         }
+    }
+
+    #[test]
+    fn empty_lines_and_comments_among_the_elements_mean_nothing() {
+        let text = format!(
+            "ply\nformat ascii 1.0\n{HEAD}\n0 0 0 255\ncomment one\n  \n1.1 0 0 255\n1.1 1 0 0\n\
+             0 1 0 0\n\n4 0 1 2 3\n\n"
+        );
+        assert_eq!(sent("a.ply", text.as_bytes()), expected());
+        assert_eq!(sent("a.ply", text.replace('\n', "\r\n").as_bytes()), expected());
     }
 
     #[test]

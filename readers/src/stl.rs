@@ -35,7 +35,7 @@ impl Format for Stl {
     /// The file begins as a text does, because no beginning tells a binary file.
     fn recognises(&self, beginning: &[u8]) -> bool {
         let text = String::from_utf8_lossy(beginning);
-        let mut words = text.split_ascii_whitespace();
+        let mut words = text.lines().flat_map(words);
         words.next() == Some("solid") && words.any(|word| word == "facet")
     }
 
@@ -43,9 +43,7 @@ impl Format for Stl {
         let mut mesh = Mesh::new(file.clone());
         match binary_faces(&bytes) {
             Some(faces) => read_binary(&file, faces, &mut mesh)?,
-            None if bytes.trim_ascii_start().starts_with(b"solid") => {
-                read_text(&file, &bytes, &mut mesh)?;
-            }
+            None if is_text(&bytes) => read_text(&file, &bytes, &mut mesh)?,
             None => {
                 let reason = "this is no whole STL file: its length does not match the number of \
                               faces that it tells";
@@ -54,6 +52,17 @@ impl Format for Stl {
         }
         mesh.finish()
     }
+}
+
+/// The words of a line of a text file, without the comment that some programs write behind `#`.
+fn words(line: &str) -> impl Iterator<Item = &str> {
+    line.split('#').next().unwrap_or_default().split_ascii_whitespace()
+}
+
+/// Whether the first word of a file that is not binary is that of a text file.
+fn is_text(bytes: &[u8]) -> bool {
+    let text = String::from_utf8_lossy(bytes);
+    text.lines().flat_map(words).next() == Some("solid")
 }
 
 /// The faces of a binary file; `None` if it is none.
@@ -92,7 +101,7 @@ fn read_text(file: &str, bytes: &[u8], mesh: &mut Mesh) -> Result<(), ReadError>
             let origin = Origin { file: file.to_owned(), line: index + 1, text };
             Err(ReadError::Line { origin, reason: reason.to_owned() })
         };
-        let mut words = line.split_ascii_whitespace();
+        let mut words = words(line);
         let Some(word) = words.next() else { continue };
         match word.to_ascii_lowercase().as_str() {
             "vertex" => match point(words) {
@@ -136,6 +145,15 @@ mod tests {
                         vertex 0 1.5 0\n   vertex 1 0 0\n  endloop\n endfacet\nendsolid one part\n\
                         solid two\nfacet normal 0 0 0\nouter loop\nvertex 0 0 0\nvertex 1e0 0 0\n\
                         vertex 0 0 1\nendloop\nendfacet\nendsolid\n";
+
+    #[test]
+    fn comments_mean_nothing() {
+        let text = TEXT.replace('\n', " # a comment\n  # another\n");
+        let commented = format!("# first of all\n\n{text}");
+        assert_eq!(sent("a.stl", commented.as_bytes()), sent("a.stl", TEXT.as_bytes()));
+        assert_eq!(sent("a", commented.as_bytes()), sent("a.stl", TEXT.as_bytes()));
+        assert!(sent("a.stl", TEXT.as_bytes()).is_ok());
+    }
 
     fn binary(head: &str, faces: &[[[f32; 3]; 3]]) -> Vec<u8> {
         let mut bytes = format!("{head:80}").into_bytes();

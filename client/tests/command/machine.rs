@@ -137,6 +137,28 @@ impl Library {
             .expect("the program runs")
     }
 
+    /// Starts to plot 70 waves of 300 points, more than the plotter holds, computed by the client.
+    fn plot_waves(&self, folder: &Path) -> Child {
+        let (mut points, mut lines) = (String::new(), String::new());
+        for wave in 0..70 {
+            lines += "l";
+            for n in 0..300 {
+                let (x, y) = (20.0 + 0.4 * f64::from(n), f64::from(20 + 2 * wave + n % 2));
+                points += &format!("v {x} {y} 0\n");
+                lines += &format!(" {}", 300 * wave + n + 1);
+            }
+            lines.push('\n');
+        }
+        fs::write(folder.join("waves.obj"), points + &lines).expect("written");
+        Command::new(env!("CARGO_BIN_EXE_penup"))
+            .args(["plot", "waves.obj", "--port", &self.device, "--compute", "host"])
+            .current_dir(folder)
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs")
+    }
+
     /// Waits until the plot command of this client has come.
     fn wait_for_drawing(&self, client: &mut Child) {
         while !self.drawing.load(Ordering::Relaxed) {
@@ -441,6 +463,48 @@ fn a_job_that_a_loss_of_power_has_stopped_is_not_taken_for_done() {
     let (code, _, noted) = ended(watch);
     assert_eq!(code, Some(5), "{noted}");
     assert!(noted.contains("again") || noted.contains("the job has stopped after "), "{noted}");
+}
+
+#[test]
+fn strokes_that_stop_coming_come_again_from_the_same_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let mut client = plotter.plot_waves(folder.path());
+    while plotter.heard.load(Ordering::Relaxed) < 30_000 {
+        assert_eq!(client.try_wait().expect("a state"), None, "it ended before");
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    client.kill().expect("killed");
+    client.wait().expect("it ends");
+    // What has come is drawn, and then the machine waits with the pen up.
+    let strokes = |status: &serde_json::Value| status["strokes"]["done"].as_u64().unwrap_or(0);
+    let mut seen = (u64::MAX, 0);
+    while seen.0 != seen.1 || seen.0 == 0 {
+        std::thread::sleep(Duration::from_millis(500));
+        seen = (strokes(&plotter.json(folder.path(), &["status"]).1), seen.0);
+    }
+    assert!((1..70).contains(&seen.0), "{seen:?}");
+    let (code, said, noted) = ended(plotter.plot_waves(folder.path()));
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("the plotter draws this already: the last "), "{noted}");
+    assert!(said.starts_with("waves.obj is drawn: "), "{said}");
+    let status = plotter.json(folder.path(), &["status"]).1;
+    assert_eq!(status["state"], "Idle", "{status}");
+}
+
+#[test]
+fn a_drawing_goes_on_at_the_stroke_that_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let file = "v 10 10 0\nv 60 10 0\nv 10 20 0\nv 60 20 0\nl 1 2\nl 3 4\n";
+    fs::write(folder.path().join("a.obj"), file).expect("written");
+    let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
+    let plot = |from: &str| run(&["plot", "a.obj", "--port", "auto", "--from", from]);
+    let (code, _, noted) = plot("1");
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("1 strokes with 2 points are sent"), "{noted}");
+    let (code, _, noted) = plot("2");
+    assert_ne!(code, Some(0), "there is nothing behind the last stroke: {noted}");
 }
 
 #[test]

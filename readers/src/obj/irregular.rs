@@ -51,6 +51,21 @@ const WITHOUT_MEANING: &[&str] = &[
     "cdp",
     "res",
     "curvature",
+    // Those of a library of materials, which some programs write into the model itself.
+    "newmtl",
+    "Ka",
+    "Kd",
+    "Ks",
+    "Ke",
+    "Ns",
+    "Ni",
+    "Tf",
+    "Tr",
+    "d",
+    "illum",
+    "map_Ka",
+    "map_Kd",
+    "map_Ks",
 ];
 
 /// Whether a statement with this keyword is read here although a plotter refuses it.
