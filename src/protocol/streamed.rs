@@ -327,7 +327,7 @@ mod tests {
         ];
         let mut writer = StrokeWriter::default();
         targets.iter().for_each(|&target| writer.push(target));
-        assert_eq!(writer.bytes(), 3 + 38);
+        assert_eq!(writer.bytes(), 3 + 40);
         let line = writer.end_line();
         let read: Result<Vec<_>, _> =
             StreamedTargets::new(line.trim_start_matches("$s=")).collect();
