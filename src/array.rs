@@ -1,4 +1,19 @@
-//! Arrays of a few items, as points and the ends of lines are.
+//! Arrays of a few items, as points and the ends of lines are, and the reversal of slices.
+
+/// Reverses the order of items. The standard library's `reverse` leaves a check in a device's image
+/// that the compiler cannot prove away.
+///
+/// ```
+/// let mut items = [1, 2, 3, 4, 5];
+/// penup::array::reverse(&mut items);
+/// assert_eq!(items, [5, 4, 3, 2, 1]);
+/// ```
+pub fn reverse<T>(items: &mut [T]) {
+    let mut items = items.iter_mut();
+    while let (Some(first), Some(last)) = (items.next(), items.next_back()) {
+        core::mem::swap(first, last);
+    }
+}
 
 /// Maps arrays of two to four items.
 pub trait MapEach<T, const N: usize> {

@@ -173,7 +173,8 @@ struct Keyed<'i, T, F> {
 
 impl<T, K: Ord, F: Fn(&T) -> K> Heap for Keyed<'_, T, F> {
     fn is_less(&self, a: usize, b: usize) -> bool {
-        (self.key)(&self.items[a]) < (self.key)(&self.items[b])
+        let key = |index: usize| self.items.get(index).map(&self.key);
+        key(a) < key(b)
     }
 
     fn swap(&mut self, a: usize, b: usize) {

@@ -66,7 +66,7 @@ pub(super) fn check<I: Index>(points: &[Point]) -> Result<(), SolidError> {
 /// Sorts `numbers` by position and keeps only the least of those at the same position. Returns how
 /// many are left.
 pub(super) fn weld<I: Index>(points: &[Point], numbers: &mut [I]) -> usize {
-    heap_sort_by_key(numbers, |number| (points[number.get()], *number));
+    heap_sort_by_key(numbers, |number| (points.get(number.get()), *number));
     let mut kept = 0;
     for at in 0..numbers.len() {
         let number = numbers[at];

@@ -339,7 +339,7 @@ impl<'a, I: Index> PointFinder<'a, I> {
         let mut slot = self.slot(point);
         // The table always has a free slot, so this loop ends.
         loop {
-            let next = self.table[slot];
+            let next = *self.table.get(slot)?;
             let at = next.get().checked_sub(1)?;
             if self.points[at] == point {
                 return Some(next - I::ONE);

@@ -440,7 +440,7 @@ fn turn<I: Index>(network: Network<'_, I>, shape: Shape, route: &mut [Leg<I>]) {
 
 /// Reverses the tour, so that it goes from its end to its start.
 fn reverse<I: Index>(tour: &mut [Leg<I>]) {
-    tour.reverse();
+    crate::array::reverse(tour);
     for leg in tour {
         *leg = leg.flipped();
     }

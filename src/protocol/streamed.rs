@@ -132,7 +132,7 @@ pub struct StreamedTarget {
 ///
 /// ```
 /// use penup::protocol::StreamedTargets;
-/// let targets: Result<Vec<_>, _> = StreamedTargets::new(",K0k1").collect();
+/// let targets: Result<Vec<_>, _> = StreamedTargets::new(",K0E0").collect();
 /// let targets = targets.expect("a move and a line");
 /// let seen = targets.iter().map(|t| (t.target.point.x, t.target.point.y, t.target.ink.is_some()));
 /// assert_eq!(seen.collect::<Vec<_>>(), [(10, 0, false), (17, 0, true)]);

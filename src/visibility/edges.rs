@@ -45,7 +45,8 @@ impl<'a, I: Index> Outlines<'a, I> {
         range: Range<usize>,
     ) -> impl Iterator<Item = (usize, &'a [Corner<I>])> + use<'a, I> {
         let mut next = range.start;
-        self.corners[range].split_inclusive(|corner| corner.is_last()).map(move |corners| {
+        let corners = self.corners.get(range).unwrap_or_default();
+        corners.split_inclusive(|corner| corner.is_last()).map(move |corners| {
             let first = next;
             next += corners.len();
             (first, corners)

@@ -160,7 +160,7 @@ pub(super) fn element_length<I: Index>(corners: &[Corner<I>]) -> Option<usize> {
 /// vertex.
 pub(super) fn reverse<I: Index>(face: &mut [Corner<I>]) {
     let Some((_, rest)) = face.split_first_mut() else { return };
-    rest.reverse();
+    crate::array::reverse(rest);
     let last = face.len() - 1;
     for (at, corner) in face.iter_mut().enumerate() {
         *corner = Corner::new(corner.vertex(), false, at == last);

@@ -6,6 +6,9 @@ use crate::array::MapEach;
 use crate::fixed::{Decimal, Millimetres};
 use crate::protocol::{BlockError, CommandError};
 
+/// The letters of the axes.
+const AXES: [u8; 3] = [b'X', b'Y', b'Z'];
+
 impl Program {
     /// The order of what a line does beside setting modes and moving.
     pub(super) fn action(
@@ -50,7 +53,7 @@ impl Program {
                 // With coordinates, only the axes that are named go on.
                 let mut end = to;
                 if block.has_any(b"XYZ") {
-                    for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+                    for (axis, &letter) in AXES.iter().enumerate() {
                         end[axis] = if block.has(letter) { to[axis] } else { via[axis] };
                     }
                 }
@@ -99,7 +102,7 @@ impl Program {
             }
             Ok(20) => {
                 let here = self.origin_here(block, self.shift)?;
-                for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+                for (axis, &letter) in AXES.iter().enumerate() {
                     origin[axis] = if block.has(letter) { here[axis] } else { origin[axis] };
                 }
             }
@@ -119,12 +122,13 @@ impl Program {
             return Err(BlockError::NoAxis.into());
         }
         let mut origin = self.shift;
-        for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+        for (axis, &letter) in AXES.iter().enumerate() {
             if !block.has(letter) {
                 continue;
             }
             let tool_length = if axis == 2 { self.tool_length } else { Millimetres::ZERO };
-            let position = self.at[axis].checked_sub(from[axis]);
+            let (Some(at), Some(from)) = (self.at.get(axis), from.get(axis)) else { continue };
+            let position = at.checked_sub(*from);
             let position = position.and_then(|position| position.checked_sub(tool_length));
             let coordinate = self.coordinate(block, letter)?;
             let shift = position.and_then(|position| position.checked_sub(coordinate));
@@ -155,19 +159,19 @@ impl Program {
         context: &Context<'_>,
     ) -> Result<MachinePosition, CommandError> {
         let origin = self.origin(context.parameters);
-        let mut position = self.at;
-        for (axis, letter) in [b'X', b'Y', b'Z'].into_iter().enumerate() {
+        let end = |at: Millimetres, origin: Millimetres, letter: u8| {
             if !block.has(letter) {
-                continue;
+                return Ok(at);
             }
             let base = match block.action {
                 Action::Machine => Millimetres::ZERO,
-                _ if self.relative => self.at[axis],
-                _ => origin[axis],
+                _ if self.relative => at,
+                _ => origin,
             };
             let end = base.checked_add(self.coordinate(block, letter)?);
-            position[axis] = end.ok_or(CommandError::NumberOutOfRange)?;
-        }
-        Ok(position)
+            end.ok_or(CommandError::NumberOutOfRange)
+        };
+        let ([x, y, z], [x0, y0, z0]) = (self.at, origin);
+        Ok([end(x, x0, b'X')?, end(y, y0, b'Y')?, end(z, z0, b'Z')?])
     }
 }

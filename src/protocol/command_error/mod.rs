@@ -452,7 +452,8 @@ impl CommandError {
             ),
             #[cfg(feature = "stream")]
             Self::BeyondBounds => row(
-                error(182, "a stroke leads beyond the bounds of its job"),
+                error(182, "a stroke leads beyond the bounds of its job")
+                    .client("the strokes that came are not those that were announced: begin anew"),
                 format_args!("$stream=… has said that all strokes lie elsewhere: begin anew"),
             ),
             Self::Damaged => row(
