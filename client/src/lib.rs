@@ -14,8 +14,8 @@
 //! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command
 //! returns an [`outcome`].
 //!
-//! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a job as single motor steps, and
-//! [`motion_plot`] plots its speed.
+//! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a
+//! job as single motor steps, and [`motion_plot`] plots its speed.
 
 pub mod board;
 pub mod bridge;

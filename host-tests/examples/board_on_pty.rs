@@ -3,9 +3,9 @@
 //!
 //! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is
 //! the name of the terminal. Then each line of the input is answered by one line: `forget` forgets
-//! the ink so far; `judge SLACK FILE` compares the ink since then with the lines of FILE, each of which
-//! is a polyline of points `x,y` in steps, and answers `same` or what differs; `heard` prints what
-//! the board has been sent since the last call, escaped. It ends with its input.
+//! the ink so far; `judge SLACK FILE` compares the ink since then with the lines of FILE, each of
+//! which is a polyline of points `x,y` in steps, and answers `same` or what differs; `heard` prints
+//! what the board has been sent since the last call, escaped. It ends with its input.
 
 use std::error::Error;
 use std::io::{BufRead as _, Read as _, Write as _};

@@ -1,5 +1,5 @@
-//! Sends drawings that this computer has computed to emulated boards, stroke by stroke, and compares
-//! their pins with the preview.
+//! Sends drawings that this computer has computed to emulated boards, stroke by stroke, and
+//! compares their pins with the preview.
 #![cfg(feature = "emulator")]
 
 use penup::board_table::{BoardRow, LM3S6965, PICO};

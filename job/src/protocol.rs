@@ -131,8 +131,8 @@ pub struct Status {
     pub stopped: Option<(u64, u64)>,
     /// The lengths of `Ink:done/all`, drawn and to draw, in whole mm.
     pub ink: Option<(u64, u64)>,
-    /// The numbers of `Stream:taken/all,room`, if strokes are drawn while they are sent: the targets
-    /// that have come, all of them, and for how many more there is room.
+    /// The numbers of `Stream:taken/all,room`, if strokes are drawn while they are sent: the
+    /// targets that have come, all of them, and for how many more there is room.
     pub stream: Option<[u32; 3]>,
     /// The seconds of `Left:seconds` until the end of the job.
     pub seconds_left: Option<u64>,

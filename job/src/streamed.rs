@@ -198,7 +198,8 @@ impl StreamedJob {
         self.text.len()
     }
 
-    /// The pens, counted from 1, that the machine waits for behind the first `lines` lines of G-code.
+    /// The pens, counted from 1, that the machine waits for behind the first `lines` lines of
+    /// G-code.
     pub fn pens_in_lines(&self, lines: usize) -> &[u8] {
         let count = self.pen_lines.partition_point(|line| *line < lines);
         self.pens.get(..count).unwrap_or_default()

@@ -23,7 +23,7 @@ const PHASES = {
 /** What is said about each kind of plotter. */
 const HINTS = {
   emulated: "The plotter's own program, on pins of memory. Nothing needs to be plugged in.",
-  serial: "Chromium, Chrome or Edge, and a plotter that runs penup. The page talks to it by itself.",
+  serial: "Chromium, Chrome or Edge, and a plotter that runs penup. The page talks to it.",
   program: "The program penup has its line, so any browser will do. One page at a time holds it.",
 };
 /** How dark the lines are that are still to be drawn. */

@@ -3,7 +3,8 @@
 //! A polygon is kept in a buffer of [`VERTICES`] points. As on Hewlett-Packard's machines, filled
 //! rectangles and wedges use the same buffer, and what does not fit sets error 7 (HP 7550A) and is
 //! not drawn at all. Inside is what an odd number of edges surrounds. A fill is made line by line,
-//! each from edge to edge: no list of crossings is kept, the next one is looked for among all edges.
+//! each from edge to edge: no list of crossings is kept, the next one is looked for among all
+//! edges.
 //!
 //! Sources: PCL 5 Printer Language Technical Reference Manual (Hewlett-Packard), part II, chapter
 //! 21, "The Polygon Group": which points are joined, how subpolygons are closed, and what `EP` and
@@ -192,7 +193,8 @@ impl Hatch {
         point.rotated([-sine, cosine])
     }
 
-    /// Where the present line crosses an edge. Of both ends of an edge, the lower one belongs to it.
+    /// Where the present line crosses an edge. Of both ends of an edge, the lower one belongs to
+    /// it.
     fn crosses(&self, y: i64, edge: [Point; 2]) -> Option<i64> {
         let [a, b] = edge.map(|point| self.turned(point));
         if (a.y <= y) == (b.y <= y) {

@@ -173,7 +173,8 @@ impl Homing {
 
 impl Machine<'_> {
     /// Homes x first, then y. Afterwards the machine is in the corner of the switches, one pull-off
-    /// away from each: at (0, 0) if both lie at the low ends. [`Machine::watch`] must be called often meanwhile.
+    /// away from each: at (0, 0) if both lie at the low ends. [`Machine::watch`] must be called
+    /// often meanwhile.
     ///
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
@@ -315,8 +316,8 @@ impl Machine<'_> {
         self.settings.whole(Setting::HomingDirection) & 1 << axis as u32 != 0
     }
 
-    /// Sets the position of an axis after its last phase: to 0 or its travel, or to the homed length
-    /// of a belt.
+    /// Sets the position of an axis after its last phase: to 0 or its travel, or to the homed
+    /// length of a belt.
     fn set_homed(&mut self, axis: Axis) {
         let properties = Kinematics::properties(&self.settings);
         let mut position = self.homing_position(self.runner.position());

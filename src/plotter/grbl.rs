@@ -29,8 +29,8 @@ impl<I: Index> Inner<'_, I> {
         }
     }
 
-    /// Whether a program is open that idleness would end, or drivers are to be switched off, so that
-    /// time must be told.
+    /// Whether a program is open that idleness would end, or drivers are to be switched off, so
+    /// that time must be told.
     pub(super) fn is_timing(&self) -> bool {
         #[cfg(feature = "driver-pins")]
         if self.machine.driver_rest().is_some() {

@@ -82,8 +82,8 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// Waits until the last moves are made: their plan may be complete before, and a sector of flash
-    /// must not be erased while something moves.
+    /// Waits until the last moves are made: their plan may be complete before, and a sector of
+    /// flash must not be erased while something moves.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn settle<B: Board>(&mut self, listener: &mut Listener<'_, B>) -> Result<(), Aborted> {
         while !self.machine.is_stopped() {

@@ -38,8 +38,8 @@ impl<'a, I: Index> Outlines<'a, I> {
         self.elements_in(0..self.corners.len())
     }
 
-    /// Iterates over the elements of a range of corners, which begins and ends with an element, each
-    /// with the number of its first corner.
+    /// Iterates over the elements of a range of corners, which begins and ends with an element,
+    /// each with the number of its first corner.
     pub fn elements_in(
         &self,
         range: Range<usize>,

@@ -47,8 +47,8 @@ impl<'m, I: Index> Marks<'m, I> {
         2 * FaceSet::<I>::bytes(faces) + Scratch::bytes_for::<ProfilePiece>(FEWEST_PIECES)
     }
 
-    /// Returns the number of bytes of working memory beyond which more is no gain, because an eighth
-    /// of what lies beyond the least is all the pieces that a profile may have.
+    /// Returns the number of bytes of working memory beyond which more is no gain, because an
+    /// eighth of what lies beyond the least is all the pieces that a profile may have.
     #[cfg(feature = "threads")]
     pub const fn most_bytes(faces: usize) -> usize {
         2 * FaceSet::<I>::bytes(faces) + 8 * Scratch::bytes_for::<ProfilePiece>(MOST_PIECES)
@@ -102,8 +102,8 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         Self { around, grid, marks, options }
     }
 
-    /// Finds the stretches of the edges of a range of elements, in the order of the model. The range
-    /// is one of corners, which begins and ends with an element.
+    /// Finds the stretches of the edges of a range of elements, in the order of the model. The
+    /// range is one of corners, which begins and ends with an element.
     ///
     /// # Errors
     /// Returns an error if the sink is full or the user cancels.

@@ -130,8 +130,8 @@ enum Task {
         #[arg(default_value_t = 4864)]
         count: u32,
     },
-    /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs them
-    /// into target/senders (some 30 minutes).
+    /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs
+    /// them into target/senders (some 30 minutes).
     Senders(senders::Arguments),
     /// Lists, by file, the calls of panic functions that are left in the boards' images.
     Panics,

@@ -389,8 +389,8 @@ impl Setup<'_> {
         say("4 of 5: the origin, the sheet's lower left corner.");
         let mut link = if has_switches {
             self.answers.ask(
-                "Lay the sheet so that its lower left corner is where the switches are. Press Enter \
-                 to find them.",
+                "Lay the sheet so that its lower left corner is where the switches are. Press \
+                 Enter to find them.",
             )?;
             link
         } else {

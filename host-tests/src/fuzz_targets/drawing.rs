@@ -13,9 +13,9 @@ use std::collections::BTreeSet;
 /// The most points. The reference for the order is slow.
 const MOST_POINTS: usize = 60;
 
-/// Orders a drawing and draws it, while the user holds and goes on, and changes the speed. The order
-/// must draw each line once, the pins must keep every rule and limit and ink just the lines, and the
-/// pen must end raised.
+/// Orders a drawing and draws it, while the user holds and goes on, and changes the speed. The
+/// order must draw each line once, the pins must keep every rule and limit and ink just the lines,
+/// and the pen must end raised.
 ///
 /// The first eight bytes choose the speed, the acceleration, the jerk, the junction deviation, how
 /// late the main loop is, and two holds and an override. Each further pair of bytes is a point, in

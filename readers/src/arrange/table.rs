@@ -42,8 +42,8 @@ pub const PLAN_OPTIONS: &[PlanOption] = &[
     PlanOption {
         name: "scale",
         value: "FACTOR",
-        help: "Make the drawing larger or smaller about its middle; X,Y scales each axis by its own \
-               factor",
+        help: "Make the drawing larger or smaller about its middle; X,Y scales each axis by its \
+               own factor",
         changes_size: true,
         set: |arrangement, text| {
             let factors = numbers(text)?;
@@ -108,8 +108,8 @@ pub const PLAN_OPTIONS: &[PlanOption] = &[
     PlanOption {
         name: "crop",
         value: "X,Y,WIDTH,HEIGHT",
-        help: "Cut off what is beyond this rectangle, in mm from the lower left corner of the page; \
-               page cuts at the margin of the page",
+        help: "Cut off what is beyond this rectangle, in mm from the lower left corner of the \
+               page; page cuts at the margin of the page",
         changes_size: false,
         set: |arrangement, text| {
             if text.trim() == "page" {

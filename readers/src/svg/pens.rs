@@ -41,8 +41,8 @@ pub(super) fn not_obeyed(marks: &[Marks]) -> Vec<String> {
         }
         if control.pauses && alone {
             notes.push(format!(
-                "there is no pause before the layer \"{name}\": it is the only one, and the machine \
-                 pauses where pens change"
+                "there is no pause before the layer \"{name}\": it is the only one, and the \
+                 machine pauses where pens change"
             ));
         }
     }

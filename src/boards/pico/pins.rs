@@ -41,8 +41,8 @@ pub fn hand_over() {
     }
 }
 
-/// Inverts the step pins of the motors in the mask `steps`, and the enable pin if `enable`. Whatever
-/// drives these pins then drives them the other way, a fault included.
+/// Inverts the step pins of the motors in the mask `steps`, and the enable pin if `enable`.
+/// Whatever drives these pins then drives them the other way, a fault included.
 pub fn invert(steps: u8, enable: bool) {
     /// The bit of a pin's control register that inverts its output (data sheet, 2.19.6.1).
     const INVERT: u32 = 1 << 8;

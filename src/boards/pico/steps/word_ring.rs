@@ -14,8 +14,8 @@ pub const GROUP: u32 = 16;
 pub struct Ring([AtomicU32; WORDS as usize]);
 const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
-/// The ring of the words that wait. It lies where its alignment leaves no gap (`boards/pico.x`), and
-/// nothing gives it a value before [`clear`].
+/// The ring of the words that wait. It lies where its alignment leaves no gap (`boards/pico.x`),
+/// and nothing gives it a value before [`clear`].
 #[unsafe(link_section = ".ring")]
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 /// For each word of the ring that is a step: `around` of [`StepWay`] in the lower half and `behind`
