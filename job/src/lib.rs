@@ -20,6 +20,7 @@ pub mod protocol;
 pub mod results;
 pub mod room;
 pub mod sampled;
+#[cfg(feature = "stream")]
 pub mod streamed;
 pub mod strokes;
 pub mod twin;

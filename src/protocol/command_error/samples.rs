@@ -29,11 +29,13 @@ pub fn error_entries() -> Vec<ErrorEntry> {
 ///
 /// If a variant is missing, this does not compile, because the match has no other arm.
 macro_rules! every_variant {
-    ($enum:ident: $($variant:ident $({ $($named:tt)* })? $(( $($plain:tt)* ))?),* $(,)?) => {{
+    ($enum:ident: $(
+        $(#[$condition:meta])* $variant:ident $({ $($named:tt)* })? $(( $($plain:tt)* ))?
+    ),* $(,)?) => {{
         let _is_complete = |value: &$enum| match value {
-            $($enum::$variant { .. } => (),)*
+            $($(#[$condition])* $enum::$variant { .. } => (),)*
         };
-        [$($enum::$variant $({ $($named)* })? $(( $($plain)* ))?),*]
+        [$($(#[$condition])* $enum::$variant $({ $($named)* })? $(( $($plain)* ))?),*]
     }};
 }
 
@@ -79,8 +81,11 @@ pub fn error_samples() -> Vec<CommandError> {
         NotStored,
         NoJobKept,
         OtherSteps,
+        #[cfg(feature = "stream")]
         NotStrokes,
+        #[cfg(feature = "stream")]
         NoStream,
+        #[cfg(feature = "stream")]
         BeyondBounds,
         NothingToResume,
         PositionUnknown,
