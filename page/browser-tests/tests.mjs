@@ -669,6 +669,7 @@ test("speeds, heights and a square by hand, and a job that has stopped", async (
   await percent(100);
   await page.click("#give-up");
   await state("Given up");
+  await page.waitForFunction(() => window.penup.plotting.phase === "ready");
   // The emulated plotter of the page keeps no jobs, so the status of one that does is said here. The
   // next status of the emulated one takes its place, so what is shown is read at once.
   const said = await page.evaluate(() => {
