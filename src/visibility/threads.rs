@@ -15,7 +15,6 @@ use super::yield_counter::YieldCounter;
 use super::{Options, Report, Scene, Stretch, StretchSink, VisibilityError, index};
 use crate::index::Index;
 use crate::stage::{Aborted, Cancel, Scratch, SinkFull};
-use core::num::NonZero;
 use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -26,7 +25,7 @@ use std::vec::Vec;
 
 /// The usual number of corners, or of faces whose seams are found, in a part. It is worth some
 /// milliseconds of work.
-const PART: NonZero<usize> = NonZero::new(4096).unwrap();
+const PART: usize = 4096;
 
 /// How long the calling thread waits for a part before it asks whether the user has cancelled.
 const PATIENCE: Duration = Duration::from_millis(20);
@@ -51,7 +50,7 @@ pub fn find_stretches<I: Index>(
     cancel: &mut dyn Cancel,
     sink: &mut dyn StretchSink<I>,
 ) -> Result<Report, VisibilityError> {
-    let is_small = scene.elements.corners().len() < 2 * PART.get();
+    let is_small = scene.elements.corners().len() < 2 * PART;
     if is_small || rayon::current_num_threads() < 2 {
         return super::find_stretches(scene, options, scratch, cancel, sink);
     }
@@ -59,12 +58,12 @@ pub fn find_stretches<I: Index>(
 }
 
 /// Does the same as [`find_stretches`], in parts of at least `part` corners, and of `part` faces
-/// whose seams are found.
+/// whose seams are found; 0 counts as 1.
 ///
 /// # Errors
 /// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
 pub fn find_stretches_in_parts<I: Index>(
-    part: NonZero<usize>,
+    part: usize,
     scene: &Scene<'_, I>,
     options: Options,
     scratch: Scratch<'_>,
@@ -78,7 +77,7 @@ pub fn find_stretches_in_parts<I: Index>(
     let stop = &AtomicBool::new(false);
     rayon::in_place_scope_fifo(|scope| {
         let (sender, receiver) = mpsc::channel();
-        let parts = parts(part.get(), around, options);
+        let parts = parts(part.max(1), around, options);
         let count = parts.len();
         for (number, part) in parts.into_iter().enumerate() {
             let sender = sender.clone();

@@ -167,6 +167,11 @@ impl Library {
         }
     }
 
+    /// How many strokes it has drawn of its job.
+    fn strokes(&self, folder: &Path) -> u64 {
+        self.json(folder, &["status"]).1["strokes"]["done"].as_u64().unwrap_or(0)
+    }
+
     /// Runs a command that finds this plotter by itself.
     fn run(&self, folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
         with_ports(folder, &[&self.device], arguments)
@@ -320,8 +325,7 @@ fn a_job_goes_on_after_a_loss_of_power() {
     client.kill().expect("killed");
     client.wait().expect("it ends");
     // It draws some strokes before its power is cut.
-    let strokes = |status: &serde_json::Value| status["strokes"]["done"].as_u64().unwrap_or(0);
-    while strokes(&plotter.json(folder.path(), &["status"]).1) < 3 {}
+    while plotter.strokes(folder.path()) < 3 {}
     plotter.cut.store(true, Ordering::Relaxed);
     while plotter.cut.load(Ordering::Relaxed) {}
     let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
@@ -449,8 +453,7 @@ fn a_job_that_a_loss_of_power_has_stopped_is_not_taken_for_done() {
     client.kill().expect("killed");
     client.wait().expect("it ends");
     plotter.slow.store(true, Ordering::Relaxed);
-    let strokes = |status: &serde_json::Value| status["strokes"]["done"].as_u64().unwrap_or(0);
-    while strokes(&plotter.json(folder.path(), &["status"]).1) < 3 {}
+    while plotter.strokes(folder.path()) < 3 {}
     let watch = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(["watch", "--port", &plotter.device])
         .stdout(Stdio::piped())
@@ -477,11 +480,10 @@ fn strokes_that_stop_coming_come_again_from_the_same_file() {
     client.kill().expect("killed");
     client.wait().expect("it ends");
     // What has come is drawn, and then the machine waits with the pen up.
-    let strokes = |status: &serde_json::Value| status["strokes"]["done"].as_u64().unwrap_or(0);
     let mut seen = (u64::MAX, 0);
     while seen.0 != seen.1 || seen.0 == 0 {
         std::thread::sleep(Duration::from_millis(500));
-        seen = (strokes(&plotter.json(folder.path(), &["status"]).1), seen.0);
+        seen = (plotter.strokes(folder.path()), seen.0);
     }
     assert!((1..70).contains(&seen.0), "{seen:?}");
     let (code, said, noted) = ended(plotter.plot_waves(folder.path()));

@@ -176,7 +176,8 @@ fn an_svg_is_drawn_at_its_place_with_two_pens() {
     let folder = tempfile::tempdir().expect("a folder");
     let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='90mm' height='60mm' \
                viewBox='0 0 90 60'><path d='M0 0H20' stroke='red'/>\
-               <circle cx='70' cy='40' r='20' fill='none' stroke='blue'/><image href='a.png' width='9' height='9'/></svg>";
+               <circle cx='70' cy='40' r='20' fill='none' stroke='blue'/>\
+               <image href='a.png' width='9' height='9'/></svg>";
     fs::write(folder.path().join("a.svg"), svg).expect("written");
     let (code, said, noted) = penup(folder.path(), &["preview", "a.svg", "--json", "a.json"]);
     assert_eq!(code, Some(0), "{noted}");
