@@ -271,7 +271,8 @@ fn counted(number: usize, [one, many]: [&str; 2]) -> String {
     format!("{number} {}", if number == 1 { one } else { many })
 }
 
-/// Says how many points the drawing has if a plotter takes fewer.
+/// Says how many points the drawing has if the memory of a plotter takes fewer, and what happens
+/// then.
 fn capacity(points: usize) -> Option<String> {
     let boards = BOARDS.iter().map(|board| (board.name, board.memory.vertices));
     let short: Vec<String> = boards
@@ -280,7 +281,10 @@ fn capacity(points: usize) -> Option<String> {
         .collect();
     (!short.is_empty()).then(|| {
         let short = short.join(", ");
-        format!("the drawing has {points} points, and {short}: `penup fit` makes fewer of them")
+        format!(
+            "the drawing has {points} points, and {short}: beyond that `penup plot` computes the \
+             drawing itself and sends the strokes, and `penup fit` makes fewer points"
+        )
     })
 }
 
