@@ -7,6 +7,7 @@
 //! fit the page or the memory is refused.
 
 mod collect;
+mod font;
 mod line_type;
 mod overlap;
 mod page;

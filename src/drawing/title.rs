@@ -1,44 +1,12 @@
 //! Draws a title in a vector font: Hershey Roman Simplex, with all letters of Latin-1 and Latin-9.
 //!
 //! A [`Title`] is a text and its size. It computes its width, so that it can be centred, and its
-//! pen-down lines on the page, one after another. A [`TitleText`] owns a text. The font is stored
-//! in flash (5 KB, see `font/LICENCE.txt`) and parsed while it is drawn. A character that is not in
-//! the font is drawn as a box, and [`Title::unknown`] returns it.
-//!
-//! The font's file has a line for each letter: the letter, its left and its right side, and then
-//! its points of two characters each, with x to the right and y *down*, counted from `R`. ` R`
-//! lifts the pen (James Hurt's format). Capitals reach from 12 units above to 9 units below the
-//! middle of the letter.
+//! pen-down lines on the page, one after another. A [`TitleText`] owns a text. A character that is
+//! not in the font is drawn as a box, and [`Title::unknown`] returns it.
 
+use super::font::Glyph;
 use super::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
-use crate::array::MapEach;
 use crate::fixed::{Millimetres, divide_rounding};
-use core::cmp::Ordering;
-
-/// The font as text, one line for each letter (see the module documentation).
-const FONT: &str = include_str!("font/simplex.txt");
-
-/// The offset at which each line of the font begins, and the end of the last. The lines are sorted
-/// by their letters.
-const STARTS: [u16; GLYPHS + 1] = starts();
-/// The number of letters and accents in the font, which is the number of lines of its file.
-const GLYPHS: usize = 158;
-
-/// Finds where each line of the font begins, when the library is compiled.
-const fn starts() -> [u16; GLYPHS + 1] {
-    let font = FONT.as_bytes();
-    let (mut starts, mut line, mut at) = ([0; GLYPHS + 1], 0, 0);
-    while at < font.len() {
-        at += 1;
-        if font[at - 1] == b'\n' {
-            line += 1;
-            // The font has 5 KB, so the offset fits.
-            starts[line] = at as u16;
-        }
-    }
-    assert!(line == GLYPHS, "another number of letters");
-    starts
-}
 
 /// Height of the capitals in the font's units.
 const CAPITAL_HEIGHT: i32 = 21;
@@ -142,14 +110,13 @@ impl Title<'_> {
         for letter in self.text.chars() {
             line.set(letter, &mut |Placed { glyph, x, rise }| {
                 let mut before = None;
-                for point in glyph.points.chunks_exact(2) {
-                    let point_on_page = match *point {
-                        [right, down] if right != b' ' => Some(PagePoint {
-                            x: on_axis(left, x + offset(right), 0),
-                            y: on_axis(baseline, rise + BASELINE - offset(down), 1),
-                        }),
-                        _ => None,
-                    };
+                let mut index = 0;
+                while let Some(point) = glyph.point(index) {
+                    index += 1;
+                    let point_on_page = point.map(|[right, down]| PagePoint {
+                        x: on_axis(left, x + right, 0),
+                        y: on_axis(baseline, rise + BASELINE - down, 1),
+                    });
                     if let (Some(from), Some(to), Ok(())) = (before, point_on_page, &outcome) {
                         outcome = each([from, to]);
                     }
@@ -216,47 +183,6 @@ impl Default for TitleText {
     }
 }
 
-/// The shape of one letter of the font.
-#[derive(Debug, Clone, Copy)]
-struct Glyph {
-    /// The x of the letter's left side, measured from its middle in the font's units; negative to
-    /// the left.
-    left: i32,
-    /// The x of the letter's right side, measured from its middle in the font's units.
-    right: i32,
-    /// The points of the letter's strokes, of two characters each, as the font's file has them.
-    points: &'static [u8],
-}
-
-impl Glyph {
-    /// Finds a letter in the font by binary search.
-    fn find(letter: char) -> Option<Self> {
-        let line = |at: usize| {
-            let [start, end] =
-                [STARTS.get(at)?, STARTS.get(at + 1)?].map_each(|at| usize::from(*at));
-            FONT.get(start..end)
-        };
-        let (mut low, mut high) = (0, GLYPHS);
-        while low < high {
-            let middle = (low + high) / 2;
-            let mut letters = line(middle)?.chars();
-            match letters.next()?.cmp(&letter) {
-                Ordering::Less => low = middle + 1,
-                Ordering::Greater => high = middle,
-                Ordering::Equal => {
-                    return match letters.as_str().trim_ascii_end().as_bytes() {
-                        [left, right, points @ ..] => {
-                            Some(Self { left: offset(*left), right: offset(*right), points })
-                        }
-                        _ => None,
-                    };
-                }
-            }
-        }
-        None
-    }
-}
-
 /// The strokes of a single letter or of its accent, for those who place letters by themselves.
 ///
 /// ```
@@ -294,21 +220,13 @@ impl LetterStrokes {
     /// the right of the letter's middle, and up from its baseline. `Some(None)` where the pen is
     /// lifted between the two, `None` behind the last line.
     pub fn line(&self, index: usize) -> Option<Option<[[i32; 2]; 2]>> {
-        let point = |index: usize| match self.glyph.points.get(2 * index..2 * index + 2) {
-            Some(&[b' ', _]) => Some(None),
-            Some(&[right, down]) => {
-                Some(Some([offset(right), self.rise + BASELINE - offset(down)]))
-            }
-            _ => None,
+        let point = |index: usize| {
+            let point = self.glyph.point(index)?;
+            Some(point.map(|[right, down]| [right, self.rise + BASELINE - down]))
         };
         let (from, to) = (point(index)?, point(index + 1)?);
         Some(from.zip(to).map(|(from, to)| [from, to]))
     }
-}
-
-/// Returns the coordinate that a character of the font's file stands for, in the font's units.
-fn offset(byte: u8) -> i32 {
-    i32::from(byte) - i32::from(b'R')
 }
 
 /// A letter at its position in the text, in the font's units.
@@ -344,8 +262,9 @@ impl TypeLine {
             if ('\u{300}'..='\u{36F}').contains(&letter) {
                 rise = if letter == '\u{327}' { 0 } else { self.rise };
             } else {
-                self.middle = self.end.saturating_sub(glyph.left);
-                self.end = self.middle.saturating_add(glyph.right);
+                let [left, right] = glyph.sides();
+                self.middle = self.end.saturating_sub(left);
+                self.end = self.middle.saturating_add(right);
                 self.rise = if letter.is_ascii_uppercase() { ACCENT_RISE } else { 0 };
             }
             each(Placed { glyph, x: self.middle, rise });
