@@ -20,7 +20,7 @@
 
 mod log;
 
-pub use log::{Log, NOTE_BYTES};
+pub use log::{Log, NOTE_BYTES, Noted};
 
 use crate::checksum::Crc32;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};

@@ -144,6 +144,45 @@ fn a_job_goes_on_after_a_cut_a_reset_and_a_fault() -> TestResult {
     Ok(())
 }
 
+/// A spiral of one stroke, with rests after each 40 mm of it.
+#[test]
+fn a_job_goes_on_within_its_only_stroke() -> TestResult {
+    let vertices = (0..200).map(|index| {
+        let (turn, radius) = (f64::from(index) * 0.2, 2.0 + f64::from(index) / 20.0);
+        format!("v {:.3} {:.3} 0", radius * turn.cos(), radius * turn.sin())
+    });
+    let settings = ["$212=30", "$213=30", "$219=0.04", "$page=30x30", "$margin=3"];
+    let lines: Vec<String> = vertices
+        .chain((1..200).map(|from| format!("l {from} {}", from + 1)))
+        .chain(settings.into_iter().chain(["$plot"]).map(str::to_owned))
+        .collect();
+    let whole = strokes_of(on_the_host(&lines));
+    assert_eq!(whole.len(), 1);
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    for text in &lines {
+        assert_eq!(ask(&mut line, text)?, "ok", "{text}");
+    }
+    let time = duration(&on_the_host(&lines));
+    let mut runs = Vec::new();
+    for _ in 0..4 {
+        line.emulator.cut_power_after(time / 6)?;
+        line.hear_greeting()?;
+        let message = line.hear()?;
+        assert!(message.starts_with("[MSG:a job stopped at stroke 1 of 1"), "{message}");
+        runs.push(strokes_of(line.emulator.pin_changes()?));
+        assert_eq!(ask(&mut line, "$resume=origin")?, "ok");
+    }
+    wait_for(&mut line, u32::MAX)?;
+    runs.push(strokes_of(line.emulator.pin_changes()?));
+    assert!(!line.status()?.contains("|Late:"), "the queue ran empty while the machine moved");
+    assert_eq!(ink(runs.iter().flatten()), ink(&whole));
+    let steps = |run: &Run| run.iter().map(|stroke| stroke.len() - 1).sum::<usize>();
+    let twice = runs.iter().map(steps).sum::<usize>() - steps(&whole);
+    // 40 mm of 80 steps, of which slanting chords have up to twice as many, and a chord.
+    assert!(twice <= 4 * 2 * 80 * 44, "{twice} steps are drawn twice");
+    Ok(())
+}
+
 /// Prints how long it takes to write to the flash while a job is drawn, and by how much that delays
 /// the job.
 #[test]

@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
 use penup::boards::host::{Cut, CutFlash};
-use penup::storage::{Log, NOTE_BYTES, Slots, StorageError};
+use penup::storage::{Log, NOTE_BYTES, Noted, Slots, StorageError};
 use penup_host_tests::cut_jobs::{empty_flash, switch_on};
 
 /// The slots are not at the beginning of the flash, and each has more than one sector.
@@ -91,8 +91,8 @@ const LOG: Log = Log { start: 5 * 4096, bytes: 2 * 4096 };
 /// Reads the notes and the bits of the log of the state with this checksum.
 fn log_of(flash: &mut CutFlash, of: u32) -> Option<(Vec<u8>, u32)> {
     let mut notes = [0; NOTE_BYTES];
-    let (length, count) = LOG.read(flash, of, &mut notes)?;
-    Some((notes[..length].to_vec(), count))
+    let (length, Noted { parts, .. }) = LOG.read(flash, of, &mut notes)?;
+    Some((notes[..length].to_vec(), parts))
 }
 
 #[test]
@@ -115,6 +115,25 @@ fn a_log_is_read_as_it_was_written() {
     let too_long = LOG.begin(&mut flash, 7, &[0; NOTE_BYTES + 1]);
     assert_eq!(too_long, Err(StorageError::TooLong));
     assert_eq!(log_of(&mut flash, 7).map(|(_, count)| count), Some(LOG.limit()));
+}
+
+/// Parts and points are counted from the two ends, and neither count reaches the bits of the other.
+#[test]
+fn points_are_counted_beside_the_parts() {
+    let mut flash = CutFlash::new(7 * 4096);
+    LOG.begin(&mut flash, 7, b"notes").expect("it fits");
+    let read = |flash: &mut CutFlash| LOG.read(flash, 7, &mut [0; NOTE_BYTES]).expect("the log").1;
+    let (most, limit) = (LOG.limit(), LOG.points_limit());
+    assert_eq!(most + limit, (2 * 4096 - 256) * 8);
+    let mut noted = Noted::default();
+    for (parts, points) in [(0, 1), (5, 9), (5, 2048), (2050, 2049), (most, 3000), (most, limit)] {
+        LOG.note(&mut flash, noted.parts, parts).expect("it is taken");
+        LOG.note_points(&mut flash, noted.points, points).expect("it is taken");
+        noted = Noted { parts, points };
+        assert_eq!(read(&mut flash), noted);
+    }
+    LOG.note(&mut flash, most, most + 9).expect("what is beyond is left out");
+    LOG.note_points(&mut flash, limit, limit + 9).expect("what is beyond is left out");
 }
 
 #[test]

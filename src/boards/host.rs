@@ -17,6 +17,7 @@ use crate::plotter::{
     Board, EMPTY_LOOKAHEAD, Kept, Layout, MemorySlices, NotStored, Record, Replies, Stored,
 };
 use crate::protocol::{LineReader, RealTime, Sorter};
+use crate::storage::Noted;
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use std::boxed::Box;
@@ -508,7 +509,16 @@ impl Board for HostBoard<'_> {
         self.kept.as_mut().ok_or(NotStored)?.note_progress(strokes)
     }
 
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+    /// # Panics
+    /// When a step is due meanwhile, as above.
+    fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
+        let before = self.state.steps();
+        self.pass(self.write_ticks);
+        assert_eq!(self.state.steps(), before, "a step is due while the flash is written");
+        self.kept.as_mut().ok_or(NotStored)?.note_point(points)
+    }
+
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         self.kept.as_mut()?.progress(notes)
     }
 

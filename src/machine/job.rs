@@ -129,6 +129,8 @@ impl Machine<'_> {
     /// Begins a job of this size, whose moves come from `source`.
     pub(super) fn begin_job(&mut self, size: JobSize, source: Source) {
         self.end_log();
+        #[cfg(feature = "resume")]
+        self.begin_points(0);
         self.progress = Progress::begin(size, self.runner.run());
         self.reset_ink_budget();
         self.steady = Steady::default();
@@ -159,6 +161,10 @@ impl Machine<'_> {
         while self.activity.is_moving() {
             self.read_targets(path);
             if self.waits_for_log() {
+                return;
+            }
+            #[cfg(feature = "resume")]
+            if self.rests_in_stroke(queue) {
                 return;
             }
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
@@ -265,7 +271,7 @@ impl Machine<'_> {
         if self.segmenter.is_some() {
             self.push_segments();
         }
-        while self.activity.reads_path() && self.has_room() {
+        while self.activity.reads_path() && self.has_room() && self.reads_on() {
             match path.next_target() {
                 Some(first) if path.pen() != self.pen => {
                     self.end_targets(Source::PenChange { pen: path.pen(), first });
@@ -273,8 +279,9 @@ impl Machine<'_> {
                 // The whole path was measured at the start, so every move fits.
                 Some(target) => {
                     let limit = self.steady_limit(path, target);
-                    if self.push(target, limit).is_err() {
-                        self.abort();
+                    match self.push(target, limit) {
+                        Ok(length) => self.pass_point(target, length),
+                        Err(_) => self.abort(),
                     }
                 }
                 #[cfg(feature = "stream")]

@@ -28,6 +28,8 @@ mod steady;
 mod stream;
 mod stroke_ends;
 mod stroke_log;
+#[cfg(feature = "resume")]
+mod stroke_points;
 mod tool;
 mod travel;
 
@@ -41,6 +43,8 @@ pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value
 pub use state::{Alarm, MachineError, State};
 pub use status::Status;
 pub use stroke_ends::StrokeEnds;
+#[cfg(feature = "resume")]
+pub use stroke_points::StrokePoints;
 pub use tool::{Pen, Solenoid, servo};
 
 use backlash::Backlash;
@@ -49,6 +53,8 @@ use segmenter::Segmenter;
 use state::{Activity, Source};
 use steady::Steady;
 use stroke_log::StrokeLog;
+#[cfg(feature = "resume")]
+use stroke_points::StrokeRest;
 use tool::Tool;
 
 use crate::drawing::PagePoint;
@@ -88,6 +94,12 @@ pub struct Machine<'m> {
     pen: u8,
     /// How far the strokes of the job have been noted.
     log: StrokeLog,
+    /// The points within strokes at which the machine rests.
+    #[cfg(feature = "resume")]
+    points: StrokePoints,
+    /// How far it has come with such a rest.
+    #[cfg(feature = "resume")]
+    rest: StrokeRest,
     /// The ticks of all events when the drivers were switched off at rest.
     #[cfg(feature = "driver-pins")]
     released_at: u32,
@@ -124,6 +136,10 @@ impl<'m> Machine<'m> {
             ahead_ticks,
             progress: Progress::default(),
             log: StrokeLog::default(),
+            #[cfg(feature = "resume")]
+            points: StrokePoints::default(),
+            #[cfg(feature = "resume")]
+            rest: StrokeRest::default(),
             segmenter: None,
             steady: Steady::default(),
             slack: Backlash::default(),
@@ -288,9 +304,12 @@ impl<'m> Machine<'m> {
             self.steady = Steady::default();
             self.pen = pen;
             source = Source::Path;
-            if self.push(first, PathLength::MAX).is_err() {
-                self.abort();
-                return;
+            match self.push(first, PathLength::MAX) {
+                Ok(length) => self.pass_point(first, length),
+                Err(_) => {
+                    self.abort();
+                    return;
+                }
             }
         }
         self.runner.resume();

@@ -33,10 +33,20 @@ struct Open {
 }
 
 #[cfg(feature = "resume")]
+impl StrokeLog {
+    /// Whether strokes and points are noted.
+    pub(super) const fn is_open(&self) -> bool {
+        self.open.is_some()
+    }
+}
+
+#[cfg(feature = "resume")]
 impl Machine<'_> {
-    /// Lets the machine wait after each stroke of the job that has just begun until it is noted.
-    /// Call it after [`Machine::start`] or [`Machine::start_rest`].
-    pub fn log_strokes(&mut self) {
+    /// Lets the machine wait after each stroke of the job that has just begun until it is noted,
+    /// and at each of its points, of which so many were passed before. Call it after
+    /// [`Machine::start`] or [`Machine::start_rest`].
+    pub fn log_strokes(&mut self, points: u32) {
+        self.begin_points(points);
         let drawn = self.progress.done(self.runner.run()).strokes;
         let noted = self.runner.strokes_over();
         let begin = noted.wrapping_sub(drawn);
@@ -89,13 +99,15 @@ impl Machine<'_> {
         self.log.open = (!is_over).then_some(Open { noted, ..open });
     }
 
-    /// Stops noting strokes.
+    /// Stops noting strokes and points.
     pub fn end_log(&mut self) {
         self.log.open = None;
+        self.point_noted();
     }
 
     /// The job is given up, so the stroke in which that happens is not drawn to its end.
     pub(super) fn limit_log(&mut self) {
+        self.point_noted();
         let over = self.runner.strokes_over();
         if let Some(open) = &mut self.log.open {
             if open.noted == over {
@@ -135,4 +147,12 @@ impl Machine<'_> {
 
     /// The path was planned to its end.
     pub(super) const fn complete_log(&mut self) {}
+
+    /// No point is passed.
+    pub(super) const fn pass_point(&mut self, _: super::Target, _: crate::motion::PathLength) {}
+
+    /// Whether targets may be read: always.
+    pub(super) const fn reads_on(&self) -> bool {
+        true
+    }
 }

@@ -312,6 +312,26 @@ impl<'m> Runner<'m> {
         self.course.is_none() && self.lookahead.is_empty() && !self.emitter.is_open()
     }
 
+    /// Whether all blocks are run. The pen is where it was with the last one.
+    #[cfg(feature = "resume")]
+    pub fn has_run_all(&self) -> bool {
+        self.course.is_none() && self.lookahead.is_empty()
+    }
+
+    /// Ends the events of all blocks that are run, and leaves the pen where it is.
+    ///
+    /// # Errors
+    /// The event that the queue refused although it had room.
+    #[cfg(feature = "resume")]
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    pub fn rest_on_paper(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        if self.emitter.is_open() {
+            let at = self.emitter.rest(self.now, true, queue)?;
+            self.advance_to(at);
+        }
+        Ok(())
+    }
+
     /// Whether the pen was last told to go down.
     pub fn pen_is_down(&self) -> bool {
         self.pen_is_down == Some(true)

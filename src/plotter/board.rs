@@ -6,6 +6,7 @@
 use crate::machine::Contacts;
 use crate::motion::EventQueue;
 use crate::protocol::RealTime;
+use crate::storage::Noted;
 
 /// A board: its serial ports, and the interrupt that turns step events into pin levels.
 pub trait Board {
@@ -109,10 +110,19 @@ pub trait Board {
         let _ = strokes;
         Err(NotStored)
     }
+    /// Keeps that so many points within strokes of the job have been passed. The call may block
+    /// for a few milliseconds, so it is only made while the machine stands and no step waits.
+    ///
+    /// # Errors
+    /// [`NotStored`] if the flash does not take it.
+    fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
+        let _ = points;
+        Err(NotStored)
+    }
     /// Copies the notes of the job that was saved last to the front of `notes`, and goes on to keep
-    /// how far that job comes. Returns the length of the notes and the number of strokes drawn;
-    /// `None` if no drawing of that job has begun.
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+    /// how far that job comes. Returns the length of the notes and how many strokes are drawn and
+    /// points within strokes are passed; `None` if no drawing of that job has begun.
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         let _ = notes;
         None
     }

@@ -4,7 +4,7 @@
 //! A board owns a [`Kept`] and passes its calls of [`Board`](super::Board) on to it.
 
 use super::{NotStored, Record, Stored};
-use crate::storage::{Log, Slots};
+use crate::storage::{Log, Noted, Slots};
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 
 /// Where in the flash each record lies.
@@ -57,8 +57,8 @@ impl Layout {
 struct OpenLog {
     /// Where it lies in the flash.
     log: Log,
-    /// How many strokes are noted in it.
-    strokes: u32,
+    /// How many strokes are noted in it, and how many points within strokes.
+    noted: Noted,
 }
 
 /// The records in the flash `F`.
@@ -114,7 +114,7 @@ impl<F: MultiwriteNorFlash> Kept<F> {
             return Err(NotStored);
         }
         log.begin(&mut self.flash, sum, notes).map_err(|_| NotStored)?;
-        self.open = Some(OpenLog { log, strokes: 0 });
+        self.open = Some(OpenLog { log, noted: Noted::default() });
         Ok(())
     }
 
@@ -124,17 +124,28 @@ impl<F: MultiwriteNorFlash> Kept<F> {
     /// [`NotStored`] if no log is open or the flash does not take it.
     pub fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
         let open = self.open.as_mut().ok_or(NotStored)?;
-        open.log.note(&mut self.flash, open.strokes, strokes).map_err(|_| NotStored)?;
-        open.strokes = open.strokes.max(strokes);
+        open.log.note(&mut self.flash, open.noted.parts, strokes).map_err(|_| NotStored)?;
+        open.noted.parts = open.noted.parts.max(strokes);
+        Ok(())
+    }
+
+    /// Carries out [`Board::note_point`](super::Board::note_point).
+    ///
+    /// # Errors
+    /// [`NotStored`] if no log is open or the flash does not take it.
+    pub fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
+        let open = self.open.as_mut().ok_or(NotStored)?;
+        open.log.note_points(&mut self.flash, open.noted.points, points).map_err(|_| NotStored)?;
+        open.noted.points = open.noted.points.max(points);
         Ok(())
     }
 
     /// Carries out [`Board::progress`](super::Board::progress).
-    pub fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+    pub fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         let (slot, sum) = self.layout.job.identify(&mut self.flash)?;
         let log = *self.layout.logs.get(slot)?;
-        let (length, strokes) = log.read(&mut self.flash, sum, notes)?;
-        self.open = Some(OpenLog { log, strokes });
-        Some((length, strokes))
+        let (length, noted) = log.read(&mut self.flash, sum, notes)?;
+        self.open = Some(OpenLog { log, noted });
+        Some((length, noted))
     }
 }

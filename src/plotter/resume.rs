@@ -31,19 +31,21 @@ pub(super) struct Resumption {
 mod with_feature {
     use super::{Board, Index, Inner, Reply, Resumption};
     use crate::checksum::Crc32;
-    use crate::machine::{Setting, Settings, State, Value};
+    use crate::machine::{Path, Setting, Settings, State, Value};
     use crate::plotter::listener::MeasuredStrokes;
     use crate::plotter::records;
     use crate::protocol::CommandError;
     use crate::stage::Cancel;
+    use crate::storage::Noted;
 
     /// The settings that decide where ink falls, so that they must be the same in all parts of a
     /// drawing.
-    const PLACING: [Setting; 15] = [
+    const PLACING: [Setting; 16] = [
         Setting::InvertDirections,
         Setting::HomingPullOff,
         Setting::StepsPerMmX,
         Setting::StepsPerMmY,
+        Setting::PointDistance,
         Setting::DotLength,
         Setting::Kinematics,
         Setting::AnchorWidth,
@@ -58,7 +60,7 @@ mod with_feature {
     ];
 
     /// A mark at the beginning of the notes; those with another layout have another mark.
-    const LAYOUT: u32 = u32::from_le_bytes(*b"run1");
+    const LAYOUT: u32 = u32::from_le_bytes(*b"run2");
     /// Number of words before the settings: layout, version, strokes, whether the model is known,
     /// and the checksums of model and options.
     const HEAD: usize = 6;
@@ -122,7 +124,8 @@ mod with_feature {
         /// Looks for a job that the last run of the firmware did not finish.
         #[inline(never)] // Keeps its frame off the stack while the stages run.
         pub(in crate::plotter) fn find_stopped<B: Board>(&mut self, board: &mut B) {
-            self.resumption.progress = read(board).map(|(notes, done)| [done, strokes(&notes)]);
+            self.resumption.progress =
+                read(board).map(|(notes, noted)| [noted.parts, strokes(&notes)]);
             self.resumption.is_lost = true;
         }
 
@@ -143,13 +146,17 @@ mod with_feature {
             if board.begin_progress(notes.as_flattened(), strokes).is_err() {
                 return refuse(board);
             }
-            self.machine.log_strokes();
+            self.machine.log_strokes(0);
             self.resumption.progress = Some([0, strokes]);
         }
 
-        /// Keeps that a stroke has been drawn, if the pins have just drawn it and stand.
+        /// Keeps that a stroke has been drawn, or that a point within one has been passed, if the
+        /// pins have just done so and stand.
         #[inline(always)] // It is called in every turn of the main loop.
         pub(in crate::plotter) fn note_progress<B: Board>(&mut self, board: &mut B) {
+            if let Some(points) = self.machine.point_to_note() {
+                self.note_point(points, board);
+            }
             if self.machine.may_note_stroke()
                 && let Some(strokes) = self.machine.stroke_to_note()
             {
@@ -171,8 +178,20 @@ mod with_feature {
             }
         }
 
-        /// Loads the job that has stopped, and returns how many of its strokes are drawn. With
-        /// `at_origin` the user has put the pen at the origin.
+        /// Keeps that so many points within strokes have been passed.
+        #[inline(never)] // Inlined, it would take room in the main loop.
+        fn note_point<B: Board>(&mut self, points: u32, board: &mut B) {
+            let kept = board.note_point(points);
+            self.machine.point_noted();
+            if kept.is_err() {
+                self.machine.end_log();
+                self.resumption.progress = None;
+                refuse(board);
+            }
+        }
+
+        /// Loads the job that has stopped, and returns how much of it is drawn. With `at_origin`
+        /// the user has put the pen at the origin.
         ///
         /// # Errors
         /// [`CommandError::NothingToResume`] if no job has stopped, or the reason why it cannot go
@@ -182,9 +201,9 @@ mod with_feature {
             &mut self,
             at_origin: bool,
             board: &mut B,
-        ) -> Result<u32, CommandError> {
-            let (notes, done) = read(board).ok_or(CommandError::NothingToResume)?;
-            if done >= strokes(&notes) {
+        ) -> Result<Noted, CommandError> {
+            let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
+            if noted.parts >= strokes(&notes) {
                 return Err(CommandError::NothingToResume);
             }
             self.check_notes(&notes)?;
@@ -199,8 +218,8 @@ mod with_feature {
                 self.machine.declare_origin()?;
             }
             self.resumption =
-                Resumption { progress: Some([done, strokes(&notes)]), is_lost: false };
-            Ok(done)
+                Resumption { progress: Some([noted.parts, strokes(&notes)]), is_lost: false };
+            Ok(noted)
         }
 
         /// Checks that what a job depends on is as it was when the job began.
@@ -227,14 +246,14 @@ mod with_feature {
             Ok(())
         }
 
-        /// Hands the rest of the job to the machine, of which so many strokes are `drawn`.
+        /// Hands the rest of the job to the machine, of which so much is `drawn`.
         ///
         /// # Errors
         /// The machine's refusal, or [`CommandError::Aborted`].
         #[inline(never)] // Keeps its frame off the stack while the stages run.
         pub(in crate::plotter) fn begin_rest(
             &mut self,
-            drawn: u32,
+            drawn: Noted,
             cancel: &mut dyn Cancel,
         ) -> Result<(), CommandError> {
             let ends = self.machine.stroke_ends();
@@ -244,28 +263,34 @@ mod with_feature {
             if strokes.aborted {
                 return Err(CommandError::Aborted);
             }
-            if !strokes.strokes.begin_at(drawn) {
+            if !strokes.strokes.begin_at(drawn.parts) {
                 return Err(CommandError::NoJobKept);
+            }
+            let (mut points, distance) = (0, self.machine.point_distance());
+            if drawn.points > 0 && distance > 0 {
+                let length = |ends| self.machine.length(ends);
+                let Noted { parts, points: passed } = drawn;
+                points = strokes.strokes.begin_at_point(parts, passed, distance, &length);
             }
             self.machine.start_rest(&mut strokes, whole)?;
             if strokes.aborted {
                 self.machine.abort();
                 return Err(CommandError::Aborted);
             }
-            strokes.strokes.begin_at(drawn);
+            strokes.strokes.rewind();
             if self.machine.state() == State::Run {
-                self.machine.log_strokes();
+                self.machine.log_strokes(points);
             }
             Ok(())
         }
     }
 
-    /// Reads the notes of the kept job, and how many of its strokes are drawn.
-    fn read<B: Board>(board: &mut B) -> Option<(Notes, u32)> {
+    /// Reads the notes of the kept job, and how much of it is drawn.
+    fn read<B: Board>(board: &mut B) -> Option<(Notes, Noted)> {
         let mut notes: Notes = [[0; 4]; WORDS];
-        let (length, done) = board.progress(notes.as_flattened_mut())?;
+        let (length, noted) = board.progress(notes.as_flattened_mut())?;
         let [layout, ..] = notes.map(u32::from_le_bytes);
-        (length == size_of::<Notes>() && layout == LAYOUT).then_some((notes, done))
+        (length == size_of::<Notes>() && layout == LAYOUT).then_some((notes, noted))
     }
 
     /// The number of strokes of a job.

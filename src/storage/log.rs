@@ -3,7 +3,8 @@
 //! A log lies in sectors of its own. [`Log::begin`] erases them and writes a page at their front;
 //! from then on [`Log::note`] clears one bit after the other, each by a write of one page, so that
 //! nothing has to be erased while the work goes on. The number of bits that are clear, from the
-//! first one on, is how far it has come.
+//! first one on, is how far it has come. A second count of the same kind begins at the last bit:
+//! how many points are passed within the parts of the work.
 //!
 //! The first page begins with four words in little-endian order: a mark, the checksum of the state
 //! to which the log belongs, the length of the notes in bytes, and the CRC-32 of these three and
@@ -22,6 +23,15 @@ pub const NOTE_BYTES: usize = PAGE_BYTES - HEADER_BYTES;
 /// How many bytes of bits are read at a time.
 const PIECE_BYTES: usize = 32;
 
+/// How far the work has come that a log describes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Noted {
+    /// How many parts of the work are done.
+    pub parts: u32,
+    /// How many points within its parts are passed, counted over all of the work.
+    pub points: u32,
+}
+
 /// Where a log lies in flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Log {
@@ -32,8 +42,18 @@ pub struct Log {
 }
 
 impl Log {
-    /// The number of bits that can be cleared.
+    /// The number of parts of the work that can be noted: three quarters of the bits.
     pub const fn limit(self) -> u32 {
+        self.bits() / 4 * 3
+    }
+
+    /// The number of points that can be noted: a quarter of the bits.
+    pub const fn points_limit(self) -> u32 {
+        self.bits() / 4
+    }
+
+    /// The number of bits that can be cleared: those of all pages but the first.
+    const fn bits(self) -> u32 {
         (self.bytes - PAGE_BYTES as u32) * 8
     }
 
@@ -64,14 +84,14 @@ impl Log {
     }
 
     /// Copies the notes of the log of the state with the checksum `of` to the front of `notes`.
-    /// Returns their length and the number of bits that are clear, or `None` if no such log has
-    /// begun, or if its notes do not fit.
+    /// Returns their length and what has been noted, or `None` if no such log has begun, or if its
+    /// notes do not fit.
     pub fn read<F: ReadNorFlash>(
         self,
         flash: &mut F,
         of: u32,
         notes: &mut [u8],
-    ) -> Option<(usize, u32)> {
+    ) -> Option<(usize, Noted)> {
         let mut header = [0; HEADER_BYTES];
         read_surely(flash, self.start, &mut header).ok()?;
         let [mark, found, length, sum] = words(header);
@@ -80,7 +100,10 @@ impl Log {
             return None;
         }
         read_surely(flash, self.start + HEADER_BYTES as u32, notes).ok()?;
-        (sum == checksum(of, notes)).then(|| (notes.len(), self.count(flash)))
+        (sum == checksum(of, notes)).then(|| {
+            let noted = Noted { parts: self.count(flash), points: self.count_points(flash) };
+            (notes.len(), noted)
+        })
     }
 
     /// Returns the number of bits that are clear, from the first one on. A flash that fails ends
@@ -103,8 +126,43 @@ impl Log {
         count
     }
 
-    /// Clears the bits from number `from` up to number `to`, which is excluded. Bits beyond
-    /// [`Log::limit`] are left out.
+    /// Returns the number of bits that are clear, from the last one back. A flash that fails ends
+    /// the count.
+    fn count_points<F: ReadNorFlash>(self, flash: &mut F) -> u32 {
+        let mut count = 0;
+        let mut piece = [0; PIECE_BYTES];
+        while count < self.points_limit() {
+            let at = self.start + self.bytes - count / 8 - PIECE_BYTES as u32;
+            if read_surely(flash, at, &mut piece).is_err() {
+                break;
+            }
+            for byte in piece.into_iter().rev() {
+                count += byte.leading_zeros().min(8);
+                if byte != 0 {
+                    return count;
+                }
+            }
+        }
+        count
+    }
+
+    /// Notes the points from number `from` up to number `to`, which is excluded, by clearing bits
+    /// from the last one back. Points beyond [`Log::points_limit`] are left out.
+    ///
+    /// # Errors
+    /// The error of the flash.
+    pub fn note_points<F: MultiwriteNorFlash>(
+        self,
+        flash: &mut F,
+        from: u32,
+        to: u32,
+    ) -> Result<(), F::Error> {
+        let limit = self.points_limit();
+        self.clear(flash, self.bits() - to.min(limit), self.bits() - from.min(limit))
+    }
+
+    /// Notes the parts from number `from` up to number `to`, which is excluded, by clearing bits
+    /// from the first one on. Parts beyond [`Log::limit`] are left out.
     ///
     /// # Errors
     /// The error of the flash.
@@ -114,8 +172,17 @@ impl Log {
         from: u32,
         to: u32,
     ) -> Result<(), F::Error> {
+        self.clear(flash, from, to.min(self.limit()))
+    }
+
+    /// Clears the bits from number `from` up to number `to`, which is excluded.
+    fn clear<F: MultiwriteNorFlash>(
+        self,
+        flash: &mut F,
+        from: u32,
+        to: u32,
+    ) -> Result<(), F::Error> {
         const PAGE_BITS: u32 = PAGE_BYTES as u32 * 8;
-        let to = to.min(self.limit());
         let mut from = from;
         while from < to {
             let page_begin = from / PAGE_BITS * PAGE_BITS;

@@ -44,6 +44,7 @@ use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
 use penup::plotter::{Board, Kept, Memory, MemorySlices, NotStored, Record, Replies, Stored};
 use penup::protocol::RealTime;
+use penup::storage::Noted;
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::Pins;
@@ -244,7 +245,11 @@ impl Board for Pico {
         self.kept.note_progress(strokes)
     }
 
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+    fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
+        self.kept.note_point(points)
+    }
+
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         self.kept.progress(notes)
     }
 

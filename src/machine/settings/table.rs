@@ -121,6 +121,9 @@ pub enum Setting {
     PenS,
     /// `$217` Whether the pen is down below that S. Otherwise above.
     PenSBelow,
+    /// `$219` How much of a stroke is drawn from one point at which the machine rests, to keep how
+    /// far it has come, to the next. 0 if it does not rest.
+    PointDistance,
     /// `$220` The length of the dots and gaps of a dotted line. A dash is three dots long.
     DotLength,
     /// `$221` By how much a closed stroke of a drawing goes on beyond its end, along its beginning.
@@ -217,6 +220,16 @@ const DRIVER_RANGES: [(f64, f64, f64); 3] = if DRIVER_PINS {
     [(255.0, 255.0, 255.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)]
 };
 
+/// Whether the board keeps how far a job has come. On other boards [`Setting::PointDistance`] has
+/// one value.
+const KEEPS_POINTS: bool = cfg!(feature = "resume");
+/// The name of [`Setting::PointDistance`].
+const POINT_NAME: &str =
+    if KEEPS_POINTS { "within strokes keep the point reached each" } else { "(not on this board)" };
+/// Its least and greatest value, and its default.
+const POINT_RANGE: (f64, f64, f64) =
+    if KEEPS_POINTS { (0.0, 10000.0, 0.0) } else { (0.0, 0.0, 0.0) };
+
 /// All settings, sorted by number: number, name, unit, range with default, and whether only whole
 /// numbers are allowed.
 #[rustfmt::skip] // a table
@@ -275,6 +288,7 @@ pub const SETTINGS: &[SettingInfo] = {
         row(InkBeforePause, 215, "drawn length before a pause", "m", (0.0, 10000.0, 0.0), false),
         row(PenS, 216, "pen down at S", "", (0.0, 32767.0, 45.0), false),
         row(PenSBelow, 217, "pen down at higher S, lower S", "0|1", (0.0, 1.0, 0.0), true),
+        row(PointDistance, 219, POINT_NAME, "m", POINT_RANGE, false),
         row(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
         row(StrokeOverlap, 221, "closed strokes go on by", "mm", (0.0, 10.0, 0.0), false),
         row(StrokeLead, 222, "open strokes begin early by", "mm", (0.0, 10.0, 0.0), false),

@@ -4,6 +4,8 @@ use crate::drawing::{Drawing, LineType, PagePoint, Segment};
 use crate::index::Index;
 #[cfg(feature = "stream")]
 use crate::machine::Late;
+#[cfg(feature = "resume")]
+use crate::machine::StrokePoints;
 use crate::machine::{Path, StrokeEnds, Target};
 use crate::motion::PathLength;
 use crate::order::Leg;
@@ -24,11 +26,29 @@ pub struct Cursor<I = u16> {
     /// Index in the tour of the segment with which the path begins.
     #[cfg(feature = "resume")]
     path_start: usize,
+    /// Index in the tour of the first segment of the stroke within which the path begins, if it
+    /// begins within one.
+    #[cfg(feature = "resume")]
+    within: Option<usize>,
     /// Index in the tour of the first segment of the stroke, or, while a closed stroke goes on
     /// beyond its end, of the segment along which it does so.
     first: usize,
     /// How much further it goes on.
     beyond: PathLength,
+}
+
+impl<I> Cursor<I> {
+    /// Index in the tour of the first segment of a stroke that is handed over from this one on.
+    #[inline(always)] // Where steps are planned.
+    fn stroke_start(&self, index: usize) -> usize {
+        #[cfg(feature = "resume")]
+        if let Some(first) = self.within
+            && index == self.path_start
+        {
+            return first;
+        }
+        index
+    }
 }
 
 /// The strokes of a job, as the [`Path`] that the machine follows. A pen-up move is inserted
@@ -84,7 +104,8 @@ impl<'a, I: Index> Strokes<'a, I> {
     fn early(&self, ends: &StrokeEnds, index: usize) -> Option<PagePoint> {
         let (segment, numbers) = self.leg(index)?;
         let [from, to] = self.points(numbers)?;
-        if ends.lead == 0 || segment.line_type() != LineType::Full || self.is_closed(index) {
+        let is_early = ends.lead > 0 && self.cursor.stroke_start(index) == index;
+        if !is_early || segment.line_type() != LineType::Full || self.is_closed(index) {
             return Some(from);
         }
         Some(ends.along([to, from], from, ends.lead))
@@ -150,7 +171,7 @@ impl<I: Index> Path for Strokes<'_, I> {
         let number = if begins_here { to } else { from };
         let mut point = *self.drawing.points.get(number.get())?;
         if !begins_here || self.cursor.pen != segment.pen() {
-            self.cursor.first = index;
+            self.cursor.first = self.cursor.stroke_start(index);
         }
         self.cursor.at = Some(number);
         self.cursor.pen = segment.pen();
@@ -171,6 +192,8 @@ impl<I: Index> Path for Strokes<'_, I> {
             leg: self.cursor.path_start,
             #[cfg(feature = "resume")]
             path_start: self.cursor.path_start,
+            #[cfg(feature = "resume")]
+            within: self.cursor.within,
             ..Cursor::default()
         };
     }
@@ -210,5 +233,45 @@ impl<I: Index> Strokes<'_, I> {
             }
             (inked, pen) = (ink.is_some(), self.pen());
         }
+    }
+
+    /// Lets the path begin within this stroke, at the last one of so many points that are passed
+    /// along the whole path, if it lies there; else with the stroke, as [`Strokes::begin_at`] does.
+    /// `distance` and `length` are the machine's
+    /// [`point_distance`](crate::machine::Machine::point_distance) and
+    /// [`length`](crate::machine::Machine::length). Returns the number of points before the path.
+    pub fn begin_at_point(
+        &mut self,
+        stroke: u32,
+        points: u32,
+        distance: u64,
+        length: &dyn Fn([PagePoint; 2]) -> u64,
+    ) -> u32 {
+        *self.cursor = Cursor::default();
+        let mut walk = StrokePoints::new(0, distance);
+        let (mut inked, mut pen, mut begun, mut before) = (false, 0, 0u32, 0);
+        let mut at = None;
+        while let Some(target) = self.next_target() {
+            if target.ink.is_some() && (!inked || self.pen() != pen) {
+                if begun == stroke {
+                    before = walk.passed;
+                } else if begun > stroke {
+                    break;
+                }
+                begun += 1;
+            }
+            let way = at.map_or(0, |at| length([at, target.point]));
+            let is_last_point = walk.pass(target, way) && walk.passed == points;
+            let leg = self.cursor.leg;
+            // A point where the stroke ends, or where it goes on beyond its end, is none.
+            if is_last_point && begun > stroke && !self.ends_stroke(leg.saturating_sub(1)) {
+                let within = Some(self.cursor.first);
+                *self.cursor = Cursor { leg, path_start: leg, within, ..Cursor::default() };
+                return points;
+            }
+            (inked, pen, at) = (target.ink.is_some(), self.pen(), Some(target.point));
+        }
+        self.begin_at(stroke);
+        before
     }
 }
