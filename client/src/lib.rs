@@ -4,9 +4,9 @@
 //! A job passes through the modules in this order. [`cli`] reads the command line, [`files`] has
 //! the file read by [`penup_readers`], and a [`Job`](penup_job::Job) joins both into the lines to
 //! send. [`plot`] draws it, by a plotter that computes it, or by strokes of this computer, as
-//! [`compute`] chooses. [`sender`] sends these lines over a [`link`] and follows the plotter's replies with
-//! [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an [`emulator`] of
-//! one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
+//! [`compute`] chooses. [`sender`] sends these lines over a [`link`] and follows the plotter's
+//! replies with [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an
+//! [`emulator`] of one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
 //! [`penup_job::picture`] renders its path, [`png`] the image of that, [`penup_job::export`] writes
 //! it for other machines, and [`output`] writes the files. [`penup_job::results`] are what is known
 //! about a job afterwards.

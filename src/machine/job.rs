@@ -85,11 +85,7 @@ impl Machine<'_> {
     #[cfg(feature = "stream")]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn stands_for_late_path(&mut self, path: &dyn Path, progress: RunnerProgress) -> bool {
-        let (Activity::Run(Source::Path) | Activity::Hold { source: Source::Path, .. }, Some(late)) =
-            (self.activity, path.late())
-        else {
-            return false;
-        };
+        let Some(late) = path.late().filter(|_| self.activity.reads_path()) else { return false };
         // After a hold the machine stands for that.
         if progress != RunnerProgress::Done {
             return false;

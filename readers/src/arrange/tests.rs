@@ -209,7 +209,10 @@ proptest! {
     }
 
     #[test]
-    fn points_that_are_left_out_stay_within_the_tolerance(plan in plans(), tolerance in 0.1..10.0_f64) {
+    fn points_that_are_left_out_stay_within_the_tolerance(
+        plan in plans(),
+        tolerance in 0.1..10.0_f64,
+    ) {
         let before = after(&plan, &[]);
         let simple = after(&plan, &[("simplify", &tolerance.to_string())]);
         prop_assert!(corners(&simple) <= corners(&before));

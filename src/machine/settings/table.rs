@@ -252,7 +252,7 @@ pub const SETTINGS: &[SettingInfo] = {
         row(Homing, 22, "homing", "0|1", (0.0, 1.0, 0.0), true),
         row(HomingDirection, 23, "switches at the low end", "mask", (0.0, 3.0, 3.0), true),
         row(HomingFeed, 24, "homing speed, slow approach", "mm/min", (1.0, 32767.0, 60.0), false),
-        row(HomingSeek, 25, "homing speed, first approach", "mm/min", (1.0, 32767.0, 1500.0), false),
+        row(HomingSeek, 25, "homing speed, fast approach", "mm/min", (1.0, 32767.0, 1500.0), false),
         row(HomingDebounce, 26, "homing pause for the switches", "ms", (0.0, 1000.0, 0.0), false),
         row(HomingPullOff, 27, "homing pull-off", "mm", (0.1, 50.0, 2.0), false),
         row(MaxSpindle, 30, "greatest S", "", (1.0, 32767.0, 1000.0), false),
