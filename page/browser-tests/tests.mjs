@@ -8,6 +8,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { after, before, test } from "node:test";
 import { promisify } from "node:util";
+import { ball } from "./ball.mjs";
 import { serve, start } from "./browser.mjs";
 import { fakeSerial } from "./fake-serial.mjs";
 
@@ -247,6 +248,26 @@ test("keys, undo, names of controls", async () => {
   for (const name of flags.filter((flag) => !own.has(flag))) {
     assert.equal(await page.locator(`#option-${name}`).count(), 1, name);
   }
+  assert.deepEqual(problems, []);
+});
+
+test("a large model turns as outlines, and has all its lines when it rests", async () => {
+  await fresh();
+  const file = { name: "ball.obj", mimeType: "text/plain", buffer: ball(101) };
+  await page.setInputFiles("#file", file);
+  await page.waitForFunction(() => /^ball/.test(document.getElementById("file-name").textContent));
+  const count = () => page.evaluate(() => window.penup.lines().length / 5);
+  await page.waitForFunction(() => window.penup.lines().length > 5 * 8000);
+  const whole = await count();
+  await page.focus("#sheet");
+  await page.keyboard.press("ArrowRight");
+  await page.waitForFunction((most) => window.penup.lines().length < most, 5 * 1000);
+  assert.ok((await count()) > 50, "the outlines are drawn");
+  // Nothing else is asked for.
+  await page.waitForFunction(() => window.penup.frames.whole.length === 1);
+  assert.ok((await count()) > 0.9 * whole, "all lines are drawn at rest");
+  await page.keyboard.press("Control+z");
+  await page.waitForFunction((all) => window.penup.lines().length === all, 5 * whole);
   assert.deepEqual(problems, []);
 });
 

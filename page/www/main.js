@@ -17,6 +17,10 @@ const $ = (id) => document.getElementById(id);
 const LARGEST_FILE = 64 << 20;
 /** How long the camera rests before the whole drawing is computed, in ms. */
 const REST = 350;
+/** How long a large model rests before it is drawn with all its lines, in ms. */
+const SETTLE = 150;
+/** With more faces, a model is large: while it turns, only its outlines are drawn. */
+const LARGE = 10_000;
 /** How many steps back are kept. */
 const MOST_UNDOS = 200;
 const EXAMPLES = ["notched", "lattice3", "interpen", "lblock", "gears", "isobars"];
@@ -41,12 +45,16 @@ let lines = new Float32Array(),
   drawsBusy = false,
   drawsAgain = false,
   reads = false,
-  arranges = false;
+  arranges = false,
+  isTurning = false;
 let tab = "see",
   restTimer = 0,
   lastBegin = "";
-/** Times of frames and of the longest task in ms. Tests read them by `window.penup`. */
-const frames = { compute: [], from: [], longest: 0 };
+/**
+ * Times of frames, of those with all lines of a large model that has turned, and of the longest
+ * task, in ms. Tests read them by `window.penup`.
+ */
+const frames = { compute: [], from: [], whole: [], longest: 0 };
 let view, controls, drawing, plotting, helper;
 
 main().catch((error) =>
@@ -67,7 +75,7 @@ async function main() {
   drawing = new Drawing(view, JSON.parse(library.boards()), { job, announce });
   plotting = new Plotting(view, { job, announce, lines: () => lines, program: await joined() });
   for (const name of EXAMPLES) $("example").append(new Option(name, `${name}.obj`));
-  window.penup = { frames, drawing, plotting, view };
+  window.penup = { frames, drawing, plotting, view, lines: () => lines };
   listenToPage();
   const link = new Map(fromLink(location.hash));
   const given = link.get("given"),
@@ -191,6 +199,7 @@ async function open(name, bytes, nextValues = values) {
 /** A control has a new value; `null` is the default. */
 function change(name, value) {
   remember(name);
+  isTurning = false;
   if (value === null) values.delete(name);
   else values.set(name, value);
   reads ||= name === "pens";
@@ -246,8 +255,21 @@ function link() {
 
 // The picture of the camera.
 
-/** Draws what the camera sees. One frame is computed at a time, with the newest values. */
-async function draw(name = null) {
+/** Whether the model has so many faces that it turns as outlines. */
+function isLarge() {
+  return scene?.faces > LARGE;
+}
+
+/** The options of a quick picture: only silhouettes and open edges, with hidden lines removed. */
+function outlines() {
+  return [...pairs().filter(([name]) => name !== "crease"), ["crease", "180"]];
+}
+
+/**
+ * Draws what the camera sees. One frame is computed at a time, with the newest values. A large
+ * model that turns is drawn as outlines until it rests, unless it `isWhole`.
+ */
+async function draw(name = null, isWhole = false) {
   drawing.outdated();
   clearTimeout(restTimer);
   if (drawsBusy) {
@@ -256,20 +278,24 @@ async function draw(name = null) {
   }
   drawsBusy = true;
   const began = performance.now();
+  const isQuick = isTurning && !isWhole && isLarge() && !reads && !arranges;
   let problem = null;
   try {
     if (arranges && file) {
       ({ file, scene } = await readFile(file.name, file.bytes, new Map(pairs())));
       note(scene.notes);
     }
-    const options = JSON.stringify(pairs());
+    const options = JSON.stringify(isQuick ? outlines() : pairs());
     const answer = await helper.ask("draw", { options, reads });
     reads = arranges = false;
     ({ lines, camera } = answer);
     view.page = answer.page;
-    frames.compute.push(answer.ms);
     view.draw();
-    frames.from.push(performance.now() - began);
+    if (isTurning && !isQuick && isLarge()) frames.whole.push(performance.now() - began);
+    else {
+      frames.compute.push(answer.ms);
+      frames.from.push(performance.now() - began);
+    }
   } catch (text) {
     problem = text;
   }
@@ -282,7 +308,9 @@ async function draw(name = null) {
   if (problem) fail(problem);
   else {
     hush();
-    restTimer = setTimeout(() => drawing.compute(), REST);
+    restTimer = isQuick
+      ? setTimeout(() => draw(null, true), SETTLE)
+      : setTimeout(() => drawing.compute(), REST);
   }
 }
 
@@ -299,6 +327,7 @@ function turn(about, up, nearer) {
   const eye = turned(camera, upwards(), about, up, nearer);
   camera = { ...camera, eye };
   values.set("eye", triple(eye));
+  isTurning = true;
   if (!values.has("at")) values.set("at", triple(camera.at));
   changed();
 }
