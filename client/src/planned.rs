@@ -256,8 +256,7 @@ impl Steps {
             return;
         }
         let doubled = 2 * u32::from(height);
-        let down =
-            if self.lowers_upwards { doubled < self.middle } else { doubled > self.middle };
+        let down = if self.lowers_upwards { doubled < self.middle } else { doubled > self.middle };
         let at = self.at;
         if let Some(job) = &mut self.job {
             job.path.set_pen(down);

@@ -216,8 +216,7 @@ mod tests {
 
     #[test]
     fn pens_dots_and_numbers_are_written_as_other_machines_read_them() {
-        let drawn =
-            lines(&[run(1, &[[1.0, 2.0], [3.5, -0.0001]]), run(3, &[[0.1, 0.2]])], ONCE);
+        let drawn = lines(&[run(1, &[[1.0, 2.0], [3.5, -0.0001]]), run(3, &[[0.1, 0.2]])], ONCE);
         let version = env!("CARGO_PKG_VERSION");
         assert_eq!(
             gcode(&drawn, 1500.0),
