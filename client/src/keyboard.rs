@@ -8,7 +8,8 @@
 use crate::link::Order;
 
 /// What the keys do, for the user.
-pub const KEYS: &str = "space pauses and goes on, + and - change the speed, q gives up";
+pub const KEYS: &str = "space pauses and goes on, + and - change the speed, in a pause u and d set the \
+                        lowered pen higher or lower, q gives up";
 
 /// A key that was pressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -27,6 +28,8 @@ impl Key {
             b' ' => Self::Order(Order::Pause),
             b'+' => Self::Order(Order::Faster),
             b'-' => Self::Order(Order::Slower),
+            b'u' | b'U' => Self::Order(Order::PenHigher),
+            b'd' | b'D' => Self::Order(Order::PenLower),
             b'q' | b'Q' => Self::Order(Order::GiveUp),
             _ => return None,
         })

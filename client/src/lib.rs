@@ -37,6 +37,7 @@ pub mod motion_plot;
 pub mod operate;
 pub mod outcome;
 pub mod output;
+pub mod planned;
 pub mod plot;
 pub mod png;
 pub mod ports;

@@ -35,6 +35,10 @@ pub enum Order {
     Faster,
     /// All speeds down by a tenth.
     Slower,
+    /// Lower the pen a little less far, while the machine holds.
+    PenHigher,
+    /// Lower the pen a little farther, while the machine holds.
+    PenLower,
     /// Give the job up.
     GiveUp,
 }

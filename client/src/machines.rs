@@ -4,7 +4,7 @@ use crate::emulator::{self, EmulatedBoard, EmulatorError};
 use crate::error::Error;
 use crate::link::Link;
 use crate::table::BoardRow;
-use penup_job::path::PenRuns;
+use penup_job::path::Run;
 use penup_job::sampled::SampledPath;
 use penup_job::watch::PenWatch;
 use std::fs;
@@ -17,7 +17,7 @@ pub trait WatchedPlotter: Link {
     ///
     /// # Errors
     /// The emulator ended, or its trace cannot be parsed.
-    fn pen_runs(&mut self) -> Result<PenRuns, Error>;
+    fn pen_runs(&mut self) -> Result<Vec<Run>, Error>;
 
     /// The samples of the path of the pen since the last call ([`SampledPath`]).
     ///
@@ -116,7 +116,7 @@ impl Link for Emulated {
 }
 
 impl WatchedPlotter for Emulated {
-    fn pen_runs(&mut self) -> Result<PenRuns, Error> {
+    fn pen_runs(&mut self) -> Result<Vec<Run>, Error> {
         self.follow_pins().map_err(|error| not_started(self.board, &error))?;
         Ok(self.pen.runs())
     }

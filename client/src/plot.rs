@@ -94,10 +94,10 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
             drawn
         });
     let report = drawn.map_err(|error| board.explain(error))?;
-    let pen = board.pen_runs()?;
+    let runs = board.pen_runs()?;
     drop(board);
     drop(moving);
-    let picture = Picture { page: settings.page, runs: pen.runs, step: pen.step };
+    let picture = Picture { page: settings.page, runs };
     drop(bar);
     let files = write_pictures(&picture, &outputs)?;
     Ok(source.bounded(summary(&files, report)))
@@ -245,10 +245,11 @@ fn note_keys() {
 pub fn draw(
     link: &mut dyn Link,
     job: &dyn Lines,
+    patience: Patience,
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
-    let mut sender = Sender::open(link, Patience::default(), interrupt)?;
+    let mut sender = Sender::open(link, patience, interrupt)?;
     let drawn = draw_by(&mut sender, job, 1, progress);
     sender.end();
     drawn

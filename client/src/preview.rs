@@ -1,35 +1,37 @@
 //! A plotter in memory: the plotter's library on this computer, behind the same interface as a
 //! serial line.
 //!
-//! Every line passes through the library's own protocol, and the job through its own interrupt code
-//! on a [`HostBoard`]. A preview therefore shows what a plotter would do, including its refusals.
+//! Every line passes through the library's own protocol, and the job through its own planner, whose
+//! steps a [`PlannedBoard`] carries out. A preview therefore shows what a plotter would do,
+//! including its refusals.
 
 use crate::error::Error;
 use crate::link::Link;
 use crate::motion_plot::{self, Motion};
-use penup::boards::host::{Change, CutFlash, HostBoard};
+use crate::planned::PlannedBoard;
+use penup::boards::host::CutFlash;
 use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
-use penup::machine::{EventRing, PulserState, Setting, Settings};
+use penup::machine::{Setting, Settings};
 use penup::motion::TICKS_PER_SECOND;
 use penup::plotter::{Observer, Plotter, Unobserved};
 use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
 use penup::view::View;
 use penup::visibility::{EdgeParameter, Stretch};
-use penup_job::path::{PagePoint, PenRuns, Run};
+use penup_job::path::{PagePoint, Run};
 use penup_job::protocol::{MODEL, PLOT};
 use penup_job::results::{JobReport, JobResult, Lengths, Timings};
 use penup_job::room::Room;
+use penup_job::straight::{TOLERANCE, straightened};
 use penup_job::streamed::{Form, StreamError, StreamedJob};
-use penup_job::strokes::strokes_of;
-use penup_job::watch::PenWatch;
+use penup_job::strokes::{Stroke, strokes_of};
 use penup_readers::lines::Lines;
 use std::io;
 use std::time::{Duration, Instant};
 
-/// The number of ticks in a second.
-const SECOND: f64 = TICKS_PER_SECOND as f64;
+/// The number of ticks in a millisecond.
+const MILLISECOND: u64 = TICKS_PER_SECOND as u64 / 1000;
 
 /// The size of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,42 +50,43 @@ pub struct ModelSize {
 
 /// A plotter in this process, with numbers of 32 bits, or of 16 as on a board.
 pub struct InMemory<I: Index = u32> {
-    board: HostBoard<'static>,
+    board: PlannedBoard,
     plotter: Plotter<'static, I>,
-    steps: u64,
-    pen: Option<PenWatch>,
-    /// The times, in ticks, of the first and the last change of a pin since the plot command.
-    span: Option<[u64; 2]>,
-    /// Whether the pen was changed since the last change of a pin.
-    waited: bool,
-    /// The ticks for which the machine waited for pens since the plot command.
-    waits: u64,
+    /// When the plotter's clock began, if that is the clock of the conversation.
+    began: Option<Instant>,
+}
+
+/// What the plotter drew after a plot command.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Drawn {
+    /// The path of the pen.
+    pub runs: Vec<Run>,
+    /// The number of motor steps. A simultaneous step of both axes counts once.
+    pub steps: u64,
+    /// The time from the first to the last change of a pin, in seconds, without changes of pens by
+    /// hand.
+    pub duration_s: f64,
 }
 
 impl<I: Index> InMemory<I> {
-    /// Starts a plotter with this memory and these settings.
+    /// Starts a plotter with this memory and these settings. Its own clock is that of the
+    /// conversation, and goes on while a sender listens.
     pub fn new(room: Room, settings: Settings) -> Self {
-        // The memory is leaked because the plotter and the board borrow from it as long as the
-        // process lives; there is only one per run.
-        let ring = Box::leak(Box::new(EventRing::new()));
-        let pins = Box::leak(Box::new(PulserState::new()));
-        let mut board = HostBoard::new(ring, pins);
-        pins.set_queue(room.steps);
-        let plotter = Plotter::with_settings(room.lend(), pins, settings).without_undo();
+        let mut board = PlannedBoard::new(50 * MILLISECOND, room.steps);
+        let plotter = Plotter::with_settings(room.lend(), board.pins, settings).without_undo();
         plotter.greet(&mut board);
-        Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
+        Self { board, plotter, began: Some(Instant::now()) }
     }
 
     /// Starts a plotter with this memory, and with flash in which it keeps its settings and jobs,
-    /// as when its power comes on.
+    /// as when its power comes on. In each call of [`Link::receive`] a tenth of a second passes for
+    /// it.
     pub fn with_flash(room: Room, flash: CutFlash) -> Self {
-        let ring = Box::leak(Box::new(EventRing::new()));
-        let pins = Box::leak(Box::new(PulserState::new()));
-        let mut board = HostBoard::new(ring, pins);
+        let mut board = PlannedBoard::new(MILLISECOND, room.steps);
         board.set_flash(flash);
-        pins.set_queue(room.steps);
+        let pins = board.pins;
         let plotter = penup::plotter::start(&mut board, room.lend(), pins);
-        Self { board, plotter, steps: 0, pen: None, span: None, waited: false, waits: 0 }
+        Self { board, plotter, began: None }
     }
 
     /// Cuts the power. Returns the flash, if the plotter has any.
@@ -93,21 +96,6 @@ impl<I: Index> InMemory<I> {
 
     fn steps_per_mm(&self) -> [f64; 2] {
         self.plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>())
-    }
-
-    fn follow_pins(&mut self) {
-        let changes = self.board.trace().take_changes();
-        self.steps += count_steps(&changes);
-        if let (Some(first), Some(last)) = (changes.first(), changes.last()) {
-            let [begin, end] = self.span.unwrap_or([first.time; 2]);
-            if std::mem::take(&mut self.waited) {
-                self.waits += first.time - end;
-            }
-            self.span = Some([begin, last.time]);
-        }
-        if let Some(pen) = &mut self.pen {
-            changes.iter().for_each(|change| pen.change(change.into()));
-        }
     }
 
     /// Polls the plotter until it has read every byte and has no more work. A plot that began
@@ -222,28 +210,37 @@ impl<I: Index> InMemory<I> {
             .map_err(|error| refused(CommandError::Machine(error)))
     }
 
-    /// The results of the last plot command.
+    /// What was drawn after the last plot command.
+    pub fn drawn(&mut self) -> Drawn {
+        let (steps, duration_s) = self.board.steps.totals();
+        let settings = self.plotter.machine().settings();
+        let runs = if is_grid(settings) {
+            self.board.steps.runs()
+        } else {
+            let steps = self.steps_per_mm();
+            runs(strokes_of(&mut self.plotter.strokes(), steps), 1.0 / steps[0])
+        };
+        Drawn { runs, steps, duration_s }
+    }
+
+    /// The results of the last plot command. The drawing is computed once more, which is timed.
     ///
     /// # Errors
     /// The plotter refuses the drawing.
     pub fn result(&mut self) -> Result<JobResult, Error> {
+        let Drawn { runs, steps, duration_s } = self.drawn();
         let mut watch = StopWatch::default();
         let mut segments = Segments::default();
         let computed = self.plotter.compute(&mut watch, &mut segments);
         computed.map_err(|refusal| Error::NotDrawn { refusal })?;
         let timings_ms = watch.stop();
-        let steps = self.steps_per_mm();
+        let steps_per_mm = self.steps_per_mm();
         let (stroke_pens, strokes): (Vec<u8>, Vec<_>) =
-            strokes_of(&mut self.plotter.strokes(), steps)
+            strokes_of(&mut self.plotter.strokes(), steps_per_mm)
                 .into_iter()
                 .map(|stroke| (stroke.pen, stroke.points))
                 .unzip();
         let lengths = Lengths::of(&strokes);
-        let pen = match self.pen.as_mut() {
-            Some(pen) if is_grid(self.plotter.machine().settings()) => pen.runs(),
-            Some(_) => runs(&strokes, &stroke_pens, 1.0 / steps[0]),
-            None => PenRuns::default(),
-        };
         Ok(JobResult {
             segments: segments.ends,
             segment_pens: segments.pens,
@@ -252,12 +249,10 @@ impl<I: Index> InMemory<I> {
             pen_down_mm: lengths.pen_down_mm,
             pen_up_mm: lengths.pen_up_mm,
             efficiency: lengths.efficiency(),
-            steps: core::mem::take(&mut self.steps),
-            duration_s: self
-                .span
-                .map_or(0.0, |[begin, end]| (end - begin - self.waits) as f64 / SECOND),
+            steps,
+            duration_s,
             timings_ms,
-            pen,
+            runs,
         })
     }
 }
@@ -267,25 +262,28 @@ impl<I: Index> Link for InMemory<I> {
         // The command is between the line's number and its checksum.
         let plots = |part: &[u8]| part.starts_with(PLOT.as_bytes());
         if bytes.split(|byte| *byte == b' ').any(plots) {
-            self.steps = 0;
-            self.span = None;
-            (self.waited, self.waits) = (false, 0);
-            let step = 1.0 / self.steps_per_mm()[0];
-            self.pen.get_or_insert_with(|| PenWatch::new(step)).begin_again();
+            self.board.steps.begin(self.plotter.machine().settings());
         }
         self.board.receive(bytes);
         self.answer();
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], _patience: Duration) -> io::Result<usize> {
-        // Each iteration lets a tenth of a second of the plotter's time pass.
-        for _ in 0..100 {
+    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+        let patience = match self.began {
+            Some(_) => patience,
+            None => Duration::from_millis(100),
+        };
+        let end = self.board.now() + patience.as_millis() as u64 * MILLISECOND;
+        let mut sent = Vec::new();
+        while sent.is_empty() && self.board.now() < end {
             self.plotter.poll(&mut self.board);
             penup::plotter::Board::wait(&mut self.board);
+            if self.began.is_some() {
+                sent = self.board.take_sent();
+            }
         }
-        self.follow_pins();
-        let sent = self.board.take_sent();
+        sent.extend(self.board.take_sent());
         let (now, later) = sent.split_at(sent.len().min(buffer.len()));
         buffer[..now.len()].copy_from_slice(now);
         penup::plotter::Board::write(&mut self.board, later);
@@ -293,12 +291,13 @@ impl<I: Index> Link for InMemory<I> {
     }
 
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
-        self.follow_pins();
-        self.waited = true;
-        if let Some(watch) = &mut self.pen {
-            watch.change_pen(pen);
-        }
+        self.board.steps.change_pen(pen);
         Ok(true)
+    }
+
+    fn now(&self) -> Instant {
+        let ticks = self.board.now() / MILLISECOND;
+        self.began.map_or_else(Instant::now, |began| began + Duration::from_millis(ticks))
     }
 }
 
@@ -310,23 +309,17 @@ fn is_grid(settings: &Settings) -> bool {
 }
 
 /// The path of the pen that `strokes` describe, from the origin on.
-fn runs(strokes: &[Vec<PagePoint>], pens: &[u8], step: f64) -> PenRuns {
+fn runs(strokes: Vec<Stroke>, step: f64) -> Vec<Run> {
     let (mut runs, mut at, mut last_pen) = (Vec::new(), [0.0; 2], 1);
-    for (stroke, &pen) in strokes.iter().zip(pens) {
-        let begin = stroke.first().copied().unwrap_or(at);
+    for Stroke { pen, points } in strokes {
+        let begin: PagePoint = points.first().copied().unwrap_or(at);
+        let end = points.last().copied().unwrap_or(begin);
         runs.push(Run { pen_down: false, pen: last_pen, points: vec![at, begin] });
-        runs.push(Run { pen_down: true, pen, points: stroke.clone() });
-        (at, last_pen) = (stroke.last().copied().unwrap_or(begin), pen);
+        let points = straightened(&points, TOLERANCE * step);
+        runs.push(Run { pen_down: true, pen, points });
+        (at, last_pen) = (end, pen);
     }
-    PenRuns { runs, step }
-}
-
-/// Counts the steps at the pins. Simultaneous rising edges of both axes count as one step.
-fn count_steps(changes: &[penup::boards::host::Stamped]) -> u64 {
-    let rises = |change: Change| matches!(change, Change::StepX(true) | Change::StepY(true));
-    let mut times: Vec<u64> = changes.iter().filter(|c| rises(c.change)).map(|c| c.time).collect();
-    times.dedup();
-    times.len() as u64
+    runs
 }
 
 /// Measures the computing time of each stage.

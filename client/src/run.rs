@@ -15,7 +15,7 @@ use crate::outcome::Outcome;
 use crate::output;
 use crate::plot::{draw, plot};
 use crate::png::png;
-use crate::preview::InMemory;
+use crate::preview::{Drawn, InMemory};
 use crate::progress::{Bar, duration};
 use crate::sender::{Patience, Sender};
 use crate::tape;
@@ -116,27 +116,28 @@ fn show<I: Index>(
     interrupt: &AtomicBool,
 ) -> Result<Outcome, Error> {
     let passes = args.passes.multipass;
-    let report = draw(&mut plotter, &source.job, interrupt, &mut bar)?;
-    let mut result = plotter.result()?;
+    let report = draw(&mut plotter, &source.job, Patience::simulated(), interrupt, &mut bar)?;
+    let mut drawn = plotter.drawn();
     if passes > 1 {
         // The pictures show the first pass. Each other one begins where one has ended.
-        let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;
-        let drawn = sender.plot(&mut bar);
+        let mut sender = Sender::open(&mut plotter, Patience::simulated(), interrupt)?;
+        let plotted = sender.plot(&mut bar);
         sender.end();
-        drawn?;
-        let other = plotter.result()?;
-        result.steps += u64::from(passes - 1) * other.steps;
-        result.duration_s += f64::from(passes - 1) * other.duration_s;
-    }
-    for _ in 1..args.repeat {
-        result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
+        plotted?;
+        let other = plotter.drawn();
+        drawn.steps += u64::from(passes - 1) * other.steps;
+        drawn.duration_s += f64::from(passes - 1) * other.duration_s;
     }
     drop(bar);
-    let page = source.settings.page;
-    let picture = Picture { page, runs: result.pen.runs.clone(), step: result.pen.step };
+    let Drawn { runs, steps, duration_s } = drawn;
+    let picture = Picture { page: source.settings.page, runs };
     let mut files = write_pictures(&picture, outputs)?;
     files.extend(write_exports(&picture, args, plotter.draw_speed())?);
     if let Some(path) = &outputs.json {
+        let mut result = JobResult { steps, duration_s, ..plotter.result()? };
+        for _ in 1..args.repeat {
+            result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
+        }
         let whole =
             PreviewResult { result: &result, passes, bounds: source.extent, drawn: &report };
         let text = serde_json::to_string(&whole).map_err(|error| Error::Write {
@@ -154,7 +155,7 @@ fn show<I: Index>(
     if passes > 1 {
         outcome.text += &format!(", {passes} passes");
     }
-    let time = duration(result.duration_s.round() as u64);
+    let time = duration(duration_s.round() as u64);
     outcome.text += &format!(", {time} to draw");
     Ok(outcome)
 }
@@ -181,7 +182,7 @@ fn write_exports<'a>(
 ) -> Result<Vec<&'a Path>, Error> {
     let mut files = Vec::new();
     let retracing = Retracing { passes: args.passes.multipass, reloops: args.reloop };
-    let lines = export::lines(&picture.runs, picture.step, retracing);
+    let lines = export::lines(&picture.runs, retracing);
     if let Some(path) = &args.gcode {
         output::write(path, export::gcode(&lines, speed).as_bytes())?;
         files.push(path.as_path());
@@ -225,7 +226,7 @@ fn encode_tape(
         InMemory::<u32>::new(Room::for_job(&job), penup::machine::Settings::default());
     {
         let mut bar = Bar::new(quiet);
-        let mut sender = Sender::open(&mut plotter, Patience::default(), interrupt)?;
+        let mut sender = Sender::open(&mut plotter, Patience::simulated(), interrupt)?;
         sender.stream(&job, &mut bar)?;
         sender.end();
     }

@@ -7,6 +7,7 @@ use penup::motion::{EventQueue, StepEvent};
 use penup::step::tape::{BadCode, Decoder, Instruction, TapeLines, encode};
 use penup_job::path::Run;
 use penup_job::picture::Picture;
+use penup_job::straight::{TOLERANCE, straightened};
 use penup_readers::page::Page;
 use std::fmt::Write as _;
 
@@ -81,7 +82,10 @@ pub fn show(tape: &[u8], page: Page, steps_per_mm: f64) -> Result<(Picture, usiz
         }
         at = end;
     }
-    Ok((Picture { page, runs, step: 1.0 / steps_per_mm }, moves))
+    for run in &mut runs {
+        run.points = straightened(&run.points, TOLERANCE / steps_per_mm);
+    }
+    Ok((Picture { page, runs }, moves))
 }
 
 fn instructions(tape: &[u8]) -> Result<Vec<Instruction>, BadCode> {

@@ -48,8 +48,8 @@ fn draws_as_previewed(board: &'static BoardRow, form: Form) -> Result<(), Box<dy
         .collect();
     let interrupt = AtomicBool::new(false);
     let mut preview = InMemory::<u32>::new(Room::for_job(&job), Settings::default());
-    draw(&mut preview, &job, &interrupt, &mut Quiet)?;
-    let previewed = inked(preview.result()?.pen.runs);
+    draw(&mut preview, &job, Patience::simulated(), &interrupt, &mut Quiet)?;
+    let previewed = inked(preview.drawn().runs);
     let mut host = InMemory::<u32>::new(Room::for_job(&job), Settings::default());
     assert!(host.take(&job));
     let (streamed, _) = host.streamed(form, 0)?;
@@ -59,7 +59,7 @@ fn draws_as_previewed(board: &'static BoardRow, form: Form) -> Result<(), Box<dy
     assert_eq!(sender.form()?, form);
     sender.draw_streamed(&streamed, &mut strokes)?;
     sender.end();
-    assert_eq!(inked(emulated.pen_runs()?.runs), previewed);
+    assert_eq!(inked(emulated.pen_runs()?), previewed);
     let all = u64::from(streamed.size().strokes);
     // What is still planned when the last line of G-code is taken is not told.
     let done = if form == Form::Strokes { all } else { strokes.0.0 };

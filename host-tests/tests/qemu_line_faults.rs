@@ -79,7 +79,7 @@ fn draw(scene: &str, one_in: Option<u64>) -> Result<(Vec<Run>, u32), Box<dyn Err
     sender.stream(&job, &mut Quiet)?;
     sender.plot(&mut Quiet)?;
     sender.end();
-    Ok((line.plotter.pen_runs()?.runs, line.damaged))
+    Ok((line.plotter.pen_runs()?, line.damaged))
 }
 
 #[test]

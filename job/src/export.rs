@@ -5,7 +5,6 @@
 //! own, and closed lines begin where the order of the plotter begins them.
 
 use crate::path::{PagePoint, Run};
-use crate::picture::straightened;
 use std::fmt::Write as _;
 
 /// What is done with each line of a drawing.
@@ -27,7 +26,7 @@ pub struct Line {
     pub points: Vec<PagePoint>,
 }
 
-/// The lines that `runs` draw, whose steps are this long in mm.
+/// The lines that `runs` draw.
 ///
 /// ```
 /// use penup_job::export::{Line, Retracing, lines};
@@ -37,15 +36,14 @@ pub struct Line {
 /// let twice = Retracing { passes: 2, reloops: false };
 /// let back = [[2.0, 0.0], [0.0, 0.0]];
 /// let points = [points, back.to_vec()].concat();
-/// assert_eq!(lines(&[run], 0.0, twice), [Line { pen: 1, points }]);
+/// assert_eq!(lines(&[run], twice), [Line { pen: 1, points }]);
 /// ```
-pub fn lines(runs: &[Run], step: f64, retracing: Retracing) -> Vec<Line> {
+pub fn lines(runs: &[Run], retracing: Retracing) -> Vec<Line> {
     let mut dice = Dice(0x9E37_79B9_7F4A_7C15);
     let drawn = runs.iter().filter(|run| run.pen_down && !run.points.is_empty());
     drawn
         .map(|run| {
-            // The tolerance is that of the pictures.
-            let mut points = straightened(&run.points, step * 0.501);
+            let mut points = run.points.clone();
             if retracing.reloops {
                 relooped(&mut points, &mut dice);
             }
@@ -183,7 +181,7 @@ mod tests {
         for passes in 1..5 {
             for points in [&square[..], &open] {
                 let retracing = Retracing { passes, reloops: false };
-                let drawn = lines(&[run(1, points)], 0.0, retracing);
+                let drawn = lines(&[run(1, points)], retracing);
                 assert_eq!(drawn.len(), 1);
                 assert_eq!(length(&drawn[0].points), f64::from(passes) * length(points));
             }
@@ -196,7 +194,7 @@ mod tests {
             (0..=40).map(|at| f64::from(at % 40) * 0.157).map(|a| [a.cos(), a.sin()]).collect();
         let open = [[9.0, 9.0], [1.0, 2.0], [5.0, 5.0]];
         let runs: Vec<Run> = (0..20).map(|_| run(1, &ring)).chain([run(1, &open)]).collect();
-        let drawn = lines(&runs, 0.0, Retracing { passes: 1, reloops: true });
+        let drawn = lines(&runs, Retracing { passes: 1, reloops: true });
         let sides = |points: &[PagePoint]| {
             let mut sides: Vec<String> =
                 points.windows(2).map(|side| format!("{side:?}")).collect();
@@ -213,13 +211,12 @@ mod tests {
         begins.sort();
         begins.dedup();
         assert!(begins.len() > 10, "{begins:?}");
-        assert_eq!(drawn, lines(&runs, 0.0, Retracing { passes: 1, reloops: true }));
+        assert_eq!(drawn, lines(&runs, Retracing { passes: 1, reloops: true }));
     }
 
     #[test]
     fn pens_dots_and_numbers_are_written_as_other_machines_read_them() {
-        let drawn =
-            lines(&[run(1, &[[1.0, 2.0], [3.5, -0.0001]]), run(3, &[[0.1, 0.2]])], 0.0, ONCE);
+        let drawn = lines(&[run(1, &[[1.0, 2.0], [3.5, -0.0001]]), run(3, &[[0.1, 0.2]])], ONCE);
         let version = env!("CARGO_PKG_VERSION");
         assert_eq!(
             gcode(&drawn, 1500.0),

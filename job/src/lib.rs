@@ -5,9 +5,10 @@
 //! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a
 //! user wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes
 //! what the plotter must then contain, and [`room`] the memory that takes. [`streamed`] makes lines
-//! of what this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], of
-//! which [`sampled`] keeps what a page shows. [`strokes`] and [`results`] tell what was drawn,
-//! [`picture`] shows it, and [`export`] writes it for other machines.
+//! of what this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], whose
+//! steps [`straight`] makes lines of, and of which [`sampled`] keeps what a page shows. [`strokes`]
+//! and [`results`] tell what was drawn, [`picture`] shows it, and [`export`] writes it for other
+//! machines.
 //!
 //! Nothing here opens a file or a port, starts a thread, or reads a clock.
 
@@ -20,6 +21,7 @@ pub mod protocol;
 pub mod results;
 pub mod room;
 pub mod sampled;
+pub mod straight;
 #[cfg(feature = "stream")]
 pub mod streamed;
 pub mod strokes;

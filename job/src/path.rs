@@ -13,12 +13,3 @@ pub struct Run {
     /// The vertices of the path, in mm.
     pub points: Vec<PagePoint>,
 }
-
-/// The path of the pen, as its pins told it.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct PenRuns {
-    /// The runs of the pen in order, in mm.
-    pub runs: Vec<Run>,
-    /// The length of a motor step in mm.
-    pub step: f64,
-}

@@ -8,7 +8,6 @@
 use crate::path::{PagePoint, Run};
 use penup_readers::page::Page;
 use std::collections::BTreeSet;
-use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Write as _};
 
 /// The path of the pen on a page.
@@ -18,9 +17,6 @@ pub struct Picture {
     pub page: Page,
     /// All runs in order.
     pub runs: Vec<Run>,
-    /// The plotter's step in mm. Where single steps stay within half a step of a straight line, the
-    /// picture shows the line. 0 if the runs are exact.
-    pub step: f64,
 }
 
 const PEN_WIDTH: f64 = 0.3;
@@ -49,7 +45,7 @@ impl Picture {
             runs.push(Run { pen_down: true, pen: 1, points: stroke.clone() });
             pen = Some(end);
         }
-        Self { page, runs, step: 0.0 }
+        Self { page, runs }
     }
 
     /// Renders the picture as an SVG document.
@@ -100,9 +96,7 @@ impl Picture {
             Number(width)
         )?;
         for run in self.runs.iter().filter(|run| of(run)) {
-            // The tolerance is half a step and a little more, because the numbers are rounded.
-            let points = straightened(&run.points, self.step * 0.501);
-            let Some((first, rest)) = points.split_first() else {
+            let Some((first, rest)) = run.points.split_first() else {
                 continue;
             };
             write!(out, "<path d=\"M{}", self.position(*first))?;
@@ -172,63 +166,6 @@ impl fmt::Display for Position {
     }
 }
 
-/// Simplifies a polyline: it removes points, from front to back as many as it can, such that every
-/// point stays within `tolerance` of the line that replaces it. The end points are kept, and so are
-/// the points where the polyline reverses.
-///
-/// With a tolerance of half a step, the single steps of a line between two grid points become one
-/// line.
-///
-/// ```
-/// use penup_job::picture::straightened;
-/// let steps = [[0.0, 0.0], [1.0, 0.0], [2.0, 1.0], [3.0, 1.0], [4.0, 2.0], [4.0, 3.0], [4.0,
-/// 5.0]]; assert_eq!(straightened(&steps, 0.5), [[0.0, 0.0], [4.0, 2.0], [4.0, 5.0]]);
-/// ```
-pub fn straightened(points: &[PagePoint], tolerance: f64) -> Vec<PagePoint> {
-    if tolerance <= 0.0 {
-        return points.to_vec();
-    }
-    let mut kept = Vec::new();
-    let mut rest = points;
-    while let Some((&start, ahead)) = rest.split_first() {
-        kept.push(start);
-        rest = &ahead[reach(start, ahead, tolerance)..];
-    }
-    kept
-}
-
-/// How many of the points `ahead` a straight line from `start` can skip. The line goes to the last
-/// point that is in the range of directions that pass every earlier point and is at least as far
-/// away as all of them.
-fn reach(start: PagePoint, ahead: &[PagePoint], tolerance: f64) -> usize {
-    let mut passed = 0;
-    let mut farthest = 0.0;
-    // The range of directions that pass all points so far, as angles relative to the first
-    // direction.
-    let mut first = None;
-    let (mut lowest, mut highest) = (-PI, PI);
-    for (i, point) in ahead.iter().enumerate() {
-        let (dx, dy) = (point[0] - start[0], point[1] - start[1]);
-        let distance = dx.hypot(dy);
-        let angle = dy.atan2(dx);
-        let turned = (angle - first.unwrap_or(angle) + 3.0 * PI).rem_euclid(TAU) - PI;
-        if distance >= farthest && (lowest..=highest).contains(&turned) {
-            farthest = distance;
-            passed = i;
-        }
-        if distance > tolerance {
-            first.get_or_insert(angle);
-            let spread = (tolerance / distance).asin();
-            lowest = lowest.max(turned - spread);
-            highest = highest.min(turned + spread);
-        }
-        if lowest > highest || distance + tolerance < farthest {
-            break;
-        }
-    }
-    passed
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -263,7 +200,7 @@ mod tests {
     fn each_pen_has_its_ink() {
         let run = |pen, x| Run { pen_down: true, pen, points: vec![[x, 5.0], [x, 9.0]] };
         let runs = vec![run(1, 1.0), run(3, 2.0), run(2, 3.0), run(3, 4.0), run(9, 5.0)];
-        let svg = Picture { page: PAGE, runs, step: 0.0 }.svg();
+        let svg = Picture { page: PAGE, runs }.svg();
         let groups: Vec<&str> = svg.split("<g id=\"").skip(2).collect();
         for (group, (id, ink, paths)) in groups.iter().zip([
             ("pen-down", INK, 1),
@@ -281,70 +218,5 @@ mod tests {
     fn an_empty_page_is_a_picture() {
         let svg = Picture::of_strokes(PAGE, &[]).svg();
         assert!(!svg.contains("path") && !svg.contains("circle"));
-    }
-
-    #[test]
-    fn a_stroke_that_turns_back_keeps_its_turn() {
-        let there_and_back = [[0.0, 0.0], [5.0, 0.0], [10.0, 0.0], [4.0, 0.0]];
-        assert_eq!(straightened(&there_and_back, 0.1), [[0.0, 0.0], [10.0, 0.0], [4.0, 0.0]]);
-        let closed = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 0.0]];
-        assert_eq!(straightened(&closed, 0.1), closed);
-        assert_eq!(straightened(&[], 0.1), [[0.0; 2]; 0]);
-        assert_eq!(straightened(&[[1.0, 2.0]], 0.1), [[1.0, 2.0]]);
-    }
-
-    /// The grid points of a line, as a plotter steps through them.
-    fn steps(from: [i32; 2], to: [i32; 2]) -> Vec<PagePoint> {
-        let (dx, dy) = (to[0] - from[0], to[1] - from[1]);
-        let count = dx.abs().max(dy.abs());
-        let along = |start: i32, d: i32, i: i32| {
-            (f64::from(start) + f64::from(d * i) / f64::from(count)).round()
-        };
-        (0..=count).map(|i| [along(from[0], dx, i), along(from[1], dy, i)]).collect()
-    }
-
-    #[test]
-    fn a_line_of_steps_becomes_one_line_whatever_its_direction() {
-        for to in [[140, 90], [-140, 90], [90, -141], [-7, -200], [300, 0], [0, -9], [-50, -50]] {
-            let line = steps([0, 0], to);
-            let ends = [line[0], line[line.len() - 1]];
-            assert_eq!(straightened(&line, 0.501), ends);
-        }
-    }
-
-    #[test]
-    fn a_stroke_of_steps_keeps_to_its_steps_with_few_points() {
-        let corners = [
-            [0, 0],
-            [500, 30],
-            [510, 400],
-            [80, 390],
-            [500, 30],
-            [-300, 20],
-            [-310, -1000],
-            [-310, 5],
-            [0, 0],
-        ];
-        let pairs = corners.windows(2);
-        let stroke: Vec<PagePoint> = pairs.flat_map(|pair| steps(pair[0], pair[1])).collect();
-        let straight = straightened(&stroke, 0.501);
-        assert!(straight.len() <= 4 * corners.len(), "{} points", straight.len());
-        let mut spans = straight.windows(2);
-        let mut span = spans.next().expect("several lines");
-        for &point in &stroke {
-            while distance(point, span) > 0.501 {
-                span = spans.next().expect("a line near every step");
-            }
-        }
-        assert!(spans.next().is_none(), "a line that no step is near");
-    }
-
-    /// The distance from `p` to the nearest point of a line segment.
-    fn distance(p: PagePoint, line: &[PagePoint]) -> f64 {
-        let [a, b] = [line[0], line[1]];
-        let (dx, dy) = (b[0] - a[0], b[1] - a[1]);
-        let along = ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / (dx * dx + dy * dy);
-        let along = along.clamp(0.0, 1.0);
-        (a[0] + along * dx - p[0]).hypot(a[1] + along * dy - p[1])
     }
 }

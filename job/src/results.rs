@@ -1,6 +1,6 @@
 //! The results of a job: what was drawn, its lengths, and the times of computing it.
 
-use crate::path::{PagePoint, PenRuns};
+use crate::path::{PagePoint, Run};
 use serde::{Serialize, Serializer};
 use std::fmt;
 use std::ops::Add;
@@ -36,7 +36,7 @@ pub struct JobResult {
     pub timings_ms: Timings,
     /// The path of the pen according to the pins, for the picture.
     #[serde(skip)]
-    pub pen: PenRuns,
+    pub runs: Vec<Run>,
 }
 
 /// The computing times of the stages, in milliseconds.
@@ -170,7 +170,7 @@ mod tests {
             steps: 1600,
             duration_s: 12.5,
             timings_ms: Timings { view: 0.5, visibility: 1.5, order: 2.0 },
-            pen: PenRuns::default(),
+            runs: Vec::new(),
         };
         assert_eq!(
             serde_json::to_string(&result).expect("numbers are finite"),

@@ -105,8 +105,7 @@ impl Board {
     /// The picture of the path on a page of this size in mm, as SVG: the file that `penup preview`
     /// writes.
     pub fn svg(&mut self, width: f64, height: f64) -> String {
-        let runs = self.pen.runs();
-        Picture { page: Page { width, height }, runs: runs.runs, step: runs.step }.svg()
+        Picture { page: Page { width, height }, runs: self.pen.runs() }.svg()
     }
 
     /// What the pins have drawn as G-code for Grbl, as the client writes it.
@@ -136,8 +135,8 @@ impl Board {
 impl Board {
     /// The lines that the pins have drawn.
     fn lines(&mut self) -> Vec<export::Line> {
-        let drawn = self.pen.runs();
-        export::lines(&drawn.runs, drawn.step, export::Retracing { passes: 1, reloops: false })
+        let once = export::Retracing { passes: 1, reloops: false };
+        export::lines(&self.pen.runs(), once)
     }
 }
 

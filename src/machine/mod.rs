@@ -160,13 +160,19 @@ impl<'m> Machine<'m> {
         &self.settings
     }
 
-    /// Changes a setting.
+    /// Changes a setting. While the machine holds, raised and at rest, only the heights of the pen
+    /// may change: they count from its next change on.
     ///
     /// # Errors
     /// See [`SettingError`]. On an error the setting keeps its old value.
     pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
-        let is_allowed =
-            matches!(self.activity, Activity::Idle | Activity::Check | Activity::Alarm(_));
+        let is_allowed = match self.activity {
+            Activity::Idle | Activity::Check | Activity::Alarm(_) => true,
+            Activity::Hold { stopped: true, .. } => {
+                matches!(setting, Setting::PenUpHeight | Setting::PenDownHeight)
+            }
+            _ => false,
+        };
         if !is_allowed || !self.is_stopped() {
             return Err(SettingError::Busy);
         }

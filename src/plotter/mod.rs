@@ -538,7 +538,9 @@ impl<I: Index> Inner<'_, I> {
                 let may_run = self.is_streamed();
                 #[cfg(not(feature = "stream"))]
                 let may_run = false;
-                if !may_run && !matches!(self.machine.state(), State::Check | State::Jog) {
+                let state = self.machine.state();
+                let stands = matches!(state, State::Hold { stopped: true });
+                if !may_run && !stands && !matches!(state, State::Check | State::Jog) {
                     self.check_idle()?;
                 }
                 self.task = Some(Task::List(Listing::Settings, 0));

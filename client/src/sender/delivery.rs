@@ -1,6 +1,7 @@
 //! Delivers lines: sends them with numbers and checksums until the plotter has accepted each.
 
 use super::Sender;
+use super::drawing::Numbers;
 use super::streaming::Streaming;
 use crate::error::Error;
 use crate::progress::Progress;
@@ -106,7 +107,7 @@ impl Sender<'_> {
             self.fill_queue(&mut delivery)?;
             self.stop_if_interrupted()?;
             if let Some(streaming) = &mut delivery.streaming {
-                self.obey(&mut streaming.followed)?;
+                self.obey(&mut streaming.followed, Numbers::InUse, progress)?;
             }
             let reply = self.listen()?;
             if let Some(reply) = &reply {

@@ -5,8 +5,10 @@ use super::{MOST_RESTARTS, Sender};
 use crate::error::Error;
 use crate::link::{Answer, Order};
 use crate::progress::{Progress, Quiet};
+use penup::machine::Setting;
 use penup_job::protocol::{
-    AGAIN, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, MODEL, PLOT, RESUME, Reply, SLOWER, Status,
+    AGAIN, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, MODEL, PLOT, RESUME, Reply, SETTINGS, SLOWER,
+    Status,
 };
 use penup_job::results::JobReport;
 use penup_readers::lines::{JobLine, Lines};
@@ -44,9 +46,28 @@ pub(super) struct Followed {
     standstill: Standstill,
     held_since: Option<Instant>,
     is_holding: bool,
+    /// Whether the machine holds, and stands with the pen up.
+    is_standing: bool,
     /// Whether the user of this program asked for the hold.
     paused_here: bool,
 }
+
+/// Whether a line may be sent beside the drawing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Numbers {
+    /// Yes, with the next number.
+    Free,
+    /// Yes, after the numbers have begun anew: another program may have sent the drawing.
+    Unknown,
+    /// No, because the drawing is still being sent.
+    InUse,
+}
+
+/// By how much a key moves the lowered pen, of 127.
+const PEN_CHANGE: f64 = 2.0;
+
+/// The setting that holds the height of the lowered pen.
+const PEN_DOWN: Setting = Setting::PenDownHeight;
 
 impl Sender<'_> {
     /// Starts the drawing of what was sent, and waits until the machine is idle again.
@@ -56,8 +77,9 @@ impl Sender<'_> {
     pub fn plot(&mut self, progress: &mut dyn Progress) -> Result<(), Error> {
         let lines = [JobLine::command(PLOT)];
         self.begin_plot(&lines, progress)?;
+        let base = self.done - 1;
         self.follow_drawing(Some(&lines), progress)?;
-        self.confirm(&lines, self.done - 1)
+        self.confirm(&lines, base)
     }
 
     /// Draws the last job again, which the plotter has kept, and waits until the machine is idle.
@@ -82,8 +104,9 @@ impl Sender<'_> {
     fn draw_kept(&mut self, command: &str, progress: &mut dyn Progress) -> Result<(), Error> {
         let lines = [JobLine::command(command)];
         self.deliver(&lines, &mut Quiet)?;
+        let base = self.done - 1;
         self.follow_drawing(Some(&lines), progress)?;
-        self.confirm(&lines, self.done - 1)
+        self.confirm(&lines, base)
     }
 
     /// Follows the job that the plotter draws until the machine is idle, whoever has sent it.
@@ -114,7 +137,8 @@ impl Sender<'_> {
         self.query()?;
         loop {
             self.stop_if_interrupted()?;
-            self.obey(&mut followed)?;
+            let numbers = if began.is_some() { Numbers::Free } else { Numbers::Unknown };
+            self.obey(&mut followed, numbers, progress)?;
             match self.listen()? {
                 Some(Reply::Status(status)) => {
                     progress.state(&status.state);
@@ -143,7 +167,12 @@ impl Sender<'_> {
     }
 
     /// Does what the user of this program asked for by keys.
-    pub(super) fn obey(&mut self, followed: &mut Followed) -> Result<(), Error> {
+    pub(super) fn obey(
+        &mut self,
+        followed: &mut Followed,
+        numbers: Numbers,
+        progress: &mut dyn Progress,
+    ) -> Result<(), Error> {
         while let Some(order) = self.orders.pop_front() {
             let byte = match order {
                 Order::Pause if followed.is_holding => {
@@ -157,12 +186,61 @@ impl Sender<'_> {
                 }
                 Order::Faster => FASTER,
                 Order::Slower => SLOWER,
+                Order::PenHigher | Order::PenLower => {
+                    let by = if order == Order::PenLower { PEN_CHANGE } else { -PEN_CHANGE };
+                    progress.note(&self.move_pen(by, followed, numbers)?);
+                    continue;
+                }
                 // It is carried out where an interrupt is.
                 Order::GiveUp => continue,
             };
             self.link.send(&[byte])?;
         }
         Ok(())
+    }
+
+    /// Changes the height of the lowered pen by so much, and returns what became of it, for the
+    /// user.
+    fn move_pen(
+        &mut self,
+        by: f64,
+        followed: &Followed,
+        numbers: Numbers,
+    ) -> Result<String, Error> {
+        if !followed.is_standing {
+            let reason =
+                "the pen's height can be changed in a pause alone: press space, then u or d";
+            return Ok(reason.to_owned());
+        }
+        match numbers {
+            Numbers::Free => {}
+            Numbers::Unknown => self.begin_numbers(None)?,
+            Numbers::InUse => {
+                let reason = "the pen's height cannot be changed while strokes are being sent";
+                return Ok(reason.to_owned());
+            }
+        }
+        let number = PEN_DOWN.info().number;
+        let height_in = |reply: &Reply| match reply {
+            Reply::Other(line) => {
+                let value = line.strip_prefix(&format!("${number}="))?;
+                value.split(' ').next()?.parse::<f64>().ok()
+            }
+            _ => None,
+        };
+        let changed = self.ask(SETTINGS).and_then(|replies| {
+            let Some(height) = replies.iter().find_map(height_in) else { return Ok(None) };
+            let height = (height + by).clamp(0.0, 127.0);
+            self.ask(&format!("${number}={height}"))?;
+            Ok(Some(height))
+        });
+        Ok(match changed {
+            Ok(Some(height)) => format!("the lowered pen is at height {height} of 127 now"),
+            Ok(None) | Err(Error::Refused { .. }) => {
+                format!("this firmware does not change the pen's height (${number}) in a pause")
+            }
+            Err(error) => return Err(error),
+        })
     }
 
     /// Lets a machine that stands go on if it waits for a pen that is in, or if the user allows it.
@@ -172,6 +250,7 @@ impl Sender<'_> {
         followed: &mut Followed,
     ) -> Result<(), Error> {
         followed.is_holding = status.is_holding() && status.pen_wanted.is_none();
+        followed.is_standing = status.is_standing;
         let holds = followed.standstill.holds(status);
         if !status.is_holding() {
             followed.held_since = None;

@@ -20,6 +20,16 @@ pub struct Patience {
     pub hold: Duration,
 }
 
+impl Patience {
+    /// The timeouts for a plotter in this process, by its own clock. It never falls silent, and a
+    /// computation takes none of its time.
+    pub fn simulated() -> Self {
+        let hour = Duration::from_secs(3600);
+        let query = Duration::from_secs(20);
+        Self { silence: hour, lost: hour, query, ..Self::default() }
+    }
+}
+
 impl Default for Patience {
     fn default() -> Self {
         Self {

@@ -122,19 +122,24 @@ impl Library {
 
     /// Starts to plot a job of twelve metres, four minutes of the plotter's time.
     fn plot_rows(&self, folder: &Path, options: &[&str]) -> Child {
+        let mut client = self.rows(folder, options);
+        client.stderr(Stdio::piped()).spawn().expect("the program runs")
+    }
+
+    /// The program that plots this job.
+    fn rows(&self, folder: &Path, options: &[&str]) -> Command {
         let rows: String =
             (0..120).map(|row| format!("v 50 {0} 0\nv 150 {0} 0\n", 50 + row)).collect();
         let lines: String =
             (0..120).map(|row| format!("l {} {}\n", 2 * row + 1, 2 * row + 2)).collect();
         fs::write(folder.join("rows.obj"), rows + &lines).expect("written");
-        Command::new(env!("CARGO_BIN_EXE_penup"))
+        let mut client = Command::new(env!("CARGO_BIN_EXE_penup"));
+        client
             .args(["plot", "rows.obj", "--port", &self.device])
             .args(options)
             .current_dir(folder)
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .expect("the program runs")
+            .stdout(Stdio::piped());
+        client
     }
 
     /// Starts to plot 70 waves of 300 points, more than the plotter holds, computed by the client.
@@ -314,6 +319,54 @@ fn settings_are_saved_changed_and_restored() {
     let (code, _, error) = run(&["settings", "restore", "bad.toml"]);
     assert_eq!(code, Some(1));
     assert!(error.starts_with("penup: bad.toml: [settings] holds speed"), "{error}");
+}
+
+#[test]
+fn keys_pause_the_drawing_and_move_the_lowered_pen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    plotter.slow.store(true, Ordering::Relaxed);
+    let (mut keys, name) = pseudo_terminal();
+    let terminal = || fs::OpenOptions::new().read(true).write(true).open(&name).expect("opened");
+    let mut client = plotter.rows(folder.path(), &[]);
+    client.stdin(terminal()).stderr(terminal());
+    let mut client = client.spawn().expect("the program runs");
+    let mut said = String::new();
+    // Each key is pressed once the program has said what comes before it.
+    for (key, answer) in [
+        ("", "in a pause u and d set the lowered pen higher or lower"),
+        ("d", "the pen's height can be changed in a pause alone: press space"),
+        (" ", "Held"),
+        ("u", "the lowered pen is at height 125 of 127 now"),
+        ("u", "the lowered pen is at height 123 of 127 now"),
+        ("d", "the lowered pen is at height 125 of 127 now"),
+        (" ", "Drawing"),
+    ] {
+        if key == "d" && answer.starts_with("the pen's") {
+            plotter.wait_for_drawing(&mut client);
+        }
+        let before = said.len();
+        keys.write_all(key.as_bytes()).expect("pressed");
+        let mut buffer = [0; 256];
+        while !said[before..].contains(answer) {
+            assert_eq!(client.try_wait().expect("a state"), None, "{answer}: {said}");
+            if let Ok(count) = keys.read(&mut buffer) {
+                said += &String::from_utf8_lossy(&buffer[..count]);
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+    plotter.slow.store(false, Ordering::Relaxed);
+    let mut buffer = [0; 256];
+    while client.try_wait().expect("a state").is_none() {
+        let _ = keys.read(&mut buffer);
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    let (code, drawn, _) = ended(client);
+    assert_eq!(code, Some(0), "{said}");
+    assert!(drawn.starts_with("rows.obj is drawn: 120 strokes, 12000.0 mm drawn"), "{drawn}");
+    let (_, settings, _) = plotter.run(folder.path(), &["settings", "show"]);
+    assert!(settings.contains("211 = 125"), "{settings}");
 }
 
 #[test]

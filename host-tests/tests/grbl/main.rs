@@ -238,6 +238,33 @@ fn the_override_of_rapid_moves_slows_those_with_the_pen_up_only() {
 }
 
 #[test]
+fn a_feed_above_the_greatest_speed_is_that_speed() {
+    let time = |feed: u32| {
+        let mut bench = Bench::small();
+        assert_eq!(bench.say(&format!("G1 X100 F{feed}\n")), "ok\n");
+        bench.finish();
+        bench.board.trace().now()
+    };
+    assert_eq!(time(100_000), time(6000));
+    assert!(time(6000) < time(3000));
+}
+
+#[test]
+fn a_comment_may_be_long_and_a_command_may_not() {
+    let mut bench = Bench::small();
+    let long = |letter: &str| letter.repeat(300);
+    assert_eq!(bench.say(&format!("G0 X1 ({})\n", long("a"))), "ok\n");
+    assert_eq!(bench.say(&format!("G0 X2 ;{}\n", long("ä"))), "ok\n");
+    bench.finish();
+    assert!(bench.say("?").starts_with("<Idle|MPos:2.000,"));
+    for line in [format!("G0 X{}", long("1")), long("#_"), long("G0")] {
+        assert!(bench.say(&format!("{line}\n")).contains("error:11\n"), "{line}");
+    }
+    assert!(bench.say("?").starts_with("<Idle|MPos:2.000,"));
+    assert_eq!(bench.say("G0 X1\n"), "ok\n");
+}
+
+#[test]
 fn letters_of_utf_8_are_no_orders() {
     let mut bench = Bench::small();
     assert_eq!(bench.say("# Å Д °±\n(Ä)\n"), "ok\nok\n");

@@ -3,7 +3,7 @@
 use crate::fixtures::{
     ink, is_ready, job, lifted, never_cancel, point, raised, run_job, to, with_backlash,
 };
-use penup::machine::{Alarm, Settings, State, TargetList};
+use penup::machine::{Alarm, Setting, SettingError, Settings, State, TargetList, Value};
 use penup_host_tests::event_checker::{self, Drawn};
 use penup_host_tests::pin_machine;
 use proptest::prelude::*;
@@ -32,6 +32,7 @@ proptest! {
         again in 0u64..9_000_000,
         loose: bool,
         by_a_motor: bool,
+        height in 90u8..=127,
     ) {
         static UNDISTURBED: LazyLock<Drawn> = LazyLock::new(never_cancel);
         let mut holds = vec![instant + again, instant];
@@ -45,6 +46,14 @@ proptest! {
                 && turn.machine.is_stopped()
             {
                 assert_eq!(turn.machine.planned_position(), turn.pins);
+                // The heights of the pen may change, and nothing else.
+                let height = Value::from_num(height);
+                assert_eq!(turn.machine.set(Setting::PenDownHeight, height), Ok(()));
+                let others = [Setting::PenDownDwell, Setting::AccelerationX, Setting::StepsPerMmX];
+                for other in others {
+                    let value = turn.machine.settings().get(other);
+                    assert_eq!(turn.machine.set(other, value), Err(SettingError::Busy));
+                }
                 turn.machine.resume();
             }
             !is_ready(turn.machine)

@@ -50,6 +50,37 @@ fn after_a_restart_a_motor_raises_the_pen_and_then_has_no_current() {
 }
 
 #[test]
+fn a_height_that_changes_in_a_hold_counts_when_the_pen_goes_down_again() {
+    let expected = "\
+> job ink 4000,0 to 0,0
+< ok, strokes: 1
+> wait 0.3
+= drivers on
+= down 475 steps to 475,0
+= Run at 475,0
+> $211=100
+< Busy
+> hold
+< ok
+> wait
+= down 525 steps to 1000,0
+= Hold at 1000,0
+> $211=100
+< ok
+> $100=70
+< Busy
+> resume
+< ok
+> wait
+= the pen at height 100
+= down 3000 steps to 4000,0
+= up 4000 steps to 0,0
+= Idle at 0,0
+";
+    assert_eq!(transcript(Settings::default(), expected), expected);
+}
+
+#[test]
 fn a_motor_that_slept_looks_for_its_stop_again() {
     let expected = "\
 > job ink 50,60 to 0,0
