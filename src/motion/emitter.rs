@@ -186,6 +186,12 @@ impl Emitter {
         }
     }
 
+    /// The latest time at which another event delays none at `time`.
+    #[cfg(feature = "pen-overlap")]
+    pub(super) fn just_before(&self, time: u32) -> u32 {
+        time.wrapping_sub(self.least_interval)
+    }
+
     /// The pen goes to `height` at `time`.
     pub(super) fn pen(
         &mut self,
