@@ -288,16 +288,32 @@ impl Plot<'_> {
             rounded(greatest.max(-least))
         );
         let column = |time: f64| (time / self.seconds * COLUMNS as f64) as usize;
-        let mut path = String::new();
+        let tenths = |value: f64| (10.0 * y(value)).round() as i64;
+        let mut points: Vec<(f64, i64)> = Vec::new();
+        let mut add = |point: (f64, i64)| {
+            // A level line needs only its ends.
+            let is_level = matches!(points[..], [.., a, b] if a.1 == b.1 && b.1 == point.1);
+            if is_level {
+                points.pop();
+            }
+            points.push(point);
+        };
         for values in self.values.chunk_by(|a, b| column(a.0) == column(b.0)) {
             let low = values.iter().map(|point| point.1).fold(f64::INFINITY, f64::min);
             let high = values.iter().map(|point| point.1).fold(f64::NEG_INFINITY, f64::max);
-            let letter = if path.is_empty() { 'M' } else { 'L' };
             let x = LEFT + column(values[0].0) as f64 + 0.5;
-            let _ = write!(path, "{letter}{x} {:.1}", y(low));
-            if y(low) - y(high) > 0.5 {
-                let _ = write!(path, "L{x} {:.1}", y(high));
+            // What is less high than the line is wide is one point.
+            if tenths(low) - tenths(high) > 10 {
+                add((x, tenths(low)));
+                add((x, tenths(high)));
+            } else {
+                add((x, tenths(f64::midpoint(low, high))));
             }
+        }
+        let mut path = String::new();
+        for (index, (x, tenths)) in points.into_iter().enumerate() {
+            let letter = if index == 0 { 'M' } else { 'L' };
+            let _ = write!(path, "{letter}{x} {}", tenths as f64 / 10.0);
         }
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"#1b1f3b\"/>");
     }

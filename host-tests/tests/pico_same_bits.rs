@@ -27,6 +27,15 @@ fn a_motor_lifts_the_pen() -> Result<(), Box<dyn Error>> {
 }
 
 #[test]
+fn the_pen_moves_while_the_machine_does() -> Result<(), Box<dyn Error>> {
+    for jerk in ["$204=0", "$204=30"] {
+        let settings = ["$224=150", "$225=150", jerk, "$page=80x80", "$margin=5"];
+        compare(&PICO, "notched.obj", &settings)?;
+    }
+    Ok(())
+}
+
+#[test]
 fn a_motor_raises_the_pen_after_an_emergency_stop() -> Result<(), Box<dyn Error>> {
     stop_at_once(&PICO)
 }

@@ -186,10 +186,11 @@ impl Emitter {
         }
     }
 
-    /// The latest time at which another event delays none at `time`.
+    /// The middle between the last event and one at `time`: as far as can be from both, since the
+    /// pen of a board may move some microseconds late.
     #[cfg(feature = "pen-overlap")]
-    pub(super) fn just_before(&self, time: u32) -> u32 {
-        time.wrapping_sub(self.least_interval)
+    pub(super) fn midway(&self, time: u32) -> u32 {
+        self.pending.map_or(time, |(_, since)| since.wrapping_add(time.wrapping_sub(since) / 2))
     }
 
     /// The pen goes to `height` at `time`.

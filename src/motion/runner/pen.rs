@@ -170,8 +170,8 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// Tells the pen to go down, or one height further on its ramp, just before the next move of
-    /// the slice in work.
+    /// Tells the pen to go down, or one height further on its ramp, midway to the next move, which
+    /// is one of the slice in work.
     ///
     /// # Errors
     /// The event that the queue refused.
@@ -183,7 +183,7 @@ impl Runner<'_> {
         let height = self.pen.down_height;
         let from = self.pen_height.unwrap_or(self.pen.up_height);
         let next = self.next_height(from, height);
-        let time = self.emitter.just_before(self.now.wrapping_add(due));
+        let time = self.emitter.midway(self.now.wrapping_add(due));
         let since = self.emitter.pen(next, time, queue)?;
         let top = self.timing.travel_top(self.travel);
         self.timing.lowering = Some(Lowering { since, top });
