@@ -490,6 +490,11 @@ impl<'m> Runner<'m> {
         Ok(())
     }
 
+    /// Whether the path so far ends within a stroke, so that the pen is down there.
+    pub fn ends_in_stroke(&self) -> bool {
+        self.lookahead.back().map_or(self.in_stroke, |block| block.ink.is_some())
+    }
+
     /// The slack that the blocks that wait take up: what [`Runner::forget_path`] forgets of it.
     pub fn slack_ahead(&self) -> PagePoint {
         PagePoint {
@@ -939,7 +944,9 @@ impl<'m> Runner<'m> {
         }
         let inked = course.is_inked();
         if at_rest {
-            if self.pen_is_down != Some(inked) {
+            // On the way to a stroke, motors may stand before they take up their slack.
+            let may_stay = self.timing.is_lowering() && !inked;
+            if self.pen_is_down != Some(inked) && !may_stay {
                 if inked && self.wait_for_rising(queue)? {
                     return Ok(Progress::More);
                 }

@@ -143,7 +143,8 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
             let moved = (backlashes[0].turn(delta.0), backlashes[1].turn(delta.1));
             if moved == (0, 0) {
                 if !std::mem::replace(&mut takes_up, true) {
-                    drawn.backlash.push(Run::default());
+                    let height = if is_arriving { 0 } else { drawn.pen };
+                    drawn.backlash.push(Run { height, ..Run::default() });
                 }
                 let run = drawn.backlash.last_mut().expect("never empty");
                 run.times.push(time as f64 / second);

@@ -115,6 +115,25 @@ fn gaps_ramps_polargraphs_and_chains_of_travels_keep_their_ink() {
 }
 
 #[test]
+fn slack_is_taken_up_before_the_pen_is_lowered() {
+    let plain = with_backlash(true);
+    let travels = text().iter().filter(|target| target.ink.is_none()).count();
+    for settings in [plain, overlapping(plain, 150.0, 150.0)] {
+        let drawn = draw(settings, &text());
+        assert_eq!(drawn.inked, draw(Settings::default(), &text()).inked);
+        println!(
+            "text with backlash: {:.0} ms, taken up {} times, {} with the pen down",
+            milliseconds(&drawn),
+            drawn.backlash.len(),
+            drawn.backlash.iter().filter(|run| run.height >= 64).count()
+        );
+        // Within a stroke there is one corner at which y reverses.
+        let down = drawn.backlash.iter().filter(|run| run.height >= 64).count();
+        assert!(down <= travels / 2, "{down}");
+    }
+}
+
+#[test]
 fn a_travel_that_becomes_slow_does_not_lower_the_pen_too_early() {
     let undisturbed = never_cancel();
     for jerk in [0.0, 30.0] {

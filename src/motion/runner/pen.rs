@@ -13,8 +13,8 @@
 
 use super::{Pace, Plan, Progress, Runner};
 use crate::motion::lookahead::BlockKind;
-use crate::motion::profile::FRACTION_BITS;
-use crate::motion::{EventQueue, StepEvent};
+use crate::motion::profile::{FRACTION_BITS, Profile};
+use crate::motion::{EventQueue, PathLength, StepEvent};
 
 /// For how long the pen moves while the machine does, in ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -80,24 +80,30 @@ impl PenTiming {
 }
 
 impl Runner<'_> {
-    /// How long the travels behind the piece in work are until a stroke begins, 2^-18 mm; `None` if
-    /// none is known, or if the machine may be slower in between.
-    fn way_to_stroke(&self) -> Option<u64> {
+    /// How long the travels behind the piece in work are until the machine is at rest, 2^-18 mm, and
+    /// how long it takes after that until a stroke begins: motors may have slack to take up there.
+    /// `None` if no stroke is known, or if the machine may be slower in between.
+    fn way_to_stroke(&self) -> Option<(u64, u64)> {
         if self.course.as_ref().is_some_and(|course| !course.is_last_piece()) {
-            return Some(0);
+            return Some((0, 0));
         }
-        let passes_on = self.limits.jerk.is_none();
-        let mut way = 0;
+        let is_smooth = self.limits.jerk.is_some();
+        let (mut way, mut time) = (0, 0u64);
         for block in self.lookahead.blocks().into_iter().flatten() {
-            let is_inked = block.ink.is_some() && block.kind != BlockKind::Gap;
-            if is_inked {
-                return Some(way);
+            if block.ink.is_some() && block.kind != BlockKind::Gap {
+                return Some((way, time));
             }
-            let is_slower = !passes_on && block.limit() < self.travel.stopping_distance;
-            if block.kind == BlockKind::Slack || is_slower {
+            let is_slower = is_smooth && block.limit() < self.travel.stopping_distance;
+            if is_slower || (time > 0 && block.kind != BlockKind::Slack) {
                 return None;
             }
-            way += u64::from(block.length.to_bits());
+            if block.kind == BlockKind::Slack {
+                let (from, to) = (Pace::REST, PathLength::ZERO);
+                let profile = Profile::new(&self.limits, from, block.length, self.travel, to);
+                time = time.saturating_add(profile.time_left(&self.limits)).max(1);
+            } else {
+                way += u64::from(block.length.to_bits());
+            }
         }
         None
     }
@@ -105,21 +111,22 @@ impl Runner<'_> {
     /// How long it takes at most until the travel in work is at rest where a stroke begins, by the
     /// plan that has just been made; `None` if that is not known.
     fn time_to_stroke(&self) -> Option<u64> {
-        let way = self.way_to_stroke()?;
-        match self.plan.as_ref()? {
+        let (way, later) = self.way_to_stroke()?;
+        let time = match self.plan.as_ref()? {
             Plan::Profile(profile) => {
                 let exit = profile.exit();
                 // Braking from there to rest takes just that way: v/a.
                 let brakes = u64::from(exit.stopping_distance.to_bits()) == way;
                 let slices = (u64::from(exit.speed.to_bits()) << 16)
                     .checked_div(self.limits.acceleration.to_bits().into())?;
-                brakes.then(|| profile.time_left(&self.limits).saturating_add(slices))
+                brakes.then(|| profile.time_left(&self.limits).saturating_add(slices))?
             }
             Plan::Interval(interval) => {
                 let room = self.course.as_ref()?.room();
-                Some(interval.time_to_rest(room.saturating_add(way << 14), self.travel.speed))
+                interval.time_to_rest(room.saturating_add(way << 14), self.travel.speed)
             }
-        }
+        };
+        Some(time.saturating_add(later))
     }
 
     /// A plan has been made, of an `inked` piece or a travel, from rest or not.
@@ -171,7 +178,7 @@ impl Runner<'_> {
     }
 
     /// Tells the pen to go down, or one height further on its ramp, midway to the next move, which
-    /// is one of the slice in work.
+    /// is one of the slice in work. If that leaves no room, it waits for another slice.
     ///
     /// # Errors
     /// The event that the queue refused.
@@ -183,7 +190,9 @@ impl Runner<'_> {
         let height = self.pen.down_height;
         let from = self.pen_height.unwrap_or(self.pen.up_height);
         let next = self.next_height(from, height);
-        let time = self.emitter.midway(self.now.wrapping_add(due));
+        let Some(time) = self.emitter.midway(self.now, self.now.wrapping_add(due)) else {
+            return Ok(());
+        };
         let since = self.emitter.pen(next, time, queue)?;
         let top = self.timing.travel_top(self.travel);
         self.timing.lowering = Some(Lowering { since, top });
