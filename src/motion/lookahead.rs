@@ -294,10 +294,6 @@ impl<'m> Lookahead<'m> {
         if self.is_empty() { None } else { self.blocks.get(self.first) }
     }
 
-    pub(super) fn back(&self) -> Option<&Block> {
-        self.blocks.get(self.wrapped(self.count.checked_sub(1)?))
-    }
-
     pub(super) fn clear(&mut self) {
         self.count = 0;
         self.chorded = 0;

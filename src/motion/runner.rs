@@ -474,7 +474,8 @@ impl<'m> Runner<'m> {
     }
 
     /// Appends steps by which the motors take up their slack, from rest to rest; the pen stays
-    /// where it is, lowered if `ink` says so.
+    /// where it is, lowered if `ink` says so. Where the pen may move while the machine does, it is
+    /// still raised if these steps come before a stroke.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
@@ -488,11 +489,6 @@ impl<'m> Runner<'m> {
         self.slack_end.x = self.slack_end.x.wrapping_add(dx);
         self.slack_end.y = self.slack_end.y.wrapping_add(dy);
         Ok(())
-    }
-
-    /// Whether the path so far ends within a stroke, so that the pen is down there.
-    pub fn ends_in_stroke(&self) -> bool {
-        self.lookahead.back().map_or(self.in_stroke, |block| block.ink.is_some())
     }
 
     /// The slack that the blocks that wait take up: what [`Runner::forget_path`] forgets of it.
@@ -942,11 +938,21 @@ impl<'m> Runner<'m> {
         if self.stopping && at_rest {
             return self.stand(Progress::Stopped, queue);
         }
+        #[cfg(not(feature = "pen-overlap"))]
         let inked = course.is_inked();
+        #[cfg(feature = "pen-overlap")]
+        let inked = {
+            let stays_raised = PenTiming::stays_raised(&self.pen, self.pen_is_down);
+            course.is_inked() && !(stays_raised && course.is_slack())
+        };
         if at_rest {
             // On the way to a stroke, motors may stand before they take up their slack.
-            let may_stay = self.timing.is_lowering() && !inked;
-            if self.pen_is_down != Some(inked) && !may_stay {
+            #[cfg(feature = "pen-overlap")]
+            let must_move =
+                self.pen_is_down != Some(inked) && (inked || !self.timing.is_lowering());
+            #[cfg(not(feature = "pen-overlap"))]
+            let must_move = self.pen_is_down != Some(inked);
+            if must_move {
                 if inked && self.wait_for_rising(queue)? {
                     return Ok(Progress::More);
                 }

@@ -118,7 +118,7 @@ fn gaps_ramps_polargraphs_and_chains_of_travels_keep_their_ink() {
 fn slack_is_taken_up_before_the_pen_is_lowered() {
     let plain = with_backlash(true);
     let travels = text().iter().filter(|target| target.ink.is_none()).count();
-    for settings in [plain, overlapping(plain, 150.0, 150.0)] {
+    for settings in [overlapping(plain, 0.0, 1.0), overlapping(plain, 150.0, 150.0)] {
         let drawn = draw(settings, &text());
         assert_eq!(drawn.inked, draw(Settings::default(), &text()).inked);
         println!(

@@ -11,7 +11,7 @@
 //! no earlier than it would be with a dwell at rest. Whatever stands there before the stroke begins
 //! raises it again ([`Runner::stand`]).
 
-use super::{Pace, Plan, Progress, Runner};
+use super::{Pace, PenPositions, Plan, Progress, Runner};
 use crate::motion::lookahead::BlockKind;
 use crate::motion::profile::{FRACTION_BITS, Profile};
 use crate::motion::{EventQueue, PathLength, StepEvent};
@@ -60,6 +60,12 @@ impl PenTiming {
         self.until_lowered = self.until_lowered.map(|left| left.saturating_sub(time.into()));
     }
 
+    /// Whether a pen that is not down stays so while motors take up their slack.
+    #[inline(always)]
+    pub(super) fn stays_raised(pen: &PenPositions, is_down: Option<bool>) -> bool {
+        pen.overlap != PenOverlap::default() && is_down != Some(true)
+    }
+
     /// Whether the pen, or the next height of its ramp, is due.
     #[inline(always)]
     pub(super) fn is_due(&self) -> bool {
@@ -90,7 +96,7 @@ impl Runner<'_> {
         let is_smooth = self.limits.jerk.is_some();
         let (mut way, mut time) = (0, 0u64);
         for block in self.lookahead.blocks().into_iter().flatten() {
-            if block.ink.is_some() && block.kind != BlockKind::Gap {
+            if block.ink.is_some() && block.kind == BlockKind::Line {
                 return Some((way, time));
             }
             let is_slower = is_smooth && block.limit() < self.travel.stopping_distance;

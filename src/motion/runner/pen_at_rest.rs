@@ -1,7 +1,7 @@
 //! Without the feature `pen-overlap`, the pen moves only while the machine stands: `pen.rs` has
 //! what these functions do with it.
 
-use super::{Pace, Progress, Runner};
+use super::{Pace, PenPositions, Progress, Runner};
 use crate::motion::{EventQueue, StepEvent};
 
 /// The pen does nothing beside the motion.
@@ -10,19 +10,29 @@ pub(super) struct PenTiming;
 
 impl PenTiming {
     /// So much time passes.
+    #[inline(always)]
     pub(super) const fn pass(&mut self, _: u32) {}
 
+    /// The pen is lowered before motors take up their slack.
+    #[inline(always)]
+    pub(super) const fn stays_raised(_: &PenPositions, _: Option<bool>) -> bool {
+        false
+    }
+
     /// The pen is never due on the way.
+    #[inline(always)]
     pub(super) const fn is_due(&self) -> bool {
         false
     }
 
     /// The pen is never told to go down on the way.
+    #[inline(always)]
     pub(super) const fn is_lowering(&self) -> bool {
         false
     }
 
     /// The greatest speed of the travel in work: the one in force.
+    #[inline(always)]
     pub(super) const fn travel_top(&self, travel: Pace) -> Pace {
         travel
     }
