@@ -2,11 +2,12 @@
 //!
 //! The motion is that of the library's own planner: its step events are recorded, and the place of
 //! the plan along the path at each step gives the curves. [`Motion::record`] records a job, and
-//! [`Motion::svg`] draws it. Only Cartesian machines are plotted.
+//! [`Motion::svg`] draws it. Where the pen is raised, from one order to the next, the plots are
+//! grey. Only Cartesian machines are plotted.
 
 use penup::drawing::PagePoint;
 use penup::machine::{Machine, MachineError, Path, PulserState, Setting, Settings, Target};
-use penup::motion::{Block, EventQueue, StepEvent, TICKS_PER_SECOND};
+use penup::motion::{Block, EventKind, EventQueue, StepEvent, TICKS_PER_SECOND};
 use std::fmt::Write as _;
 
 /// The number of moves that are planned ahead, as many as on the Pico.
@@ -30,14 +31,17 @@ pub struct Motion {
     steps: Vec<(f64, f64)>,
     /// The duration of the job in seconds.
     seconds: f64,
+    /// From when (s) to when the pen is told to be raised.
+    raised: Vec<[f64; 2]>,
     /// The greatest speed in mm/s, the acceleration in mm/s², and the jerk in mm/s³, if limited.
     limits: [Option<f64>; 3],
 }
 
-/// An event queue that records the time of each step in ticks.
+/// An event queue that records the time of each step, and of each order to the pen, in ticks.
 #[derive(Default)]
 struct Recorder {
     times: Vec<u64>,
+    orders: Vec<(u64, u8)>,
     now: u64,
 }
 
@@ -49,8 +53,28 @@ impl EventQueue for Recorder {
         if event.step() != (0, 0) {
             self.times.push(self.now);
         }
+        if let EventKind::Pen { height } = event.kind() {
+            self.orders.push((self.now, height));
+        }
         self.now += u64::from(event.ticks());
         Ok(())
+    }
+}
+
+impl Recorder {
+    /// From when to when, in seconds, the pen is told to be elsewhere than at the height `down`.
+    fn raised(&self, down: u8) -> Vec<[f64; 2]> {
+        let seconds = |ticks: u64| ticks as f64 / f64::from(TICKS_PER_SECOND);
+        let (mut raised, mut since) = (Vec::new(), Some(0));
+        for &(time, height) in &self.orders {
+            if height != down {
+                since = since.or(Some(time));
+            } else if let Some(since) = since.take() {
+                raised.push([seconds(since), seconds(time)]);
+            }
+        }
+        raised.extend(since.map(|since| [seconds(since), seconds(self.now)]));
+        raised
     }
 }
 
@@ -99,11 +123,13 @@ impl Motion {
         Ok(Self {
             steps: times.zip(positions(path, &settings)).collect(),
             seconds: recorder.now as f64 / second,
+            raised: recorder.raised(value(Setting::PenDownHeight) as u8),
             limits: [Some(speed), Some(acceleration), (jerk > 0.0).then_some(jerk)],
         })
     }
 
-    /// The three plots, one above the other, with the limits as dashed lines.
+    /// The three plots, one above the other, with the limits as dashed lines, and grey where the
+    /// pen is raised.
     ///
     /// Acceleration and jerk are means over a few milliseconds, as long as the errors of the
     /// positions need, so changes within less than that look smoother than they are.
@@ -173,6 +199,7 @@ impl Motion {
                 values: curves[index].iter().map(|&(time, value)| (time, value / unit)).collect(),
                 limit: self.limits[index].map(|limit| limit / unit),
                 seconds: self.seconds,
+                raised: &self.raised,
             };
             plot.draw(&mut svg);
         }
@@ -192,9 +219,40 @@ struct Plot<'a> {
     limit: Option<f64>,
     /// The duration that the width shows.
     seconds: f64,
+    /// From when to when the pen is raised.
+    raised: &'a [[f64; 2]],
 }
 
 impl Plot<'_> {
+    /// The x of a time.
+    fn x(&self, time: f64) -> f64 {
+        LEFT + time / self.seconds.max(1e-9) * COLUMNS as f64
+    }
+
+    /// Draws what is grey because the pen is raised, and the axis of the time.
+    fn draw_time(&self, svg: &mut String) {
+        let bottom = self.top + HEIGHT;
+        let mut path = String::new();
+        for &[from, to] in self.raised {
+            let (x, width) = (self.x(from), self.x(to) - self.x(from));
+            let _ = write!(path, "M{x:.1} {}h{width:.1}v{HEIGHT}h-{width:.1}z", self.top);
+        }
+        let _ = writeln!(svg, "<path d=\"{path}\" fill=\"#ececec\"/>");
+        let step = tick_step(self.seconds);
+        for number in 0..=(self.seconds / step) as u32 {
+            let time = step * f64::from(number);
+            let (x, y) = (self.x(time), bottom + 4.0);
+            let _ = writeln!(svg, "<path d=\"M{x:.1} {bottom}v4\" stroke=\"#888888\"/>");
+            let unit = if number == 0 { " s" } else { "" };
+            let _ = writeln!(
+                svg,
+                "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\" font-size=\"10\">{}{unit}</text>",
+                y + 9.0,
+                (time * 1000.0).round() / 1000.0,
+            );
+        }
+    }
+
     fn draw(&self, svg: &mut String) {
         let least = self.values.iter().map(|point| point.1).fold(0.0, f64::min);
         let greatest = self.values.iter().map(|point| point.1).fold(0.0, f64::max);
@@ -203,6 +261,7 @@ impl Plot<'_> {
         let y = |value: f64| self.top + HEIGHT * (reach - value) / (reach - bottom);
         let right = LEFT + COLUMNS as f64;
         // Writing to a string cannot fail.
+        self.draw_time(svg);
         let mut line = |value: f64, style: &str| {
             let y = y(value);
             let _ = writeln!(svg, "<path d=\"M{LEFT} {y:.1}H{right}\" {style}/>");
@@ -229,19 +288,44 @@ impl Plot<'_> {
             rounded(greatest.max(-least))
         );
         let column = |time: f64| (time / self.seconds * COLUMNS as f64) as usize;
-        let mut path = String::new();
+        let tenths = |value: f64| (10.0 * y(value)).round() as i64;
+        let mut points: Vec<(f64, i64)> = Vec::new();
+        let mut add = |point: (f64, i64)| {
+            // A level line needs only its ends.
+            let is_level = matches!(points[..], [.., a, b] if a.1 == b.1 && b.1 == point.1);
+            if is_level {
+                points.pop();
+            }
+            points.push(point);
+        };
         for values in self.values.chunk_by(|a, b| column(a.0) == column(b.0)) {
             let low = values.iter().map(|point| point.1).fold(f64::INFINITY, f64::min);
             let high = values.iter().map(|point| point.1).fold(f64::NEG_INFINITY, f64::max);
-            let letter = if path.is_empty() { 'M' } else { 'L' };
             let x = LEFT + column(values[0].0) as f64 + 0.5;
-            let _ = write!(path, "{letter}{x} {:.1}", y(low));
-            if y(low) - y(high) > 0.5 {
-                let _ = write!(path, "L{x} {:.1}", y(high));
+            // What is less high than the line is wide is one point.
+            if tenths(low) - tenths(high) > 10 {
+                add((x, tenths(low)));
+                add((x, tenths(high)));
+            } else {
+                add((x, tenths(f64::midpoint(low, high))));
             }
+        }
+        let mut path = String::new();
+        for (index, (x, tenths)) in points.into_iter().enumerate() {
+            let letter = if index == 0 { 'M' } else { 'L' };
+            let _ = write!(path, "{letter}{x} {}", tenths as f64 / 10.0);
         }
         let _ = writeln!(svg, "<path d=\"{path}\" fill=\"none\" stroke=\"#1b1f3b\"/>");
     }
+}
+
+/// The time from one mark of the axis to the next: 1, 2 or 5 times a power of ten, so that there
+/// are 6 to 15 marks.
+fn tick_step(seconds: f64) -> f64 {
+    let least = seconds.max(1e-6) / 15.0;
+    let decade = 10f64.powf(least.log10().floor());
+    let factor = [1.0, 2.0, 5.0, 10.0].into_iter().find(|factor| factor * decade >= least);
+    factor.unwrap_or(10.0) * decade
 }
 
 /// A number with three digits or more.
@@ -313,6 +397,20 @@ mod tests {
         for value in [-jerk.0, jerk.1] {
             assert!((0.9..1.1).contains(&(value / 5000.0)), "{jerk:?}");
         }
+    }
+
+    #[test]
+    fn the_pen_is_raised_before_and_behind_each_stroke() {
+        let motion = motion(&[]);
+        // It is lowered at once, raised behind the stroke, and raised for its dwell.
+        let [before, behind] = motion.raised[..] else {
+            panic!("{:?}", motion.raised);
+        };
+        assert!(before[0] == 0.0 && before[1] < 0.01, "{before:?}");
+        let last = motion.steps.last().expect("steps").0;
+        assert!(behind[0] >= last && behind[0] < last + 0.01, "{behind:?}");
+        assert!((behind[1] - behind[0] - 0.15).abs() < 0.01 && behind[1] == motion.seconds);
+        assert_eq!([0.28, 1.0, 5.6, 70.0].map(tick_step), [0.02, 0.1, 0.5, 5.0]);
     }
 
     #[test]

@@ -3,11 +3,15 @@
 #![cfg(feature = "emulator")]
 
 use penup::board_table::PICO;
+use penup::boards::host::Change;
+use penup_client::emulator::Pin;
 use penup_host_tests::emulated_jobs::{
-    PEN_ON_A_MOTOR, assert_same_as_on_the_host, begin, compare, events_until_idle, give_up,
-    stop_at_once,
+    PEN_ON_A_MOTOR, assert_same_as_on_the_host, begin, bench_like, compare, events_until_idle,
+    give_up, stop_at_once,
 };
+use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
+use std::time::Duration;
 
 #[test]
 fn a_concave_solid_in_perspective() -> Result<(), Box<dyn Error>> {
@@ -24,6 +28,67 @@ fn many_parts_with_many_odd_points() -> Result<(), Box<dyn Error>> {
 fn a_motor_lifts_the_pen() -> Result<(), Box<dyn Error>> {
     let settings = [&PEN_ON_A_MOTOR[..], &["$page=80x80", "$margin=5"]].concat();
     compare(&PICO, "notched.obj", &settings)
+}
+
+/// The times at which step pulses begin, in microseconds.
+fn pulses(changes: impl IntoIterator<Item = (bool, f64)>) -> Vec<f64> {
+    changes.into_iter().filter(|change| change.0).map(|change| change.1).collect()
+}
+
+#[test]
+fn the_pen_moves_while_the_machine_does() -> Result<(), Box<dyn Error>> {
+    for jerk in ["$204=0", "$204=30"] {
+        let overlap = ["$224=150", "$225=150", jerk, "$page=80x80", "$margin=5"];
+        let lines = job_lines("notched.obj", &overlap);
+        let mut line = begin(&PICO, &lines)?;
+        let (mut steps, mut lowered) = (Vec::new(), 0);
+        loop {
+            let idle = line.status()?.starts_with("<Idle");
+            for change in line.emulator.pin_changes()? {
+                match change.pin {
+                    Pin::StepX | Pin::StepY => {
+                        steps.push((change.high, change.at.as_nanos() as f64 / 1000.0));
+                    }
+                    // The servo follows with its next pulse.
+                    Pin::Pen => lowered += usize::from(change.high),
+                    _ => {}
+                }
+            }
+            if idle {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(200));
+        }
+        let at_the_pins = pulses(steps);
+
+        let mut bench = bench_like(&PICO);
+        for text in &lines {
+            bench.say(&format!("{text}\n"));
+        }
+        bench.finish();
+        let changes = bench.board.trace().changes();
+        let on_the_host = pulses(changes.iter().filter_map(|stamped| match stamped.change {
+            Change::StepX(high) | Change::StepY(high) => Some((high, stamped.time as f64 / 25.0)),
+            _ => None,
+        }));
+        let orders = changes.iter().filter(|stamped| matches!(stamped.change, Change::Pen(127)));
+        assert_eq!(lowered, orders.count());
+        // Every pulse comes as long after the one before; only where the pen has just been raised,
+        // the board may first note in its flash that the stroke is drawn.
+        assert_eq!(at_the_pins.len(), on_the_host.len());
+        let mut noted = 0.0f64;
+        for (number, pair) in on_the_host.windows(2).enumerate() {
+            let host = pair[1] - pair[0];
+            let late = at_the_pins[number + 1] - at_the_pins[number] - host;
+            assert!(late > -1.0, "{jerk}, pulse {number}: {late} us");
+            if late >= 1.0 {
+                assert!(host > 5000.0 && late < 20_000.0, "{jerk}, pulse {number}: {late} us");
+                noted = noted.max(late);
+            }
+        }
+        println!("{jerk}: {lowered} strokes, noted within {noted} us");
+    }
+    Ok(())
 }
 
 #[test]

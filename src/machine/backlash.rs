@@ -3,7 +3,9 @@
 //!
 //! The slack is taken up by separate steps that begin and end at rest. The pen does not move during
 //! these steps. So they change neither position nor ink length, and the travel limits ignore them.
-//! The slack is a property of each motor, in every kind of kinematics.
+//! Within a stroke the pen stands on the paper during them. Before one it is still raised if it may
+//! move while the machine does (`$224`, `$225`). The slack is a property of each motor, in every
+//! kind of kinematics.
 //!
 //! Until a motor has moved, it is unknown on which side of its slack it is. The first move
 //! therefore takes up nothing, and the pen may be off by the slack until the machine is homed.

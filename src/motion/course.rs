@@ -262,6 +262,14 @@ impl BlockCursor {
         }
     }
 
+    /// When the next move of the slice in work is due after where that begins, in sixteenths of
+    /// ticks; `None` if it has no more.
+    #[cfg(feature = "pen-overlap")]
+    pub(super) fn next_due(&self) -> Option<u32> {
+        let moves = self.slice.as_ref().filter(|moves| moves.left > 0)?;
+        Some(moves.due >> Train::BITS_BELOW)
+    }
+
     /// Begins the next piece of a dotted line.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn next_piece(&mut self) {

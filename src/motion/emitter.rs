@@ -186,6 +186,18 @@ impl Emitter {
         }
     }
 
+    /// The middle between the last event and one at `time`, but not before `least`: far from both,
+    /// since the pen of a board may move some microseconds late. `None` if an event there would
+    /// delay the one at `time`.
+    #[cfg(feature = "pen-overlap")]
+    pub(super) fn midway(&self, least: u32, time: u32) -> Option<u32> {
+        let (_, since) = self.pending?;
+        let middle = since.wrapping_add(time.wrapping_sub(since) / 2);
+        let at = later(later(least, middle), since.wrapping_add(self.least_interval));
+        let is_free = later(time, at.wrapping_add(self.least_interval)) == time;
+        is_free.then_some(at)
+    }
+
     /// The pen goes to `height` at `time`.
     pub(super) fn pen(
         &mut self,

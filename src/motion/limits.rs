@@ -52,6 +52,9 @@ pub enum LimitsError {
     Anchors,
     /// Pulses of 1 ms or longer.
     Pulse,
+    /// A stepper motor lifts the pen, which moves only while the machine stands.
+    #[cfg(feature = "pen-overlap")]
+    PenByMotor,
     /// So many steps per second that the pulses would run together: lower the speed or the pulse.
     TooManySteps {
         /// Steps per second asked for.

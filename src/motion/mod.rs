@@ -46,6 +46,8 @@ pub use lift::LiftRule;
 pub use limits::{Limits, LimitsError, MotionSettings};
 pub use lookahead::{Block, Lookahead};
 pub use profile::Profile;
+#[cfg(feature = "pen-overlap")]
+pub use runner::PenOverlap;
 pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
 pub use steady::SteadySpeed;
 

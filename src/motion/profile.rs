@@ -164,6 +164,14 @@ impl Profile {
         self.exit
     }
 
+    /// How long it still takes to its end, in sixteenths of ticks.
+    #[cfg(feature = "pen-overlap")]
+    pub(super) fn time_left(&self, limits: &Limits) -> u64 {
+        let flat = Phase::new(limits, self.peak.speed, self.peak.speed, self.flat);
+        let down = Phase::new(limits, self.peak.speed, self.exit.speed, self.down);
+        self.phase.time.saturating_add(flat.time).saturating_add(down.time)
+    }
+
     /// The speed where the next slice begins.
     pub(super) fn speed(&self) -> SliceSpeed {
         if self.phase.distance > 0 {

@@ -1,5 +1,12 @@
 //! Runs the blocks: pen changes at rest, slices, moves, events.
 
+#[cfg_attr(not(feature = "pen-overlap"), path = "runner/pen_at_rest.rs")]
+mod pen;
+
+#[cfg(feature = "pen-overlap")]
+pub use pen::PenOverlap;
+use pen::PenTiming;
+
 use super::course::BlockCursor;
 use super::curvature::Curvature;
 use super::emitter::{Kinds, MoveLevels, whole_ticks};
@@ -35,6 +42,9 @@ pub struct PenPositions {
     pub dot_length: PathLength,
     /// The motor that lifts it, if that is how it is lifted.
     pub lift: Option<LiftRule>,
+    /// For how long it moves while the machine does.
+    #[cfg(feature = "pen-overlap")]
+    pub overlap: PenOverlap,
 }
 
 /// What one call of [`Runner::produce`] came to.
@@ -126,6 +136,7 @@ pub struct Runner<'m> {
     /// Where the pen was sent last; not known at the start.
     pen_height: Option<u8>,
     lift: Lift,
+    timing: PenTiming,
     stopping: bool,
     stopping_after_stroke: bool,
     /// How fast the piece in work was allowed to end, if more blocks may allow it to be faster.
@@ -181,6 +192,7 @@ impl<'m> Runner<'m> {
             pen_is_down: pen.lift.is_none().then_some(false),
             pen_height: None,
             lift: Lift::default(),
+            timing: PenTiming::default(),
             #[cfg(feature = "resume")]
             raised_at: 0,
             stopping: false,
@@ -361,6 +373,7 @@ impl<'m> Runner<'m> {
     pub fn forget_pen(&mut self) {
         self.pen_is_down = None;
         self.pen_height = None;
+        self.forget_timing();
     }
 
     /// The pen's motor had no current: where it stands is not known.
@@ -481,7 +494,8 @@ impl<'m> Runner<'m> {
     }
 
     /// Appends steps by which the motors take up their slack, from rest to rest; the pen stays
-    /// where it is, lowered if `ink` says so.
+    /// where it is, lowered if `ink` says so. Where the pen may move while the machine does, it is
+    /// still raised if these steps come before a stroke.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
@@ -559,8 +573,12 @@ impl<'m> Runner<'m> {
     }
 
     /// Gives the plan up where that leaves no kink. An interval in which the acceleration changes
-    /// is carried out: at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800 mm/s² on.
+    /// is carried out: at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800 mm/s² on. So is the
+    /// rest of a travel on which the pen was told to go down.
     fn break_plan_off(&mut self) -> Option<PathLength> {
+        if self.timing.is_lowering() {
+            return None;
+        }
         match &self.plan {
             Some(Plan::Interval(interval)) if interval.changes() => None,
             _ => self.give_plan_up(),
@@ -685,6 +703,9 @@ impl<'m> Runner<'m> {
             };
             course.begin_slice(slice);
         }
+        if self.timing.is_due() {
+            self.lower_on_the_way(queue)?;
+        }
         self.run_slice(queue)?;
         Ok(Progress::More)
     }
@@ -777,6 +798,7 @@ impl<'m> Runner<'m> {
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
         self.now = self.now.wrapping_add(slice.time);
+        self.timing.pass(slice.time);
         self.emitter.split_long_wait(self.now, queue)
     }
 
@@ -825,6 +847,9 @@ impl<'m> Runner<'m> {
             self.move_pen(false, queue)?;
             return Ok(Progress::More);
         }
+        if self.wait_for_rising(queue)? {
+            return Ok(Progress::More);
+        }
         if self.emitter.is_open() {
             let at = self.emitter.rest(self.now, true, queue)?;
             self.advance_to(at);
@@ -844,6 +869,9 @@ impl<'m> Runner<'m> {
         } else {
             (self.pen.up_height, self.pen.up_ticks)
         };
+        if let Some(passed) = self.lowered_on_the_way(down) {
+            return self.dwell_for_pen(down, dwell.saturating_sub(passed), queue);
+        }
         // On its way it is neither up nor down.
         self.pen_is_down = None;
         self.was_faster = SliceSpeed::ZERO;
@@ -865,12 +893,7 @@ impl<'m> Runner<'m> {
         }
         // Where it stands if that is not known: at the start, and after an emergency stop.
         let from = self.pen_height.unwrap_or(self.pen.up_height);
-        let next = match height.cmp(&from) {
-            _ if self.pen.ramp_ticks == 0 || self.pen.lift.is_some() => height,
-            Ordering::Less => from - 1,
-            Ordering::Equal => height,
-            Ordering::Greater => from + 1,
-        };
+        let next = self.next_height(from, height);
         let at = self.emitter.pen(next, self.now, queue)?;
         self.advance_to(at);
         self.pen_height = Some(next);
@@ -878,11 +901,32 @@ impl<'m> Runner<'m> {
             self.now = self.now.wrapping_add(self.pen.ramp_ticks << FRACTION_BITS);
             return Ok(());
         }
+        self.dwell_for_pen(down, dwell, queue)
+    }
+
+    /// The height at which the pen is next on its way from one to another.
+    fn next_height(&self, from: u8, to: u8) -> u8 {
+        match to.cmp(&from) {
+            _ if self.pen.ramp_ticks == 0 || self.pen.lift.is_some() => to,
+            Ordering::Less => from - 1,
+            Ordering::Equal => to,
+            Ordering::Greater => from + 1,
+        }
+    }
+
+    /// The dwell passes of a pen that was told its last height.
+    fn dwell_for_pen(
+        &mut self,
+        down: bool,
+        dwell: u32,
+        queue: &mut dyn EventQueue,
+    ) -> Result<(), StepEvent> {
         self.pen_is_down = Some(down);
         #[cfg(feature = "resume")]
         if !down {
             self.raised_at = self.emitter.ticks();
         }
+        let dwell = if down { dwell } else { self.begin_rising(dwell) };
         // Two waits of up to 0.67 s: the settings allow no longer dwell. With the pen raised, the
         // queue may run dry in the second.
         let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
@@ -914,9 +958,24 @@ impl<'m> Runner<'m> {
         if self.stopping && at_rest {
             return self.stand(Progress::Stopped, queue);
         }
+        #[cfg(not(feature = "pen-overlap"))]
         let inked = course.is_inked();
+        #[cfg(feature = "pen-overlap")]
+        let inked = {
+            let stays_raised = PenTiming::stays_raised(&self.pen, self.pen_is_down);
+            course.is_inked() && !(stays_raised && course.is_slack())
+        };
         if at_rest {
-            if self.pen_is_down != Some(inked) {
+            // On the way to a stroke, motors may stand before they take up their slack.
+            #[cfg(feature = "pen-overlap")]
+            let must_move =
+                self.pen_is_down != Some(inked) && (inked || !self.timing.is_lowering());
+            #[cfg(not(feature = "pen-overlap"))]
+            let must_move = self.pen_is_down != Some(inked);
+            if must_move {
+                if inked && self.wait_for_rising(queue)? {
+                    return Ok(Progress::More);
+                }
                 self.move_pen(inked, queue)?;
                 return Ok(Progress::More);
             }
@@ -928,7 +987,8 @@ impl<'m> Runner<'m> {
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
-        let top = if inked { self.draw } else { self.travel };
+        let top = if inked { self.draw } else { self.timing.travel_top(self.travel) };
+        let stopping = self.stopping && !self.timing.is_lowering();
         if let Some(jerk) = self.limits.jerk {
             let state = State { speed: self.pace.speed.to_bits(), ramp: self.ramp };
             let mut road = Road {
@@ -939,7 +999,7 @@ impl<'m> Runner<'m> {
                 curve_limit: course.curve_limit,
                 beyond: course.is_last_piece().then_some(&self.lookahead),
             };
-            if self.stopping {
+            if stopping {
                 let least = jerk.braking_distance(state, 0);
                 if least <= road.room {
                     road.room = course.stop_behind(least);
@@ -949,7 +1009,7 @@ impl<'m> Runner<'m> {
                 }
             }
             self.plan = Some(Plan::Interval(road.next(state)));
-            return Ok(Progress::More);
+            return self.planned(inked, at_rest, queue);
         }
         let left = course.left();
         if let Some(exit) = self.exit_reached.take() {
@@ -964,7 +1024,7 @@ impl<'m> Runner<'m> {
             }
             top = self.curve;
         }
-        let (length, exit_allowed) = if self.stopping {
+        let (length, exit_allowed) = if stopping {
             let least = u64::from(self.pace.stopping_distance.to_bits()) << 14;
             let length = course.to_whole_step(least).div_ceil(1 << 14) as u32;
             (PathLength::from_bits(length).min(left), PathLength::ZERO)
@@ -983,7 +1043,7 @@ impl<'m> Runner<'m> {
         // No copies: they cost as much as the plan.
         self.plan =
             Some(Plan::Profile(Profile::new(&self.limits, self.pace, length, top, exit_allowed)));
-        Ok(Progress::More)
+        self.planned(inked, at_rest, queue)
     }
 
     /// The next piece of a dotted line, or the end of the block.

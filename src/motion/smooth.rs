@@ -198,6 +198,55 @@ impl JerkLimit {
         self.distance(way)
     }
 
+    /// How long it takes at most, in sixteenths of ticks, to come to rest after such a way
+    /// (2^-32 mm), on which nothing but the speed `top` and that rest limits the machine.
+    ///
+    /// While it is never slower than some speed before it brakes to that rest, it takes no longer
+    /// than three times the way over that speed: just so long while braking fades. Where it must
+    /// brake to rest, it also takes no longer than at the present acceleration, which then fades;
+    /// and no longer than the hardest braking, and three times the rest of the way over the speed.
+    #[cfg(feature = "pen-overlap")]
+    #[inline(never)] // Only on travels: inlined, it would fill the cache.
+    fn time_to_rest(self, from: State, way: u64, top: SliceSpeed) -> u64 {
+        let speed = from.speed.max(1);
+        // Ways are below 2^46; what is further away is not waited for yet.
+        let over = |way: u64, speed: u32| {
+            (3 * (way.min(1 << 45) << 16)).checked_div(speed.into()).unwrap_or(u64::MAX)
+        };
+        if speed > top.to_bits() {
+            return over(way, top.to_bits());
+        }
+        let rest = way.saturating_sub(self.braking_distance(from, 0));
+        if from.ramp < 0 && rest > way / 8 {
+            // It slows down to another speed.
+            return over(way, u32::try_from(self.settled(from)).unwrap_or(speed).min(speed));
+        }
+        let ramp = u64::from(from.ramp.unsigned_abs());
+        let acceleration = (u64::from(self.jerk.get()) * ramp) >> 12;
+        let by_ramp = match (u64::from(speed) << 16).checked_div(acceleration) {
+            Some(time) if from.ramp < 0 => time + (ramp << 11),
+            _ => u64::MAX,
+        };
+        let by_braking = self.braking_time(from).saturating_add(over(rest, speed));
+        over(way, speed).min(by_ramp).min(by_braking)
+    }
+
+    /// How long the braking of [`JerkLimit::braking_distance`] to rest takes, in sixteenths of
+    /// ticks; the greatest number where the ramp has only to end.
+    #[cfg(feature = "pen-overlap")]
+    fn braking_time(self, from: State) -> u64 {
+        let (ramp, speed) = (i64::from(from.ramp), self.scaled(from.speed) + 1);
+        let square = speed + ramp * ramp / 2;
+        if ramp < 0 && square < ramp * ramp {
+            return u64::MAX;
+        }
+        let peak = square.max(1).unsigned_abs().isqrt() as i64;
+        let peak = peak.min(self.longest.into()).max(-ramp).max(1);
+        // What is left to be shed at the peak.
+        let hold = (speed + ramp * ramp / 2 - peak * peak + peak - 1).max(0) / peak;
+        ((ramp + peak) + hold + peak).max(0).unsigned_abs() << 12
+    }
+
     /// Scaled speed times sixteenths of slices, as 2^-32 mm.
     fn distance(self, scaled: i64) -> u64 {
         ((scaled.max(0).unsigned_abs() >> 8) * u64::from(self.jerk.get())) >> 12
@@ -297,6 +346,12 @@ impl Interval {
             slice = Slice { distance, time };
         }
         Some(slice)
+    }
+
+    /// See [`JerkLimit::time_to_rest`], from where the last slice given ends.
+    #[cfg(feature = "pen-overlap")]
+    pub(super) fn time_to_rest(&self, way: u64, top: SliceSpeed) -> u64 {
+        self.limit.time_to_rest(self.state(), way, top)
     }
 
     /// Whether it is longer than others.

@@ -26,6 +26,8 @@ pub struct Drawn {
     pub runs: Vec<Run>,
     /// The moves in which motors took up their backlash in one go, in steps of the motors.
     pub backlash: Vec<Run>,
+    /// How long the machine stood before each stroke while the pen was told to be down, in ms.
+    pub stood: Vec<f64>,
 }
 
 /// Checks the changes of the pins against the settings.
@@ -33,7 +35,8 @@ pub struct Drawn {
 /// # Panics
 /// Panics at the first change that violates a rule. The rules forbid: a pulse, or a pause between
 /// pulses, shorter than the pulse width, a change of direction during a pulse or too shortly before
-/// one, a step with the drivers off, a step before the pen's dwell is over, a step that leaves the
+/// one, a step with the drivers off, a step before the pen's dwell is over but for what the settings
+/// let overlap, a pen that is lowered before it was up, a step that leaves the
 /// soft limits or leads further beyond them (the origin is where the pins began), a motor that
 /// takes up its backlash while the other one moves the pen, and a step while the pen's motor moves
 /// or is not at the pen's height.
@@ -61,6 +64,10 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
     let mut axes = [(false, None::<u64>, true, None::<u64>); 3];
     let mut lift = LiftWatch::new(settings, true);
     let (mut enabled, mut pen_ready) = (false, 0);
+    // When the machine may move on a raised pen, and until when it may while the pen goes down.
+    let (mut may_leave, mut must_stand) = (0, 0);
+    let mut is_arriving = false;
+    let overlaps = settings.is_on(Setting::PenDownEarly);
     let (mut at, mut motors) = (PagePoint::default(), PagePoint::default());
     let mut backlashes = backlash_steps(settings).map(Backlash::new);
     let mut takes_up = false;
@@ -81,9 +88,26 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
                     } else {
                         Setting::PenUpDwell
                     };
-                    pen_ready = time + u64::from(settings.milliseconds_as_ticks(dwell));
+                    let ticks = |setting| u64::from(settings.milliseconds_as_ticks(setting));
+                    let is_ramp = settings.is_on(Setting::PenRamp) && is_arriving;
+                    is_arriving = height > drawn.pen;
+                    if !is_arriving || !overlaps {
+                        drawn.runs.push(Run { height, ..Run::default() });
+                    }
+                    if is_arriving {
+                        let is_up = !overlaps || is_ramp || time >= pen_ready;
+                        assert!(is_up, "{time}: the pen is lowered before it was up");
+                        if !is_ramp {
+                            must_stand = time + ticks(Setting::PenDownEarly);
+                        }
+                        may_leave = u64::MAX;
+                    } else {
+                        must_stand = 0;
+                        let early = ticks(Setting::TravelEarly).min(ticks(dwell));
+                        may_leave = time + ticks(dwell) - early;
+                    }
+                    pen_ready = time + ticks(dwell);
                     drawn.pen = height;
-                    drawn.runs.push(Run { height, ..Run::default() });
                 }
                 Change::UpX(up) => turn(&mut axes[0], up, time),
                 Change::UpY(up) => turn(&mut axes[1], up, time),
@@ -103,13 +127,24 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
         }
         if delta != (0, 0) {
             assert!(enabled, "{time}: step with the drivers off");
-            assert!(time >= pen_ready, "{time}: step while the pen moves");
+            if is_arriving && time >= pen_ready {
+                // The stroke begins.
+                let last = drawn.last_step.max(pen_ready - ticks_of(settings));
+                drawn.stood.push((time - last) as f64 / second * 1000.0);
+                if overlaps {
+                    drawn.runs.push(Run { height: drawn.pen, ..Run::default() });
+                }
+                (is_arriving, may_leave) = (false, 0);
+            }
+            let may_move = if is_arriving { time <= must_stand } else { time >= may_leave };
+            assert!(may_move, "{time}: step while the pen moves");
             lift.assert_at(drawn.pen, "a step with the pen");
             motors = PagePoint { x: motors.x + delta.0, y: motors.y + delta.1 };
             let moved = (backlashes[0].turn(delta.0), backlashes[1].turn(delta.1));
             if moved == (0, 0) {
                 if !std::mem::replace(&mut takes_up, true) {
-                    drawn.backlash.push(Run::default());
+                    let height = if is_arriving { 0 } else { drawn.pen };
+                    drawn.backlash.push(Run { height, ..Run::default() });
                 }
                 let run = drawn.backlash.last_mut().expect("never empty");
                 run.times.push(time as f64 / second);
@@ -119,7 +154,7 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
             takes_up = false;
             assert_eq!(moved, delta, "{time}: backlash is taken up while the pen moves");
             let next = PagePoint { x: at.x + delta.0, y: at.y + delta.1 };
-            if drawn.pen >= 64 {
+            if drawn.pen >= 64 && !is_arriving {
                 drawn.inked.insert((at.min(next), at.max(next)));
             }
             if settings.is_on(Setting::SoftLimits) && !settings.is_on(Setting::Homing) {
@@ -136,6 +171,11 @@ fn follow_pins(trace: &[Stamped], settings: &Settings, alarms: bool) -> Drawn {
     drawn.end = at;
     drawn.lift = lift.position;
     drawn
+}
+
+/// The dwell of the pen when it is lowered, in ticks.
+fn ticks_of(settings: &Settings) -> u64 {
+    settings.milliseconds_as_ticks(Setting::PenDownDwell).into()
 }
 
 /// The number of steps beyond the travel.

@@ -10,4 +10,5 @@ mod disturbed;
 mod fixtures;
 mod homing;
 mod pen;
+mod pen_overlap;
 mod underrun;

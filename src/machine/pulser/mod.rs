@@ -142,12 +142,15 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
         (is_due, least.saturating_sub(self.ticks))
     }
 
-    /// Returns the ticks of the event between the current one and the next step, or 0. They count
-    /// as well where the current event is lengthened.
+    /// Returns the ticks of the event between the current one and the next step, or 0. It is
+    /// a change of direction, or an order to the pen while the machine moves. They count as well
+    /// where the current event is lengthened.
     pub fn wait_behind(&self) -> u32 {
         let others = A::ORDER.pulses | StepEvent::AT_REST | StepEvent::LENGTH | StepEvent::PEN;
         match self.ring.peek() {
             Some(word) if word as u8 & others == 0 => word >> 8,
+            #[cfg(feature = "pen-overlap")]
+            Some(word) if word as u8 & StepEvent::PEN != 0 => word >> 8,
             _ => 0,
         }
     }

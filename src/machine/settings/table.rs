@@ -132,6 +132,13 @@ pub enum Setting {
     StrokeLead,
     /// `$223` How far behind its last point an open stroke of a drawing ends.
     StrokeTrail,
+    /// `$224` How long before a travel ends the pen is told to go down, at most; no longer than it
+    /// takes.
+    #[cfg(feature = "pen-overlap")]
+    PenDownEarly,
+    /// `$225` How long before the pen is up a travel begins; no longer than `$212`.
+    #[cfg(feature = "pen-overlap")]
+    TravelEarly,
     /// `$230` The kinematics of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
     Kinematics,
     /// `$231` The distance from the left anchor of the belts to the right one.
@@ -293,6 +300,10 @@ pub const SETTINGS: &[SettingInfo] = {
         row(StrokeOverlap, 221, "closed strokes go on by", "mm", (0.0, 10.0, 0.0), false),
         row(StrokeLead, 222, "open strokes begin early by", "mm", (0.0, 10.0, 0.0), false),
         row(StrokeTrail, 223, "open strokes end late by", "mm", (0.0, 10.0, 0.0), false),
+        #[cfg(feature = "pen-overlap")]
+        row(PenDownEarly, 224, "pen goes down before a travel ends", "ms", (0.0, 500.0, 0.0), false),
+        #[cfg(feature = "pen-overlap")]
+        row(TravelEarly, 225, "travel begins before the pen is up", "ms", (0.0, 500.0, 0.0), false),
         row(Kinematics, 230, "kinematics", "0|1|2", (0.0, 2.0, 0.0), true),
         row(AnchorWidth, 231, "distance between anchors", "mm", (100.0, 8000.0, 800.0), false),
         row(AnchorLeft, 232, "left anchor to the origin", "mm", (0.0, 8000.0, 190.0), false),

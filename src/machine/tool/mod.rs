@@ -13,6 +13,8 @@ pub use solenoid::Solenoid;
 
 use super::{Setting, Settings};
 use crate::motion::{LimitsError, PenPositions};
+#[cfg(feature = "pen-overlap")]
+use crate::motion::{PenOverlap, TICKS_PER_SECOND};
 
 /// The actuator of the pen that a board has: a solenoid or a servo.
 pub trait Pen {
@@ -39,10 +41,18 @@ impl Tool {
     /// Checks the settings of the chosen tool against each other.
     ///
     /// # Errors
-    /// [`LimitsError::TooManySteps`] if the motor of z would have to step too fast.
+    /// [`LimitsError::TooManySteps`] if the motor of z would have to step too fast,
+    /// `LimitsError::PenByMotor` if a motor is to lift the pen while the others move.
     pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
         match Self::of(settings) {
             Self::Actuator => Ok(()),
+            #[cfg(feature = "pen-overlap")]
+            Self::Stepper
+                if settings.is_on(Setting::PenDownEarly)
+                    || settings.is_on(Setting::TravelEarly) =>
+            {
+                Err(LimitsError::PenByMotor)
+            }
             Self::Stepper => stepper::rule(settings).map(|_| ()),
         }
     }
@@ -63,13 +73,32 @@ impl Tool {
                 // `Settings::set` refuses whatever would be refused here.
                 Self::Stepper => stepper::rule(settings).ok(),
             },
+            #[cfg(feature = "pen-overlap")]
+            overlap: Self::overlap(settings),
+        }
+    }
+
+    /// For how long the pen moves while the machine does: no longer than it moves at all.
+    #[cfg(feature = "pen-overlap")]
+    fn overlap(settings: &Settings) -> PenOverlap {
+        let ticks = |setting| settings.milliseconds_as_ticks(setting);
+        let heights = [Setting::PenUpHeight, Setting::PenDownHeight].map(|at| settings.whole(at));
+        let ramp = ticks(Setting::PenRamp) / 127 * heights[0].abs_diff(heights[1]).min(127);
+        PenOverlap {
+            down_ticks: ticks(Setting::PenDownEarly).min(ramp + ticks(Setting::PenDownDwell)),
+            up_ticks: ticks(Setting::TravelEarly).min(ticks(Setting::PenUpDwell)),
         }
     }
 
     /// The time, in milliseconds, that lowering and raising the pen adds to each stroke: the
-    /// dwells, and the moves down and up of a motor.
+    /// dwells, and the moves down and up of a motor, without what passes while the machine moves.
     pub(super) fn stroke_milliseconds(settings: &Settings) -> u64 {
         let dwells = settings.whole(Setting::PenDownDwell) + settings.whole(Setting::PenUpDwell);
+        #[cfg(feature = "pen-overlap")]
+        let dwells = {
+            let PenOverlap { down_ticks, up_ticks } = Self::overlap(settings);
+            dwells.saturating_sub((down_ticks + up_ticks) / (TICKS_PER_SECOND / 1000))
+        };
         let moves = match Self::of(settings) {
             Self::Actuator => 0,
             Self::Stepper => 2 * stepper::move_milliseconds(settings),

@@ -7,6 +7,8 @@ use crate::drawing::PageError;
 use crate::fixed::{BinaryFraction, Length, Millimetres};
 use crate::machine::{MachineError, SettingError};
 use crate::model::{ElementKind, ModelError, PEN_LIMIT};
+#[cfg(feature = "pen-overlap")]
+use crate::motion::LimitsError;
 use crate::stage::OutOfScratch;
 use crate::view::ViewError;
 use core::fmt;
@@ -266,6 +268,11 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
         SettingError::NotWhole(setting) => {
             row(SETTING_OUT_OF_RANGE, format_args!("{} is a whole number", setting.info().name))
         }
+        #[cfg(feature = "pen-overlap")]
+        SettingError::Conflict(LimitsError::PenByMotor) => row(
+            error(151, "setting conflicts with another"),
+            format_args!("a motor moves the pen at rest only: set $224=0 and $225=0, or $209=0"),
+        ),
         SettingError::Conflict(_) => row(
             error(151, "setting conflicts with another"),
             format_args!("with it the steps would come too fast or the ramps too slow"),

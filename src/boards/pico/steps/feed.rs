@@ -227,9 +227,10 @@ fn brake_words(brake: &mut Brake, handed_over: u32, count: u32) -> u32 {
             let mut least = brake.step(unpack(step), STATE.brake());
             let planned = (word >> 8) + beyond;
             if least > planned && number + 1 < count {
-                // The next word may be a wait between two steps, whose ticks count as well.
+                // The next word may be a wait between two steps, or move the pen there: then its
+                // ticks count as well.
                 let next = slot(at.wrapping_add(1)).load(Ordering::Relaxed);
-                if next & TARGETS == target::WAIT {
+                if next & TARGETS != target::PULSE {
                     least = least.saturating_sub((next >> 8) + WAIT_TICKS);
                 }
             }
