@@ -1,15 +1,19 @@
 //! Pen-up lengths and times of `order` for plans in millimetres: `order_bench EFFORT LIFT FILE...`,
-//! where a lift is worth `LIFT` mm.
+//! where EFFORT is `auto` or a number and a lift is worth `LIFT` mm.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
-use penup::order::{Leg, Method, Options, Shape, order};
+use penup::order::{Effort, Leg, Method, Options, Shape, order};
 use penup::stage::{NeverCancel, Scratch};
 use penup_host_tests::order_reference::Sheet;
 use std::time::Instant;
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let effort = arguments.next().and_then(|word| word.parse().ok()).expect("EFFORT LIFT FILE...");
+    let effort = arguments.next().expect("EFFORT LIFT FILE...");
+    let effort = match effort.as_str() {
+        "auto" => Effort::default(),
+        units => Effort::Units(units.parse().expect("auto or a number")),
+    };
     let lift_cost: f64 = arguments.next().and_then(|word| word.parse().ok()).expect("LIFT FILE...");
     let lift_cost = (lift_cost * 80.0 * 256.0) as u32;
     for file in arguments {

@@ -15,11 +15,11 @@ use std::time::Duration;
 /// Parts of the mangled names: seeing and hidden lines, hidden lines alone, the pairing of odd
 /// points, the improvement of the tour, all of the order.
 const FUNCTIONS: [&str; 5] = [
-    "5penup4view4clip3see17h",
+    "5penup4view4clip13project_scene17h",
     "5penup10visibility14find_stretches17h",
     "5penup5order11pair_points17h",
     "5penup5order7improve7improve17h",
-    "5penup5order5order17h",
+    "Pipeline$LT$I$GT$5order17h",
 ];
 
 const SCENES: [(&str, &str); 9] = [

@@ -10,6 +10,7 @@
 pub mod curve_reference;
 pub mod cut_jobs;
 pub mod enumeration;
+pub mod order_drawings;
 pub mod order_reference;
 pub mod event_checker;
 pub mod motion_cases;

@@ -1,7 +1,7 @@
 //! Tests of the pen-up moves that `order` chooses against the enumeration.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
-use penup::order::{Method, Options, Shape, length};
+use penup::order::{Effort, Method, Options, Shape, length};
 use penup::stage::{NeverCancel, Scratch};
 use penup_host_tests::enumeration::{Distances, Options as Variants, optimum};
 use penup_host_tests::order_reference::Sheet;
@@ -57,7 +57,7 @@ proptest! {
         shape in prop_oneof![Just(Shape::OpenPath), Just(Shape::ClosedCycle)],
     ) {
         let sheet = star(&points, side);
-        let options = Options { method, shape, effort: 0, lift_cost: 0 };
+        let options = Options { method, shape, effort: Effort::Units(0), lift_cost: 0 };
         let (_, report) = sheet.order(options).expect("an order");
         let least = least(&sheet, shape);
         prop_assert!(report.bound <= least && least <= report.pen_up);

@@ -4,8 +4,9 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup::drawing::{Drawing, LineType, PagePoint, Segment};
-use penup::order::{EXACT_POINTS, Leg, Method, Options, OrderError, Report, Shape, order};
+use penup::order::{EXACT_POINTS, Effort, Leg, Method, Options, OrderError, Report, Shape, order};
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
+use penup_host_tests::order_drawings::two_columns;
 use penup_host_tests::order_reference::Sheet;
 use penup_host_tests::scene_files;
 use proptest::prelude::*;
@@ -24,13 +25,15 @@ fn polylines(reach: i32) -> impl Strategy<Value = Vec<Vec<(i32, i32)>>> {
 
 fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
     for (method, shape) in ALL {
-        let (_, nearest_first) = sheet.order(Options { method, shape, effort: 0, lift_cost: 0 })?;
-        let (_, improved) = sheet.order(Options { method, shape, effort: 3, lift_cost: 0 })?;
+        let (_, nearest_first) =
+            sheet.order(Options { method, shape, effort: Effort::Units(0), lift_cost: 0 })?;
+        let (_, improved) =
+            sheet.order(Options { method, shape, effort: Effort::Units(3), lift_cost: 0 })?;
         if sheet.segments.iter().all(|segment| segment.pen() == 0) {
             assert!(improved.pen_up <= nearest_first.pen_up);
         }
         let (_, seldom_lifted) =
-            sheet.order(Options { method, shape, effort: 3, lift_cost: 5 << 8 })?;
+            sheet.order(Options { method, shape, effort: Effort::Units(3), lift_cost: 5 << 8 })?;
         assert_eq!(improved.pen_down, nearest_first.pen_down);
         assert_eq!(seldom_lifted.pen_down, nearest_first.pen_down);
     }
@@ -69,15 +72,7 @@ fn separate_parts_are_drawn_within_three_hundredths_of_the_best_known() {
 /// column and up the other.
 #[test]
 fn a_hatching_is_drawn_within_three_hundredths_of_the_best_known() {
-    let lines = (0..250).flat_map(|row| {
-        let turn = f64::from(row);
-        let (y, middle) = (15.0 + turn, 95.0 + 30.0 * (turn / 20.0).sin());
-        let left = (20.0 + 5.0 * (turn / 9.0).sin(), middle - 4.0);
-        let right = (middle + 4.0, 175.0 + 8.0 * (turn / 7.0).cos());
-        let steps = |mm: f64| (80.0 * mm).round() as i32;
-        [left, right].map(|(from, to)| vec![(steps(from), steps(y)), (steps(to), steps(y))])
-    });
-    let sheet = Sheet::from_polylines(&lines.collect::<Vec<_>>());
+    let sheet = two_columns();
     for (shape, best_known) in [(Shape::OpenPath, 653.7), (Shape::ClosedCycle, 661.7)] {
         let (_, report) = sheet.order(Options { shape, ..Options::default() }).expect("fits");
         assert!(millimetres(report.pen_up) < 1.03 * best_known, "{report:?}");
@@ -115,8 +110,9 @@ fn very_many_odd_points_are_paired_exactly_only_when_asked() {
     let dashes = (0..600).map(|dash| vec![(40 * dash, 0), (40 * dash + 30, dash % 7)]);
     let sheet = Sheet::from_polylines(&dashes.collect::<Vec<_>>());
     let paired = |method| {
-        let (_, report) =
-            sheet.order(Options { method, effort: 0, ..Options::default() }).expect("fits");
+        let (_, report) = sheet
+            .order(Options { method, effort: Effort::Units(0), ..Options::default() })
+            .expect("fits");
         assert!(report.odd_points > EXACT_POINTS);
         report.bound > 0
     };
@@ -130,7 +126,7 @@ fn with_less_memory_the_order_is_worse_or_refused_but_never_wrong() {
     for words in (0..8000).step_by(250) {
         let mut memory = vec![0; words];
         let mut tour = vec![Leg::new(0, false); sheet.segments.len()];
-        let options = Options { effort: 20, ..Options::default() };
+        let options = Options { effort: Effort::Units(20), ..Options::default() };
         match order(
             sheet.drawing(),
             options,
@@ -165,7 +161,7 @@ fn a_job_given_up_ends_at_once() {
     for checks in [0, 1, 10, 100, 1000] {
         let mut memory = vec![0; 1 << 15];
         let mut tour = vec![Leg::new(0, false); sheet.segments.len()];
-        let options = Options { effort: 1 << 20, ..Options::default() };
+        let options = Options { effort: Effort::Units(1 << 20), ..Options::default() };
         let mut cancel = GivenUpAfter(checks);
         let scratch = Scratch::new(&mut memory);
         let result = order(sheet.drawing(), options, scratch, &mut cancel, &mut tour);
@@ -217,7 +213,7 @@ proptest! {
         }
         let shape = if closed { Shape::ClosedCycle } else { Shape::OpenPath };
         for (method, effort) in [(Method::Auto, 200), (Method::Greedy, 0), (Method::Exact, 20)] {
-            let options = Options { method, shape, effort, lift_cost: 300 };
+            let options = Options { method, shape, effort: Effort::Units(effort), lift_cost: 300 };
             let (tour, report) = sheet.order(options).expect("fits");
             let (wide, wide_report) = sheet.order_wide(options).expect("fits");
             prop_assert_eq!(report, wide_report);
@@ -235,7 +231,7 @@ proptest! {
         }
         prop_assert_eq!(orders_everything(&sheet), Ok(()));
         let (method, shape) = (Method::Auto, Shape::OpenPath);
-        let options = Options { method, shape, effort: 1, lift_cost: 0 };
+        let options = Options { method, shape, effort: Effort::Units(1), lift_cost: 0 };
         let (tour, _) = sheet.order(options).expect("as above");
         let pens = tour.iter().map(|leg| sheet.segments[leg.segment()].pen());
         prop_assert!(pens.is_sorted());

@@ -4,7 +4,7 @@
 
 use integer_blossom::min_weight_perfect_matching;
 use penup::drawing::{PagePoint, Segment};
-use penup::order::{Method, Options, Shape, length};
+use penup::order::{Effort, Method, Options, Shape, length};
 use penup_host_tests::order_reference::Sheet;
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -54,7 +54,7 @@ fn by_trial(costs: &[Vec<i64>]) -> i64 {
 
 fn compare(tips: &[PagePoint], shape: Shape, solve: fn(&[Vec<i64>]) -> i64) {
     let tips = &tips[..tips.len() & !1];
-    let options = Options { method: Method::Exact, shape, effort: 0, lift_cost: 0 };
+    let options = Options { method: Method::Exact, shape, effort: Effort::Units(0), lift_cost: 0 };
     let (_, report) = star(tips).order(options).expect("plenty of memory");
     assert_eq!(report.pen_up as i64, solve(&costs(tips, shape)), "{shape:?}");
     assert!(report.optimal);

@@ -15,7 +15,7 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::drawing::{LineType, PagePoint, Segment};
-use penup::order::{Leg, Options, Report, Shape};
+use penup::order::{Effort, Leg, Options, Report, Shape};
 use penup_host_tests::order_reference::Sheet;
 use std::collections::BTreeMap;
 
@@ -219,13 +219,13 @@ fn a_closed_hatching_goes_down_one_column_and_up_the_other() {
     assert_tour(
         closed(),
         r"
-        +--3->+     +--4->+
-
-        +<-2--+     +<-5--+
+        +<-8--+     +<-7--+
 
         +--1->+     +--6->+
 
-        +<-8--+     +<-7--+
+        +<-2--+     +<-5--+
+
+        +--3->+     +--4->+
         ",
     );
 }
@@ -234,7 +234,7 @@ fn a_closed_hatching_goes_down_one_column_and_up_the_other() {
 #[test]
 fn parts_are_drawn_nearest_first_and_then_better() {
     let nearest = assert_tour(
-        Options { effort: 0, ..open() },
+        Options { effort: Effort::Units(0), ..open() },
         r"
         +--1->+           +<-6--+
 

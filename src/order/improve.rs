@@ -10,15 +10,22 @@
 //! exchanges are tried again around them, and everything is undone unless the result costs no more:
 //! a tour never gets worse. The same budget gives the same tour on every machine. After Martin,
 //! Otto and Felten, "Large-step Markov chains for the traveling salesman problem" (1991).
+//!
+//! With [`Effort::Units`] the kicks share a fixed budget, also among the first tours. With
+//! [`Effort::Auto`] the work ends where it no longer pays. What is gained is compared with what was
+//! spent, over the last eighth of a second of counted work ([`Pace::units_per_second`]), not kick
+//! by kick: most kicks gain nothing, and hundreds of them are needed to see a rate. A further first
+//! tour is made only if it takes so little work that it may pay, too.
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
+use super::metric::root;
 use super::neighbours::Neighbours;
 use super::network::Network;
 use super::orient::orient;
 use super::patch_cycles::patch_cycles;
 use super::work_budget::WorkBudget;
-use super::{Leg, OrderError, even_part, mark_parts};
+use super::{Effort, Leg, OrderError, Pace, even_part, mark_parts};
 use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::index::Index;
@@ -32,8 +39,16 @@ const KICK_REACH: u32 = 6;
 const PATIENCE: u32 = 50;
 /// The directions of the strokes are improved after each so many kicks.
 const KICKS_BETWEEN_TURNS: u32 = 64;
-/// Percentage of the work that is spent on the first tours, of which the best gets the rest.
+/// Percentage of a fixed budget that is spent on the first tours, of which the best gets the rest.
 const FIRST_TOURS_PERCENT: u64 = 48;
+/// With [`Effort::Auto`], the gain is compared with the work after each such part of a second.
+const WINDOWS_PER_SECOND: u64 = 8;
+/// Where a tour has few moves, the gain is compared with the work as soon as each move had so many
+/// units of work.
+const WINDOW_UNITS_PER_MOVE: u64 = 800;
+/// With [`Effort::Auto`], another first tour is made if the last one took at most this part of the
+/// time in which the pen travels, or of a second. A further one seldom saves more.
+const FIRST_TOUR_PART: u64 = 256;
 
 /// The seed of the kicks' random numbers. It must not be 0; on a dozen drawings this one was no
 /// worse than others.
@@ -54,8 +69,8 @@ pub(super) struct Tour<'t, I> {
     pub start: Option<I>,
     /// Whether no part has more than two odd stations, so that each part is drawn in one stroke.
     pub strokes_only: bool,
-    /// The budget of work for each move, in distance computations.
-    pub effort: u32,
+    /// The budget of work.
+    pub effort: Effort,
     /// The cost of a move besides its length, in 1/256 steps.
     pub lift_cost: u32,
 }
@@ -81,27 +96,34 @@ pub(super) fn improve<I: Index>(
     }
     let neighbours = Neighbours::new(network, per_station, &mut scratch, work_budget)?;
     let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
-    let budget = u64::from(moves) * u64::from(effort);
-    let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
-    let share = budget * FIRST_TOURS_PERCENT / 100 / first_tours;
-    let patience = PATIENCE.saturating_mul(moves);
+    let (first, last) = match effort {
+        Effort::Auto(pace) => (Until::Exchanged(pace), Until::Unpaid(pace)),
+        Effort::Units(units) => {
+            let budget = u64::from(moves) * u64::from(units);
+            let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
+            let share = budget * FIRST_TOURS_PERCENT / 100 / first_tours;
+            (Until::Spent(share), Until::Spent(budget - first_tours * share))
+        }
+    };
     let cycle: &mut [Leg<I>] = scratch.take(legs)?;
     let mut best = Best {
         network,
         neighbours,
         open,
         lift_cost: 0,
-        patience,
+        moves,
         cost: u64::MAX,
         route,
         kicks: Kicks { random: SEED },
     };
     best.restore(cycle);
-    best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
-    patch_cycles(network, neighbours, mate, scratch.reborrow(), work_budget)?;
-    best.follow(mate, start, None, cycle, scratch.reborrow(), work_budget)?;
-    best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
-    if strokes_only {
+    let mut pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
+    if pays {
+        patch_cycles(network, neighbours, mate, scratch.reborrow(), work_budget)?;
+        best.follow(mate, start, None, cycle, scratch.reborrow(), work_budget)?;
+        pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
+    }
+    if strokes_only && pays {
         // Each part becomes one stroke without any move inside it.
         mark_parts(network, scratch.reborrow(), mate)?;
         for mate in mate.iter_mut().filter(|mate| **mate != I::NONE) {
@@ -109,14 +131,36 @@ pub(super) fn improve<I: Index>(
         }
         for corner in CORNERS {
             best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
-            best.work_on(cycle, share, scratch.reborrow(), work_budget)?;
+            if !best.work_on(cycle, first, scratch.reborrow(), work_budget)? {
+                break;
+            }
         }
     }
     // Lifts get their cost only now: with a cost from the start, the exchanges that shorten the
     // moves would be rejected.
     (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
     best.restore(cycle);
-    best.work_on(cycle, budget - first_tours * share, scratch, work_budget)
+    best.work_on(cycle, last, scratch, work_budget)?;
+    Ok(())
+}
+
+/// When the work on a tour ends.
+#[derive(Clone, Copy)]
+enum Until {
+    /// When so many units of work are spent.
+    Spent(u64),
+    /// When exchanges alone find nothing better any more. No kick is made.
+    Exchanged(Pace),
+    /// When the kicks save less time than they take.
+    Unpaid(Pace),
+}
+
+impl Until {
+    /// Returns the units of work that may be spent.
+    fn budget(self) -> u64 {
+        // The work that has no such limit ends by itself long before this.
+        if let Self::Spent(units) = self { units } else { u64::MAX >> 1 }
+    }
 }
 
 /// The corners of the page. A sign of 1 stands for the side of low x or y, -1 for the side of high
@@ -140,8 +184,9 @@ struct Best<'b, 'a, I> {
     open: bool,
     /// The cost of a move besides its length, in 1/256 steps.
     lift_cost: u32,
-    /// The search ends after this many successive kicks (random changes) without a shorter tour.
-    patience: u32,
+    /// The number of moves of the first tour. The search ends after [`PATIENCE`] times as many
+    /// successive kicks (random changes) without a shorter tour.
+    moves: u32,
     /// The cost of the shortest tour, with the present cost of a lift.
     cost: u64,
     /// The shortest tour that was found so far.
@@ -181,15 +226,16 @@ impl<I: Index> Best<'_, '_, I> {
         route.copy_from_slice(self.route);
     }
 
-    /// Shortens the tour in `cycle` with a budget of `budget` distance computations, and keeps it
-    /// if it is the shortest so far.
+    /// Shortens the tour in `cycle` until the work ends, and keeps it if it is the shortest so far.
+    /// Returns whether the same work on another tour may save more time than it takes; with a fixed
+    /// budget it always may.
     fn work_on(
         &mut self,
         cycle: &mut [Leg<I>],
-        budget: u64,
+        until: Until,
         mut scratch: Scratch<'_>,
         work_budget: &mut WorkBudget<'_>,
-    ) -> Result<(), OrderError> {
+    ) -> Result<bool, OrderError> {
         let mut scratch = scratch.reborrow();
         let chains = self.network.chains();
         let (_, gap) = cycle.split_at_mut(self.route.len());
@@ -204,12 +250,28 @@ impl<I: Index> Best<'_, '_, I> {
             self.lift_cost,
             &mut scratch,
         )?;
-        work_budget.grant(budget);
+        work_budget.grant(until.budget());
         shorten(&mut tour, choices, work_budget)?;
+        let mut pays = true;
+        let mut window = None;
+        match until {
+            Until::Spent(_) => {}
+            Until::Unpaid(pace) => window = Some(self.window(pace, tour.cost())),
+            Until::Exchanged(pace) => {
+                let spent = until.budget() - work_budget.left();
+                let second = u64::from(pace.units_per_second).max(1);
+                let parts = spent.saturating_mul(FIRST_TOUR_PART) / second;
+                pays = parts.saturating_mul(self.rate(pace, tour.cost())) <= tour.cost();
+                work_budget.grant(0);
+            }
+        }
+        let patience = PATIENCE.saturating_mul(self.moves);
         let kicks = &mut self.kicks;
         let mut in_vain = 0;
+        let mut window_gain = 0;
+        let mut window_begin = work_budget.left();
         for count in 1.. {
-            if in_vain >= self.patience || work_budget.is_over() {
+            if in_vain >= patience || work_budget.is_over() {
                 break;
             }
             let mut gain = kicks.kick(&mut tour, work_budget)?;
@@ -217,9 +279,39 @@ impl<I: Index> Best<'_, '_, I> {
                 gain += shorten(&mut tour, choices, work_budget)?;
             }
             in_vain = if gain > 0 { 0 } else { in_vain + 1 };
+            window_gain += gain;
+            if let Some(Window { units, least_gain }) = window
+                && window_begin - work_budget.left() >= units
+            {
+                if window_gain < least_gain {
+                    break;
+                }
+                (window_gain, window_begin) = (0, work_budget.left());
+            }
         }
         self.keep(&tour);
-        Ok(())
+        Ok(pays)
+    }
+
+    /// Returns by how much a saving of one second shortens a tour that costs `cost`, in 1/256
+    /// steps. A pen that accelerates all along a move of length `l` takes `2 √(l / a)` for it, of
+    /// which the derivative is `1 / √(a l)`; on a long move it is one over the speed.
+    #[inline(never)] // Its two callers share one copy of the code.
+    fn rate(&self, pace: Pace, cost: u64) -> u64 {
+        let mean = (cost / u64::from(self.moves.max(1))).saturating_sub(self.lift_cost.into());
+        // The acceleration is below 2^27 and the length of a move below 2^31.
+        let accelerating = 16 * u64::from(root(u64::from(pace.acceleration) * mean));
+        accelerating.min(u64::from(pace.speed) << 8).max(1)
+    }
+
+    /// Returns over how much work the gain of the kicks is watched, and how much it must be.
+    fn window(&self, pace: Pace, cost: u64) -> Window {
+        let second = u64::from(pace.units_per_second).max(1);
+        let moves = u64::from(self.moves) * WINDOW_UNITS_PER_MOVE;
+        let units = moves.min(second / WINDOWS_PER_SECOND);
+        // Both factors are below 2^33.
+        let least_gain = units * self.rate(pace, cost) / second;
+        Window { units, least_gain: (least_gain as i64).max(1) }
     }
 
     /// Keeps the tour if it is the shortest so far.
@@ -237,6 +329,14 @@ impl<I: Index> Best<'_, '_, I> {
             *slot = leg(start + index);
         }
     }
+}
+
+/// A stretch of work at whose end it is decided whether kicks still pay.
+struct Window {
+    /// The units of work in it.
+    units: u64,
+    /// The least gain with which the work goes on, in 1/256 steps.
+    least_gain: i64,
 }
 
 /// Exchanges moves and reverses strokes until neither makes the tour shorter. Returns by how much

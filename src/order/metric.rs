@@ -53,7 +53,7 @@ const RECIPROCAL_ROOTS: [u16; 96] = {
 ///
 /// Two Newton steps approximate the reciprocal root, which needs no division. On a core that has no
 /// division this takes a third of the instructions of the general `isqrt`.
-fn root(square: u64) -> u32 {
+pub(super) fn root(square: u64) -> u32 {
     if square == 0 {
         return 0;
     }
@@ -61,7 +61,9 @@ fn root(square: u64) -> u32 {
     let multiply = |a: u32, b: u32| u64::from(a) * u64::from(b);
     // A value from 1 to 4, with 30 bits after the binary point.
     let x = ((square << shift) >> 32) as u32;
-    let guess = u32::from(RECIPROCAL_ROOTS[(x >> 25) as usize - 32]);
+    // `x` has one of its two highest bits, so there is an entry for it.
+    let guess = RECIPROCAL_ROOTS.get(((x >> 25) as usize).wrapping_sub(32));
+    let guess = u32::from(guess.copied().unwrap_or_default());
     // Newton's step is g' = g (3 - x g²) / 2; the first gives 15 bits, the second 31.
     let squared = (multiply(x, guess * guess) >> 32) as u32;
     let guess = (multiply(guess, (3 << 28) - squared) >> 13) as u32;

@@ -125,29 +125,68 @@ pub enum Shape {
     ClosedCycle,
 }
 
-/// The settings by which the user may influence the order of the strokes.
+/// How fast the pen travels, and how fast the order is improved. They say whether a shorter way is
+/// worth the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pace {
+    /// The greatest speed with the pen up, in steps per second, below 2^22.
+    pub speed: u32,
+    /// The greatest acceleration, in steps per second squared, below 2^27.
+    pub acceleration: u32,
+    /// The units of work (distance computations) that count as one second.
+    pub units_per_second: u32,
+}
+
+impl Pace {
+    /// The units of work that count as one second on every board, and wherever a board's order is
+    /// shown. The Pico's core, which takes 417 cycles for a unit on text300 and 534 on lattice7
+    /// (`cargo xtask bench --board pico`), does so many at 125 MHz.
+    pub const BOARD: u32 = 250_000;
+    /// The units that count as one second where a computer computes for a plotter. They are more
+    /// than it does in that time, because the plotter draws meanwhile.
+    pub const COMPUTER: u32 = 30_000_000;
+}
+
+impl Default for Pace {
+    /// That of a board with the default settings of its machine: 100 mm/s and 800 mm/s², with 80
+    /// steps to the millimetre.
+    fn default() -> Self {
+        Self { speed: 8000, acceleration: 64_000, units_per_second: Self::BOARD }
+    }
+}
+
+/// The work that may be spent on improving the first tour of several parts. It is counted in
+/// distance computations, not in time, so that every machine gives the same tour.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Effort {
+    /// As much as pays: until a further second of work saves less than a second of drawing at this
+    /// pace. What is saved is taken from the moves with the pen up, each lift at its cost
+    /// ([`Options::lift_cost`]).
+    Auto(Pace),
+    /// So many distance computations for each pen-up move. With 0 the tour is not improved: the
+    /// parts are drawn nearest first.
+    Units(u32),
+}
+
+impl Default for Effort {
+    fn default() -> Self {
+        Self::Auto(Pace::default())
+    }
+}
+
+/// The settings by which the user may influence the order of the strokes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Options {
     /// The method that pairs the odd points.
     pub method: Method,
     /// Whether the path is open or closed. A drawing with several pens has an open path for each
     /// pen.
     pub shape: Shape,
-    /// The work that may be spent on improving the first tour of several parts, in distance
-    /// computations for each pen-up move. The limit counts work, not time, so that every machine
-    /// gives the same tour. With 0 the tour is not improved: the parts are drawn nearest first.
-    pub effort: u32,
+    /// The work that may be spent on improving the first tour of several parts.
+    pub effort: Effort,
     /// Extra pen-up travel that is accepted to save one pen lift, in 1/256 steps, at most 2^30.
     /// Each lift takes time, and leaves a visible mark if it lies within a stroke.
     pub lift_cost: u32,
-}
-
-impl Default for Options {
-    /// An open path, exact where that fits, with enough effort to bring a page of some hundred
-    /// strokes within 3 % of the best tour known.
-    fn default() -> Self {
-        Self { method: Method::default(), shape: Shape::default(), effort: 4000, lift_cost: 0 }
-    }
 }
 
 /// The measures of the resulting tour. Lengths are in 1/256 steps.
@@ -292,7 +331,7 @@ fn order_pen<'a, I: Index>(
             )?;
         }
         report.components += parts;
-        if parts > 1 && options.effort > 0 {
+        if parts > 1 && options.effort != Effort::Units(0) {
             let open = options.shape == Shape::OpenPath;
             let strokes_only = report.odd_points - odd_before == 2 * odd_parts;
             let bound = report.bound - bound;

@@ -54,6 +54,11 @@ impl<'a> WorkBudget<'a> {
         self.budget = units.saturating_add(self.done.into());
     }
 
+    /// Returns how many of the units granted are left.
+    pub fn left(&self) -> u64 {
+        self.budget.saturating_sub(self.done.into())
+    }
+
     /// Whether the units granted have been used up.
     pub fn is_over(&self) -> bool {
         self.budget <= u64::from(self.done)

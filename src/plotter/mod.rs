@@ -159,6 +159,9 @@ struct Inner<'m, I> {
     copy_words: usize,
     /// Whether the model is copied before each change.
     can_undo: bool,
+    /// Whether a computer computes for a plotter, so that more work on the order pays.
+    #[cfg(any(test, feature = "host"))]
+    is_thorough: bool,
     /// How far the strokes of a job have come that are sent while they are drawn.
     #[cfg(feature = "stream")]
     streamed: streamed::Streamed,
@@ -222,6 +225,8 @@ impl<'m, I: Index> Plotter<'m, I> {
                 #[cfg(feature = "stream")]
                 streamed: streamed::Streamed::default(),
                 can_undo: true,
+                #[cfg(any(test, feature = "host"))]
+                is_thorough: false,
                 program: Program::default(),
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
@@ -265,6 +270,14 @@ impl<'m, I: Index> Plotter<'m, I> {
     pub fn without_undo(mut self) -> Self {
         self.inner.can_undo = false;
         self
+    }
+
+    /// Sets whether this plotter computes for another one, on a computer. Then, unless `$effort` is
+    /// a number, more work is spent on the order ([`Pace::COMPUTER`](crate::order::Pace)), and the
+    /// order is no longer that which a board finds.
+    #[cfg(any(test, feature = "host"))]
+    pub fn set_thorough(&mut self, is_thorough: bool) {
+        self.inner.is_thorough = is_thorough;
     }
 
     /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
@@ -631,7 +644,9 @@ impl<I: Index> Inner<'_, I> {
         let steps = self.machine.settings().page_steps();
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
         let observer = &mut Unobserved;
-        let stored = job::Pipeline { model, options, steps, words, cancel, observer }.draw()?;
+        let pace = crate::order::Pace::default();
+        let pipeline = job::Pipeline { model, options, steps, pace, words, cancel, observer };
+        let stored = pipeline.draw()?;
         Ok(stored.drawing(self.words).unwrap_or(Drawing { points: &[], segments: &[] }))
     }
 

@@ -18,7 +18,7 @@ use crate::visibility::SinkFull;
 /// its lines do not fit in the memory, [`CommandError::Aborted`].
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn lay_out<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found, CommandError> {
-    let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
+    let Pipeline { model, options, steps, words, cancel, observer, .. } = pipeline;
     let steps = *steps;
     let (vertices, curves) = (model.vertices(), model.curves());
     let points: &[Point] = bytemuck::cast_slice(vertices);

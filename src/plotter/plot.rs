@@ -7,6 +7,7 @@ use super::reply::Reply;
 use super::{Board, Cursor, Inner, Job, Observer, Unobserved, records};
 use crate::index::Index;
 use crate::machine::State;
+use crate::order::Pace;
 use crate::protocol::{CommandError, RealTime};
 use crate::stage::{Aborted, Cancel, Stage};
 
@@ -142,8 +143,21 @@ impl<I: Index> Inner<'_, I> {
         self.job = Job::default();
         self.cursor = Cursor::default();
         let steps = self.machine.settings().page_steps();
+        let pace = self.machine.settings().pace(self.units_per_second());
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
-        self.job = Pipeline { model, options, steps, words, cancel, observer }.run()?;
+        self.job = Pipeline { model, options, steps, pace, words, cancel, observer }.run()?;
         Ok(())
+    }
+
+    /// The units of work that count as one second when the order is improved.
+    #[cfg(any(test, feature = "host"))]
+    fn units_per_second(&self) -> u32 {
+        if self.is_thorough { Pace::COMPUTER } else { Pace::BOARD }
+    }
+
+    /// The units of work that count as one second when the order is improved.
+    #[cfg(not(any(test, feature = "host")))]
+    fn units_per_second(&self) -> u32 {
+        Pace::BOARD
     }
 }

@@ -21,7 +21,7 @@ use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found, CommandError> {
     let (camera, view) = pipeline.camera_view()?;
-    let Pipeline { model, options, steps, words, cancel, observer } = pipeline;
+    let Pipeline { model, options, steps, words, cancel, observer, .. } = pipeline;
     let (model, options, words) = (*model, *options, &mut **words);
     let eye = match camera.sight_lines(model.fraction_bits()).map_err(CommandError::View)? {
         SightLines::Through(position) => Eye::At(position),

@@ -1,8 +1,10 @@
 //! The settings as the motion planner needs them, and whether it can honour all of them together.
 
 use super::{Setting, Settings, Value};
+use crate::array::MapEach;
 use crate::machine::{Kinematics, Tool};
 use crate::motion::{BrakeRule, Limits, LimitsError, MotionSettings, PathLength};
+use crate::order::Pace;
 
 impl Settings {
     /// Checks the settings against each other.
@@ -53,6 +55,22 @@ impl Settings {
         let is_less = asked - held > const { Value::lit("0.001") };
         let longest_step = Kinematics::properties(self).longest_step;
         (limits.brake(longest_step, queue), is_less.then_some(held))
+    }
+
+    /// Returns how fast the pen travels on the page, for an order that is improved by so many units
+    /// of work in a second. It does not depend on the board.
+    pub fn pace(&self, units_per_second: u32) -> Pace {
+        let MotionSettings { steps_per_mm, travel_mm_per_min, acceleration_mm_per_s2, .. } =
+            self.motion_settings();
+        let in_steps = |value: Value| {
+            let [value, per_mm] =
+                [value, steps_per_mm[0]].map_each(|it| it.to_bits().unsigned_abs());
+            (u64::from(value) * u64::from(per_mm)) >> (2 * Value::FRAC_NBITS)
+        };
+        // At most 32767 times 4000.
+        let [per_minute, acceleration] =
+            [travel_mm_per_min, acceleration_mm_per_s2].map_each(|value| in_steps(value) as u32);
+        Pace { speed: per_minute / 60, acceleration, units_per_second }
     }
 
     /// Returns the length of the dots of a dotted line.

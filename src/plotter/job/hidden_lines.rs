@@ -26,7 +26,7 @@ impl<I: Index> Pipeline<'_, I> {
     #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     pub(super) fn find_visible_lines(&mut self) -> Result<Found, CommandError> {
         let (_, view) = self.camera_view()?;
-        let Self { model, options, steps, words, cancel, observer } = self;
+        let Self { model, options, steps, words, cancel, observer, .. } = self;
         let (model, options, steps, words) = (*model, *options, *steps, &mut **words);
         let cancel = &mut **cancel;
         let total = size_of_val(words);

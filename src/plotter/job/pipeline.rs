@@ -9,7 +9,7 @@ use crate::drawing::Stored;
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::index::Index;
 use crate::model::Model;
-use crate::order::{self, Leg};
+use crate::order::{self, Leg, Pace};
 use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
 use crate::stage::{Cancel, Stage};
@@ -24,6 +24,8 @@ pub(in crate::plotter) struct Pipeline<'p, I> {
     pub options: &'p PlotOptions,
     /// The steps per millimetre on the page, in which the drawing is measured.
     pub steps: StepsPerMillimetre,
+    /// How fast the machine travels and the order is improved, by which its default effort ends.
+    pub pace: Pace,
     /// The working memory. Each stage (each part of the computation) leaves its result at the
     /// front.
     pub words: &'p mut [u64],
@@ -99,7 +101,7 @@ impl<I: Index> Pipeline<'_, I> {
     /// Makes one drawing of the lines and orders its strokes.
     #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     fn order(self, found: &Found) -> Result<Job<I>, CommandError> {
-        let Self { options, steps, words, cancel, .. } = self;
+        let Self { options, steps, pace, words, cancel, .. } = self;
         cancel.enter(Stage::Order);
         let stored = build_graph(words, found.lines, cancel)?;
         let (drawing, mut rest) = stored.split(words).map_err(CommandError::DrawingTooLarge)?;
@@ -108,7 +110,7 @@ impl<I: Index> Pipeline<'_, I> {
             return Err(CommandError::NothingToPlot);
         }
         let tour = rest.take::<Leg<I>>(legs).map_err(CommandError::DrawingTooLarge)?;
-        let report = order::order(drawing, options.order(steps), rest, cancel, tour)?;
+        let report = order::order(drawing, options.order(steps, pace), rest, cancel, tour)?;
         let Found { degenerate_faces, joined_edges, .. } = *found;
         Ok(Job { stored, legs, report, degenerate_faces, joined_edges })
     }

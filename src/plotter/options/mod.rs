@@ -19,7 +19,7 @@ use crate::fixed::{Decimal, Millimetres, sin_cos_degrees};
 use crate::geometry::Precision;
 use crate::index::Index;
 use crate::model::Model;
-use crate::order;
+use crate::order::{self, Effort, Method, Pace, Shape};
 use crate::protocol::{CommandError, EscapedText, number};
 use crate::view::{Camera, Direction, Pose, View};
 use crate::visibility::{self, Crease};
@@ -64,8 +64,13 @@ pub struct PlotOptions {
     title_size: Millimetres,
     /// Whether a plan is scaled to the page. Otherwise it is drawn at true size.
     pub fit: bool,
-    /// How strokes are ordered. Its `lift_cost` is not used: see the next field.
-    order: order::Options,
+    /// The method that pairs the odd points.
+    method: Method,
+    /// Whether the path is open or closed.
+    shape: Shape,
+    /// The distance computations for each pen-up move by which the order is improved. `None` if it
+    /// is improved as long as that pays.
+    effort: Option<u32>,
     /// Extra pen-up travel, in mm, that is accepted to save one pen lift.
     lift_cost: Millimetres,
 }
@@ -94,7 +99,9 @@ impl Default for PlotOptions {
             title: TitleText::default(),
             title_size,
             fit: false,
-            order: order::Options::default(),
+            method: Method::default(),
+            shape: Shape::default(),
+            effort: None,
             lift_cost,
         }
     }
@@ -125,10 +132,15 @@ impl PlotOptions {
     }
 
     /// The options of the ordering, with lengths in 1/256 step for a machine with `steps` per
-    /// millimetre.
-    pub fn order(&self, steps: StepsPerMillimetre) -> order::Options {
+    /// millimetre, which travels and computes at this `pace`.
+    pub fn order(&self, steps: StepsPerMillimetre, pace: Pace) -> order::Options {
         let lift_cost = self.lift_cost.wide_mul(steps[0]).saturating_mul_int(256);
-        order::Options { lift_cost: lift_cost.saturating_to_num(), ..self.order }
+        order::Options {
+            method: self.method,
+            shape: self.shape,
+            effort: self.effort.map_or(Effort::Auto(pace), Effort::Units),
+            lift_cost: lift_cost.saturating_to_num(),
+        }
     }
 
     /// The precision of the coordinates of `model`: as the user has set it, or as derived from the

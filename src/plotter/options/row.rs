@@ -9,6 +9,9 @@ use crate::protocol::{CommandError, choice, length, numbers, whole};
 use crate::view::Direction;
 use core::fmt::{self, Display as _};
 
+/// The value with which the plotter chooses.
+const AUTO: &str = "auto";
+
 /// One option of a plot. Everything about it is in its row: the parse of `$name=value`, the lines
 /// of `$` and of `$options`, and the flag of the client are made from it.
 #[derive(Debug, Clone, Copy)]
@@ -49,8 +52,8 @@ pub(super) enum Kind {
         /// The field that holds the length.
         field: Field<Millimetres>,
     },
-    /// The value is a whole number, 0 or more.
-    Whole(Field<u32>),
+    /// The value is a whole number, 0 or more, or `auto`.
+    Whole(Field<Option<u32>>),
     /// The value has a form of its own, with functions that read and write it.
     Other {
         /// Parses and sets the value. On an error the options stay as they were.
@@ -109,9 +112,10 @@ impl PlotOption {
                 }
                 *field(options) = value;
             }
+            Kind::Whole(field) if text == AUTO => *field(options) = None,
             Kind::Whole(field) => {
                 let value = u32::try_from(whole(text)?);
-                *field(options) = value.map_err(|_| CommandError::NumberOutOfRange)?;
+                *field(options) = Some(value.map_err(|_| CommandError::NumberOutOfRange)?);
             }
             Kind::Other { set, .. } => set(options, text)?,
             Kind::Reset(reset) => {
@@ -141,10 +145,13 @@ impl PlotOption {
                     let [x, y, z] = position.map_each(SixDecimals);
                     write!(formatter, "{x},{y},{z}")
                 }
-                None => formatter.write_str("auto"),
+                None => formatter.write_str(AUTO),
             },
             Kind::Length { field, .. } => Length(*field(&mut copy)).fmt(formatter),
-            Kind::Whole(field) => field(&mut copy).fmt(formatter),
+            Kind::Whole(field) => match field(&mut copy) {
+                Some(number) => number.fmt(formatter),
+                None => formatter.write_str(AUTO),
+            },
             Kind::Other { show, .. } => show(options, formatter),
             Kind::Reset(_) | Kind::Continued => Ok(()),
         }
@@ -168,7 +175,7 @@ impl PlotOption {
                 let [least, greatest] = [least, greatest].map_each(|length| length.to_num::<i32>());
                 Some(std::format!("{least} to {greatest} mm"))
             }
-            Kind::Whole(_) => Some(std::format!("a whole number, 0 to {}", i32::MAX)),
+            Kind::Whole(_) => Some(std::format!("auto, or a whole number, 0 to {}", i32::MAX)),
             _ => own.map(Into::into),
         }
     }

@@ -317,9 +317,9 @@ pub const OPTIONS: &[PlotOption] = &[
         values: &["auto", "greedy", "exact"],
         help: "how the moves between strokes are chosen",
         kind: Kind::Choice {
-            get: |options| options.order.method as usize,
+            get: |options| options.method as usize,
             set: |options, at| {
-                options.order.method = pick(at, [Method::Auto, Method::Greedy, Method::Exact]);
+                options.method = pick(at, [Method::Auto, Method::Greedy, Method::Exact]);
             },
         },
         flag: client(Flag {
@@ -336,9 +336,9 @@ pub const OPTIONS: &[PlotOption] = &[
         values: ON_OFF,
         help: "whether the pen returns to where it began",
         kind: Kind::Choice {
-            get: |options| usize::from(options.order.shape == Shape::OpenPath),
+            get: |options| usize::from(options.shape == Shape::OpenPath),
             set: |options, at| {
-                options.order.shape = pick(at, [Shape::ClosedCycle, Shape::OpenPath]);
+                options.shape = pick(at, [Shape::ClosedCycle, Shape::OpenPath]);
             },
         },
         flag: client(Flag {
@@ -348,13 +348,14 @@ pub const OPTIONS: &[PlotOption] = &[
     },
     PlotOption {
         name: "effort",
-        values: &["NUMBER"],
-        help: "distances tried for each move with the pen up to improve it; 0 takes the nearest \
-               next",
-        kind: Kind::Whole(|options| &mut options.order.effort),
+        values: &["auto", "NUMBER"],
+        help: "work to improve the order: auto stops when it no longer saves time; or distances \
+               tried for each move with the pen up, 0 takes the nearest next",
+        kind: Kind::Whole(|options| &mut options.effort),
         flag: client(Flag::new(
             ORDER,
-            "Work to improve the order of many parts, for each move with the pen up; with 0 the \
+            "Work to improve the order of many parts: until a second of computing saves less than \
+             one of drawing (auto), or distances tried for each move with the pen up; with 0 the \
              nearest part comes next",
         )),
     },

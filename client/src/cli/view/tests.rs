@@ -102,7 +102,7 @@ fn nonsense_is_refused_with_the_reason() {
         (["--margin", "1e308"], RANGE),
         (["--effort", "-1"], RANGE),
         (["--effort", "1e12"], RANGE),
-        (["--effort", "1.5"], "(expected: a whole number, 0 to 2147483647)"),
+        (["--effort", "1.5"], "(expected: auto, or a whole number, 0 to 2147483647)"),
         (["--effort", "much"], NUMBER),
         (["--title-size", "101"], "(expected: 1 to 100 mm)"),
         (["--title", "a→b"], "the font lacks → (U+2192)"),
