@@ -6,7 +6,7 @@ use penup::boards::host::HostBoard;
 use penup::index::Index;
 use penup::machine::{EventRing, PulserState};
 use penup::model::{Corner, Position};
-use penup::plotter::{EMPTY_LOOKAHEAD, MemorySlices, Plotter};
+use penup::plotter::{EMPTY_LOOKAHEAD, HpGlMemory, MemorySlices, Plotter};
 use penup::protocol::LineReader;
 use penup_readers::lines::Lines;
 
@@ -30,7 +30,7 @@ pub fn contents_of<I: Index>(lines: &dyn Lines, count: usize) -> Option<[u32; 2]
     // time.
     let words = &mut [];
     let readers = &mut [LineReader::new()];
-    let hpgl = &mut penup::hpgl::Session::new();
+    let hpgl = &mut HpGlMemory::new();
     let blocks = &mut blocks;
     let memory = MemorySlices {
         vertices: &mut vertices,

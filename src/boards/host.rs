@@ -8,13 +8,13 @@ mod flash;
 
 pub use flash::{Cut, CutFlash};
 
-use crate::hpgl::Session;
 use crate::index::Index;
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
 use crate::model::{Corner, Position};
 use crate::motion::{Block, EventQueue};
 use crate::plotter::{
-    Board, EMPTY_LOOKAHEAD, Kept, Layout, MemorySlices, NotStored, Record, Replies, Stored,
+    Board, EMPTY_LOOKAHEAD, HpGlMemory, Kept, Layout, MemorySlices, NotStored, Record, Replies,
+    Stored,
 };
 use crate::protocol::{LineReader, RealTime, Sorter};
 use crate::storage::Noted;
@@ -55,7 +55,7 @@ pub fn lend_memory_of<I: Index>(
         blocks: std::vec![Block::EMPTY; blocks].leak(),
         words: std::vec![0; words].leak(),
         readers: Box::leak(Box::new([const { LineReader::new() }; PORTS])),
-        hpgl: Box::leak(Box::new(Session::new())),
+        hpgl: Box::leak(Box::new(HpGlMemory::new())),
     }
 }
 

@@ -247,6 +247,7 @@ impl Machine<'_> {
     }
 
     /// Stands for a while after a move of homing, so that a switch that bounces comes to rest.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn pause_at_switch(&mut self, queue: &mut dyn EventQueue) {
         let ticks = self.settings.milliseconds_as_ticks(Setting::HomingDebounce);
         let is_homing = matches!(self.activity, Activity::Home(Homing { is_stopped: true, .. }));

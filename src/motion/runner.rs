@@ -663,6 +663,7 @@ impl<'m> Runner<'m> {
     ///
     /// # Errors
     /// The event that the queue refused.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub fn release_drivers(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         let at = self.emitter.rest(self.now, false, queue)?;
         self.advance_to(at);

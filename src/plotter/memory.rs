@@ -2,8 +2,6 @@
 //! [`crate::board_table`].
 
 use crate::board_table::BOARDS;
-#[cfg(feature = "hpgl")]
-use crate::hpgl::Session;
 use crate::model::{Corner, Position};
 use crate::motion::Block;
 use crate::protocol::LineReader;
@@ -12,6 +10,23 @@ use crate::protocol::LineReader;
 /// any is planned; see [`crate::motion`].
 pub const EMPTY_LOOKAHEAD: [Block; BOARDS[0].memory.blocks] =
     [Block::EMPTY; BOARDS[0].memory.blocks];
+
+/// What has been received of HP-GL, and its interpreter.
+#[cfg(feature = "hpgl")]
+pub type HpGlMemory = crate::hpgl::Session;
+
+/// Without the feature `hpgl` there is nothing of HP-GL to remember.
+#[cfg(not(feature = "hpgl"))]
+#[derive(Debug, Default)]
+pub struct HpGlMemory;
+
+#[cfg(not(feature = "hpgl"))]
+impl HpGlMemory {
+    /// Makes the memory.
+    pub const fn new() -> Self {
+        Self
+    }
+}
 
 /// The large memory of a plotter: the model, the working memory of its jobs, and the line that each
 /// serial port is receiving.
@@ -35,8 +50,7 @@ pub struct Memory<
     /// The line that each serial port is receiving.
     readers: [LineReader; PORTS],
     /// What has been received of HP-GL, and its interpreter.
-    #[cfg(feature = "hpgl")]
-    hpgl: Session,
+    hpgl: HpGlMemory,
 }
 
 impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORTS: usize>
@@ -49,8 +63,7 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
             corners: [Corner::ZERO; CORNERS],
             words: [0; WORDS],
             readers: [const { LineReader::new() }; PORTS],
-            #[cfg(feature = "hpgl")]
-            hpgl: Session::new(),
+            hpgl: HpGlMemory::new(),
         }
     }
 
@@ -62,7 +75,6 @@ impl<const VERTICES: usize, const CORNERS: usize, const WORDS: usize, const PORT
             blocks,
             words: &mut self.words,
             readers: &mut self.readers,
-            #[cfg(feature = "hpgl")]
             hpgl: &mut self.hpgl,
         }
     }
@@ -91,6 +103,5 @@ pub struct MemorySlices<'m, I = u16> {
     /// The line that each serial port is receiving, indexed by the port's number.
     pub readers: &'m mut [LineReader],
     /// What has been received of HP-GL, and its interpreter.
-    #[cfg(feature = "hpgl")]
-    pub hpgl: &'m mut Session,
+    pub hpgl: &'m mut HpGlMemory,
 }

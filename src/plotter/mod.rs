@@ -36,7 +36,7 @@ pub use board::{Board, NotStored, REPLY_BYTES, Record, Replies, Stored};
 pub use help::help;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
 pub use kept::{Kept, Layout};
-pub use memory::{EMPTY_LOOKAHEAD, Memory, MemorySlices};
+pub use memory::{EMPTY_LOOKAHEAD, HpGlMemory, Memory, MemorySlices};
 pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
 };
