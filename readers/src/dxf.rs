@@ -486,7 +486,10 @@ impl Format for Dxf {
             .skipped
             .iter()
             .map(|(what, (count, line))| match count {
-                1 => format!("1 {what} is not drawn (line {line})"),
+                1 => {
+                    let what = what.replacen("entities ", "entity ", 1);
+                    format!("1 {what} is not drawn (line {line})")
+                }
                 _ => format!("{count} {what} are not drawn (the first in line {line})"),
             })
             .collect();

@@ -156,7 +156,7 @@ fn what_is_not_drawn_is_counted() {
             "1 CIRCLE, tilted is not drawn",
             "1 INSERT of an unknown block is not drawn",
             "2 TEXT are not drawn",
-            "1 entities in paper space is not drawn",
+            "1 entity in paper space is not drawn",
             "2 entities on layers that are off or frozen are not drawn",
         ]
     );

@@ -220,6 +220,10 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let arcs_drawn = if dashed.is_some() { Arcs::None } else { arcs };
         let data = dashed.as_ref().unwrap_or(path.data());
         let mut polylines = flatten(data, context.to_page, arcs_drawn, &mut self.budget)?;
+        if stroke.is_none() {
+            // A filled area has a side between the ends of an open path, too.
+            polylines.iter_mut().for_each(Polyline::close);
+        }
         let outlines = match fill.map(|fill| fill.paint()) {
             Some(paint) if self.with_areas && !is_white(paint) => {
                 let whole = flatten(path.data(), context.to_page, arcs, &mut self.budget)?;

@@ -27,6 +27,17 @@ pub(super) struct Polyline {
     pub(super) points: Vec<Point>,
 }
 
+impl Polyline {
+    /// Goes on to where it began, if it is no straight line.
+    pub(super) fn close(&mut self) {
+        if let [first, _, .., last] = *self.points
+            && first != last
+        {
+            self.points.push(first);
+        }
+    }
+}
+
 /// A file has more points than fit in memory, or a curve that is too large.
 #[derive(Debug)]
 pub(super) struct TooManyPoints;

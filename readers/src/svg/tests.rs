@@ -185,7 +185,7 @@ fn many_short_lines_become_few() {
     assert_eq!(sent.len(), 1);
     assert!(sent[0].len() < 4, "{sent:?}");
     // A line that turns back keeps its end.
-    let back = positions(&in_mm("<path d='M10 50H60H20'/>"));
+    let back = positions(&in_mm("<path d='M10 50H60H20' fill='none' stroke='red'/>"));
     assert_eq!(back, [[[10.0, 50.0], [60.0, 50.0], [20.0, 50.0]]]);
 }
 
@@ -193,7 +193,7 @@ fn many_short_lines_become_few() {
 fn transforms_are_nested_and_references_are_followed() {
     let svg = in_mm(
         "<g transform='translate(50 50)'><g transform='rotate(90)'><g transform='scale(2 3)'>\
-         <path d='M0 0H10V10' /></g></g></g>\
+         <path d='M0 0H10V10' fill='none' stroke='red'/></g></g></g>\
          <defs><path id='a' d='M0 0H10'/></defs><use xlink:href='#a' x='5' y='6'/>\
          <symbol id='s' viewBox='0 0 10 10'><path d='M0 0L10 10'/></symbol>\
          <use href='#s' x='10' y='10' width='20' height='20'/>",
@@ -248,6 +248,21 @@ fn strokes_are_dashed_and_shapes_without_a_stroke_have_outlines() {
     );
     assert_eq!(polylines(&contents).len(), 1);
     assert!(contents.notes().is_empty(), "{:?}", contents.notes());
+}
+
+#[test]
+fn what_is_only_filled_has_a_side_between_its_ends_and_a_stroke_has_none() {
+    let corner = [[10.0, 90.0], [15.0, 90.0], [15.0, 85.0]];
+    let closed = [[10.0, 90.0], [15.0, 90.0], [15.0, 85.0], [10.0, 90.0]];
+    let drawn = |svg: &str| positions(&in_mm(svg));
+    assert_eq!(drawn("<path d='M10 10H15V15'/>"), [closed.to_vec()]);
+    assert_eq!(drawn("<path d='M10 10H15V15Z'/>"), [closed.to_vec()]);
+    assert_eq!(drawn("<polyline points='10,10 15,10 15,15'/>"), [closed.to_vec()]);
+    assert_eq!(drawn("<path d='M10 10H15V15' fill='none' stroke='red'/>"), [corner.to_vec()]);
+    assert_eq!(drawn("<path d='M10 10H15V15' stroke='red'/>"), [corner.to_vec()]);
+    // Each part of a path has its own.
+    let two = "<path d='M10 10H15V15M30 30H35V35'/>";
+    assert!(drawn(two).iter().all(|line| line.len() == 4) && drawn(two).len() == 2);
 }
 
 fn used_pens(svg: &str) -> Vec<String> {
