@@ -374,6 +374,12 @@ impl<'m> Lookahead<'m> {
         if index >= self.blocks.len() { index - self.blocks.len() } else { index }
     }
 
+    /// All in their order, one by one.
+    #[cfg(feature = "pen-overlap")]
+    pub(super) fn in_order(&self) -> impl Iterator<Item = &Block> {
+        (0..self.count).filter_map(|index| self.blocks.get(self.wrapped(index)))
+    }
+
     /// All in their order, in two parts.
     pub(super) fn blocks(&self) -> [&[Block]; 2] {
         let (wrapped, straight) = self.blocks.split_at(self.first.min(self.blocks.len()));

@@ -566,7 +566,7 @@ impl<'m> Runner<'m> {
     }
 
     /// Sheds speed on the path, from the next slice or interval on, and stands on a whole step with
-    /// the pen raised.
+    /// the pen raised. A travel on which the pen was told to go down is carried out first.
     pub fn stop(&mut self) {
         self.plan_again();
         self.stopping = true;

@@ -243,8 +243,10 @@ impl JerkLimit {
         let peak = square.max(1).unsigned_abs().isqrt() as i64;
         let peak = peak.min(self.longest.into()).max(-ramp).max(1);
         // What is left to be shed at the peak.
-        let hold = (speed + ramp * ramp / 2 - peak * peak + peak - 1).max(0) / peak;
-        ((ramp + peak) + hold + peak).max(0).unsigned_abs() << 12
+        let left = (speed + ramp * ramp / 2 - peak * peak + peak - 1).max(0);
+        let hold = left.unsigned_abs().checked_div(peak.unsigned_abs()).unwrap_or(0);
+        let ramps = (ramp + 2 * peak).max(0).unsigned_abs();
+        (ramps + hold) << 12
     }
 
     /// Scaled speed times sixteenths of slices, as 2^-32 mm.

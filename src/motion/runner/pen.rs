@@ -95,7 +95,7 @@ impl Runner<'_> {
         }
         let is_smooth = self.limits.jerk.is_some();
         let (mut way, mut time) = (0, 0u64);
-        for block in self.lookahead.blocks().into_iter().flatten() {
+        for block in self.lookahead.in_order() {
             if block.ink.is_some() && block.kind == BlockKind::Line {
                 return Some((way, time));
             }

@@ -1,7 +1,7 @@
 //! Without the feature `pen-overlap`, the pen moves only while the machine stands: `pen.rs` has
 //! what these functions do with it.
 
-use super::{Pace, PenPositions, Progress, Runner};
+use super::{Pace, Progress, Runner};
 use crate::motion::{EventQueue, StepEvent};
 
 /// The pen does nothing beside the motion.
@@ -12,12 +12,6 @@ impl PenTiming {
     /// So much time passes.
     #[inline(always)]
     pub(super) const fn pass(&mut self, _: u32) {}
-
-    /// The pen is lowered before motors take up their slack.
-    #[inline(always)]
-    pub(super) const fn stays_raised(_: &PenPositions, _: Option<bool>) -> bool {
-        false
-    }
 
     /// The pen is never due on the way.
     #[inline(always)]
