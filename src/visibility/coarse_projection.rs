@@ -184,6 +184,12 @@ impl Mapping {
     }
 }
 
+/// Projects a vertex onto the page: x and y in units of 2^-20, rounded down.
+#[cfg(feature = "tiles")]
+pub(crate) fn page_position(projection: Projection, vertex: Vertex) -> [i64; 2] {
+    fine(projection, vertex).into()
+}
+
 /// Projects a vertex onto the page, in units of 2^-20, rounded down.
 fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     let fine = |coordinate: i32| i64::from(coordinate) << 20;

@@ -1,0 +1,463 @@
+//! Hidden-line removal for a model that is larger than the working memory, one part of the page
+//! after the other.
+//!
+//! The page is divided into tiles. The edges and seams of a tile are those that begin in it, and a
+//! small scene is loaded for them: every element of the model that meets the rectangle around them.
+//! Nothing else can change what is seen of them. So [`find_stretches`] hands over the same
+//! stretches as [`crate::visibility::find_stretches`], in another order. No edge is cut where tiles
+//! meet.
+//!
+//! * A tile whose scene does not fit is divided.
+//! * An edge that is longer than a tile would draw in much that only it needs. If the scene does
+//!   not fit, such edges are followed one by one, each with the elements that meet it. The same is
+//!   done with the seams of two faces that are both larger than the tile.
+//! * An edge is not followed if the near plane made it.
+//!
+//! The model is read again and again ([`ModelSource`]), so it may lie in slow memory. A coarse
+//! index says which parts of it lie where on the page.
+//!
+//! # Memory
+//! A sixteenth of the memory at most is the index. A small scene takes 4 bytes for each element, 32
+//! for each vertex (20 if no positions are known), 2 for each corner, and what the search takes.
+//! The fewest elements for which there must be room are those that meet a single edge.
+//!
+//! # Limits
+//! Refused are an edge that meets more elements than fit into the memory, and a point at which more
+//! elements meet.
+
+mod blocks;
+mod load;
+mod outline;
+mod owner;
+mod page;
+mod source;
+
+use crate::array::MapEach;
+use crate::geometry::{Precision, Projection, Vertex};
+use crate::index::Index;
+use crate::model::{Corner, Position};
+use crate::stage::{Cancel, Scratch};
+use crate::visibility::{Options, SinkFull, Stretch, StretchSink, VisibilityError};
+use blocks::Blocks;
+use load::Reach;
+use outline::Outline;
+use owner::{OfTile, OneEdge, OneSeam};
+use page::{GridPoint, Rectangle, Tile};
+
+pub use page::Survey;
+pub use source::Projected;
+
+/// A model as it is read again and again: its corners, and its vertices as a camera sees them.
+pub trait ModelSource {
+    /// Returns the number of corners of all faces and bars.
+    fn corner_count(&self) -> usize;
+
+    /// Returns the corner with an index below [`ModelSource::corner_count`]. The last one is marked
+    /// as the last of its element.
+    fn corner(&self, index: usize) -> Corner<u32>;
+
+    /// Returns the pen, from 0, of the element to which a corner belongs.
+    fn pen(&self, corner: usize) -> u8;
+
+    /// Returns the position of a vertex in the model. `None` if positions are not known, which is
+    /// then so for all vertices.
+    fn position(&self, vertex: u32) -> Option<Position>;
+
+    /// Returns a vertex in view coordinates.
+    fn vertex(&self, vertex: u32) -> Vertex;
+}
+
+/// How the model is seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Sight {
+    /// Whether the view is perspective or parallel.
+    pub projection: Projection,
+    /// The least depth that is drawn; what is nearer is cut off.
+    pub near: Option<i32>,
+    /// How far the positions may be off.
+    pub precision: Precision,
+    /// Twice the possible error of a view coordinate, at least 1.
+    pub error_bound: u32,
+}
+
+/// The greatest number of long edges, or of pairs of large faces, that are followed one by one as
+/// long as a tile can be divided.
+const MOST_ALONE: usize = 12;
+
+/// The search for the stretches of a model, tile after tile.
+pub struct Tiles<'t, S> {
+    /// The model.
+    source: &'t S,
+    /// How it is seen.
+    sight: Sight,
+    /// Which kinds of stretches the user wants to see.
+    options: Options,
+    /// What is known of all elements.
+    survey: Survey,
+    /// Where the elements lie on the page.
+    blocks: Blocks<'t>,
+    /// The tile that comes next.
+    next: Option<Tile>,
+}
+
+/// Finds the stretches of every edge, every bar and every seam of a model and hands them to `sink`.
+/// They are those of [`crate::visibility::find_stretches`], in another order. Where the near plane
+/// cuts an edge, the vertex there has the number [`Index::NONE`]; of several vertices at one
+/// position, the stretch may name another than the first.
+///
+/// # Errors
+/// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
+pub fn find_stretches<S: ModelSource, N: Index>(
+    source: &S,
+    sight: Sight,
+    options: Options,
+    scratch: Scratch<'_>,
+    cancel: &mut dyn Cancel,
+    sink: &mut dyn StretchSink<N>,
+) -> Result<Option<Survey>, VisibilityError> {
+    let mut scratch = scratch; // It lives no longer than the source.
+    let Some(mut tiles) = Tiles::new(source, sight, options, &mut scratch, cancel)? else {
+        return Ok(None);
+    };
+    while tiles.follow_next(scratch.reborrow(), cancel, sink)? {}
+    Ok(Some(tiles.survey))
+}
+
+/// What the edges and seams of a tile need.
+#[derive(Debug, Clone, Copy)]
+struct Needs {
+    /// The rectangle around all of them, [`Rectangle::NONE`] if there are none.
+    all: Rectangle,
+    /// The rectangle around those that are not longer than the tile.
+    short: Rectangle,
+    /// The number of sides of elements that are longer.
+    long_sides: usize,
+    /// The number of pairs of faces that are both larger, if seams are drawn.
+    large_pairs: usize,
+}
+
+/// Counts the pairs of faces whose rectangles have the lower left corner of their intersection on a
+/// tile.
+///
+/// All faces that are counted meet the tile. The corner lies on the tile unless both faces begin to
+/// the left of it or both begin below it.
+#[derive(Debug, Clone, Copy, Default)]
+struct Pairs {
+    /// The number of faces.
+    all: usize,
+    /// The number of those that begin to the left of the tile.
+    from_left: usize,
+    /// The number of those that begin below it.
+    from_below: usize,
+    /// The number of those that do both.
+    from_both: usize,
+}
+
+impl Pairs {
+    /// Counts a face.
+    fn add(&mut self, face: Rectangle, tile: Rectangle) {
+        let from_left = face.low.x < tile.low.x;
+        let from_below = face.low.y < tile.low.y;
+        self.all += 1;
+        self.from_left += usize::from(from_left);
+        self.from_below += usize::from(from_below);
+        self.from_both += usize::from(from_left && from_below);
+    }
+
+    /// Returns the number of pairs.
+    fn count(&self) -> usize {
+        let pairs = |faces: usize| faces.saturating_mul(faces.saturating_sub(1)) / 2;
+        let beside = pairs(self.from_left) + pairs(self.from_below) - pairs(self.from_both);
+        pairs(self.all) - beside
+    }
+}
+
+impl<'t, S: ModelSource> Tiles<'t, S> {
+    /// Goes through the model twice and prepares the search. Returns `None` if nothing is seen.
+    ///
+    /// # Errors
+    /// [`VisibilityError::Scratch`] or [`VisibilityError::Aborted`].
+    pub fn new(
+        source: &'t S,
+        sight: Sight,
+        options: Options,
+        scratch: &mut Scratch<'t>,
+        cancel: &mut dyn Cancel,
+    ) -> Result<Option<Self>, VisibilityError> {
+        let Some(survey) = Survey::new(source, &sight, cancel)? else { return Ok(None) };
+        let blocks = Blocks::new(source, &sight, &survey, scratch, cancel)?;
+        Ok(Some(Self { source, sight, options, survey, blocks, next: Some(Tile::FIRST) }))
+    }
+
+    /// Finds the stretches of the next tile. Returns whether there was one.
+    ///
+    /// # Errors
+    /// See [`VisibilityError`].
+    pub fn follow_next<N: Index>(
+        &mut self,
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        sink: &mut dyn StretchSink<N>,
+    ) -> Result<bool, VisibilityError> {
+        let Some(mut tile) = self.next else { return Ok(false) };
+        while !self.follow(tile, scratch.reborrow(), cancel, sink)? {
+            // Only a tile that can be divided is not followed.
+            tile = tile.divided().unwrap_or(tile);
+        }
+        self.next = tile.next();
+        Ok(true)
+    }
+
+    /// Iterates over the elements that may meet a rectangle.
+    fn outlines(&self, near: Rectangle) -> impl Iterator<Item = Outline<'t, S>> {
+        self.blocks.outlines(self.source, near)
+    }
+
+    /// Returns how far on the grid a face may lie beside a seam or an edge that it touches.
+    fn doubt(&self) -> u16 {
+        // The ends of a seam are rounded. In a parallel view they stay within both faces.
+        let is_rounded =
+            self.options.with_seams && self.sight.projection == Projection::Perspective;
+        let of_seams = if is_rounded { self.survey.doubt(1) } else { 0 };
+        // A block touches another if it does so within the error of both.
+        let of_blocks = if self.options.merged_blocks {
+            self.survey.doubt(self.sight.error_bound.saturating_mul(2))
+        } else {
+            0
+        };
+        of_seams.max(of_blocks)
+    }
+
+    /// Finds the stretches of a tile. Returns `false`, and hands over nothing, if it must be
+    /// divided.
+    fn follow<N: Index>(
+        &self,
+        tile: Tile,
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        sink: &mut dyn StretchSink<N>,
+    ) -> Result<bool, VisibilityError> {
+        let can_divide = tile.divided().is_some();
+        let rectangle = tile.rectangle();
+        let limit = rectangle.extent();
+        let no_small_faces = limit.iter().any(|&part| part < self.doubt());
+        let needs = self.needs(rectangle, no_small_faces, cancel)?;
+        if needs.all == Rectangle::NONE {
+            return Ok(true);
+        }
+        let mut batch = |reach: Rectangle, limit: Option<[u16; 2]>| {
+            let mut scratch = scratch.reborrow();
+            let reach = Reach::Rectangle(reach.grown(self.doubt()));
+            let loaded = &self.load(reach, &mut scratch, cancel)?;
+            let near = self.sight.near;
+            let mut owner = OfTile { tile: rectangle, limit, no_small_faces, loaded, near };
+            self.search(loaded, &mut owner, can_divide, scratch, cancel, sink)
+        };
+        match batch(needs.all, None) {
+            Ok(()) => return Ok(true),
+            Err(error) if !is_too_large(error) => return Err(error),
+            Err(error) => {
+                let alone = needs.long_sides.max(needs.large_pairs);
+                if alone == 0 {
+                    return if can_divide { Ok(false) } else { Err(error) };
+                }
+                if can_divide && alone > MOST_ALONE {
+                    return Ok(false);
+                }
+            }
+        }
+        if needs.short != Rectangle::NONE {
+            match batch(needs.short, Some(limit)) {
+                Ok(()) => {}
+                Err(error) if can_divide && is_too_large(error) => return Ok(false),
+                Err(error) => return Err(error),
+            }
+        }
+        self.follow_long_edges(rectangle, scratch.reborrow(), cancel, sink)?;
+        if self.options.with_seams {
+            self.follow_large_pairs(rectangle, no_small_faces, scratch, cancel, sink)?;
+        }
+        Ok(true)
+    }
+
+    /// Finds out what the edges and seams of a tile need.
+    fn needs(
+        &self,
+        tile: Rectangle,
+        no_small_faces: bool,
+        cancel: &mut dyn Cancel,
+    ) -> Result<Needs, VisibilityError> {
+        let none = Rectangle::NONE;
+        let mut needs = Needs { all: none, short: none, long_sides: 0, large_pairs: 0 };
+        let (mut faces, mut large_faces) = (Pairs::default(), Pairs::default());
+        let (mut of_faces, mut of_small_faces) = (none, none);
+        let limit = tile.extent();
+        let beyond = Rectangle { high: Rectangle::ALL.high, ..tile };
+        for (at, outline) in self.outlines(tile).enumerate() {
+            if at % 16 == 0 {
+                cancel.check()?;
+            }
+            let mut around = none;
+            outline.each_side(&self.sight, &self.survey, &mut |_, [a, b]| {
+                let side = Rectangle::around(a, b);
+                around = around.union(side);
+                if !tile.holds(side.low) {
+                    return;
+                }
+                needs.all = needs.all.union(side);
+                if side.is_within(limit) {
+                    needs.short = needs.short.union(side);
+                } else {
+                    needs.long_sides += 1;
+                }
+            });
+            if !self.options.with_seams || outline.is_bar() || !around.meets(tile) {
+                continue;
+            }
+            let Some(part) = around.intersection(beyond) else { continue };
+            faces.add(around, tile);
+            of_faces = of_faces.union(part);
+            if around.is_within(limit) && !no_small_faces {
+                of_small_faces = of_small_faces.union(part);
+            } else {
+                large_faces.add(around, tile);
+            }
+        }
+        needs.large_pairs = large_faces.count();
+        if faces.count() > 0 {
+            needs.all = needs.all.union(of_faces);
+        }
+        if faces.count() > needs.large_pairs {
+            needs.short = needs.short.union(of_small_faces);
+        }
+        Ok(needs)
+    }
+
+    /// Follows the edges of a tile that are longer than the tile, one by one.
+    fn follow_long_edges<N: Index>(
+        &self,
+        tile: Rectangle,
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        sink: &mut dyn StretchSink<N>,
+    ) -> Result<(), VisibilityError> {
+        let limit = tile.extent();
+        for outline in self.outlines(tile) {
+            if !outline.has_extent() {
+                continue;
+            }
+            let mut outcome = Ok(());
+            outline.each_side(&self.sight, &self.survey, &mut |number, ends| {
+                let side = Rectangle::around(ends[0], ends[1]);
+                if outcome.is_ok() && tile.holds(side.low) && !side.is_within(limit) {
+                    let side = (outline.first(), number);
+                    outcome = self.follow_edge(side, ends, scratch.reborrow(), cancel, sink);
+                }
+            });
+            outcome?;
+        }
+        Ok(())
+    }
+
+    /// Follows the edge of one side of an element, which is given by its first corner and the
+    /// number of the side, if it is the first side along that edge.
+    fn follow_edge<N: Index>(
+        &self,
+        (first, number): (usize, usize),
+        ends: [GridPoint; 2],
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        sink: &mut dyn StretchSink<N>,
+    ) -> Result<(), VisibilityError> {
+        let reach = Reach::Segment(ends, self.doubt());
+        let loaded = self.load(reach, &mut scratch, cancel)?;
+        let Some(here) = loaded.find(first) else { return Ok(()) };
+        let Some(pair) = loaded.side(here, number) else { return Ok(()) };
+        // All elements with this edge are loaded.
+        if !loaded.is_first_side(here + number, pair) || loaded.is_cut(pair, self.sight.near) {
+            return Ok(());
+        }
+        self.search(&loaded, &mut OneEdge(pair), false, scratch, cancel, sink)
+    }
+
+    /// Follows the seams of a tile whose faces are both larger than the tile, one by one.
+    fn follow_large_pairs<N: Index>(
+        &self,
+        tile: Rectangle,
+        no_small_faces: bool,
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        sink: &mut dyn StretchSink<N>,
+    ) -> Result<(), VisibilityError> {
+        let limit = tile.extent();
+        let large = |outline: Outline<'t, S>| {
+            let bounds = outline.bounds(&self.sight, &self.survey)?;
+            let is_large = no_small_faces || !bounds.is_within(limit);
+            (!outline.is_bar() && is_large && bounds.meets(tile) && outline.has_extent())
+                .then(|| (outline.first(), bounds))
+        };
+        for (one, bounds) in self.outlines(tile).filter_map(large) {
+            for (other, others) in self.outlines(tile).filter_map(large) {
+                cancel.check()?;
+                let both = bounds.intersection(others).filter(|_| one < other);
+                if both.is_some_and(|both| tile.holds(both.low)) {
+                    self.follow_pair([one, other], scratch.reborrow(), cancel, sink)?;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Follows the seams of two faces, which begin at these corners, one by one.
+    fn follow_pair<N: Index>(
+        &self,
+        firsts: [usize; 2],
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        sink: &mut dyn StretchSink<N>,
+    ) -> Result<(), VisibilityError> {
+        for number in 0.. {
+            let Some(ends) = self.seam(firsts, number, scratch.reborrow(), cancel)? else { break };
+            let ends = ends.map_each(|end| self.survey.point(self.sight.projection, end));
+            let mut scratch = scratch.reborrow();
+            let loaded = self.load(Reach::Segment(ends, self.doubt()), &mut scratch, cancel)?;
+            let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
+                continue;
+            };
+            let mut owner = OneSeam::new([one, other], number, true);
+            self.search(&loaded, &mut owner, false, scratch, cancel, sink)?;
+        }
+        Ok(())
+    }
+
+    /// Returns the ends of the seam with this number of two faces. `None` if they have fewer.
+    fn seam(
+        &self,
+        firsts: [usize; 2],
+        number: usize,
+        mut scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+    ) -> Result<Option<[Vertex; 2]>, VisibilityError> {
+        let loaded = self.load(Reach::Pair(firsts), &mut scratch, cancel)?;
+        let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
+            return Ok(None);
+        };
+        let mut owner = OneSeam::new([one, other], number, false);
+        self.search::<u16>(&loaded, &mut owner, false, scratch, cancel, &mut Nowhere)?;
+        Ok(owner.ends)
+    }
+}
+
+/// Receives no stretch, because none is followed.
+struct Nowhere;
+
+impl StretchSink<u16> for Nowhere {
+    fn stretch(&mut self, _: Stretch<u16>) -> Result<(), SinkFull> {
+        Ok(())
+    }
+}
+
+/// Whether a smaller part of the model may do where this error came.
+fn is_too_large(error: VisibilityError) -> bool {
+    matches!(error, VisibilityError::Scratch(_) | VisibilityError::TooManyCorners(_))
+}
