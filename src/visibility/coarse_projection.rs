@@ -163,6 +163,10 @@ impl Mapping {
             high = (high.0.max(x), high.1.max(y));
             yield_counter.spend(TWO_DIVISIONS)?;
         }
+        // The rounded ends of a seam may lie beside all vertices. On a whole page that does not
+        // matter; on a small part of it, it may be many points of the coarse grid.
+        #[cfg(feature = "tiles")]
+        let (low, high) = with_margin(projection, vertices, low, high);
         let shift_for = |low: i64, high: i64| {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(COARSE_BITS)
@@ -182,6 +186,26 @@ impl Mapping {
             y: coarse(y, self.low.1, self.shift.1),
         }
     }
+}
+
+/// Returns the rectangle around all vertices on the page, and around all points whose view
+/// coordinates are rounded from between theirs.
+#[cfg(feature = "tiles")]
+fn with_margin(
+    projection: Projection,
+    vertices: &[Vertex],
+    low: (i64, i64),
+    high: (i64, i64),
+) -> ((i64, i64), (i64, i64)) {
+    let nearest = vertices.iter().map(|vertex| vertex.z).min();
+    let (Projection::Perspective, Some(nearest @ 1..)) = (projection, nearest) else {
+        return (low, high);
+    };
+    // In a parallel view, rounding stays between. Here x and z change by up to half a unit.
+    let parts = [low.0, low.1, high.0, high.1].map(i64::unsigned_abs);
+    let farthest = parts.into_iter().max().unwrap_or(0);
+    let margin = (((1 << 20) + farthest) >> 1) as i64 / i64::from(nearest) + 1;
+    ((low.0 - margin, low.1 - margin), (high.0 + margin, high.1 + margin))
 }
 
 /// Projects a vertex onto the page: x and y in units of 2^-20, rounded down.
