@@ -37,11 +37,16 @@ impl Block {
     }
 }
 
+/// The page is divided into so many rows and columns to count the elements on it.
+const DIVISIONS: u16 = 16;
+
 /// The index of a model.
 #[derive(Debug)]
 pub(super) struct Blocks<'t> {
     /// The blocks, in the order of the model.
     blocks: &'t [Block],
+    /// How many elements have their lower left corner in each part of the page, row by row.
+    counts: &'t [u32],
     /// The number of corners of a block. An element belongs to the block in which it begins.
     length: usize,
 }
@@ -62,18 +67,40 @@ impl<'t> Blocks<'t> {
         let most = (scratch.available_bytes() / (SHARE * size_of::<Block>())).max(1);
         let length = corners.div_ceil(most).max(FEWEST_CORNERS);
         let blocks: &mut [Block] = scratch.take(corners.div_ceil(length))?;
+        let counts: &mut [u32] = scratch.take(usize::from(DIVISIONS * DIVISIONS))?;
         let mut first = 0;
         for (number, block) in blocks.iter_mut().enumerate() {
             let mut all = Rectangle::NONE;
             while first < corners.min((number + 1) * length) {
                 cancel.check()?;
                 let outline = Outline::at(source, first);
-                all = outline.bounds(sight, survey).map_or(all, |bounds| all.union(bounds));
                 first = outline.end();
+                let Some(bounds) = outline.bounds(sight, survey) else { continue };
+                all = all.union(bounds);
+                if let Some(count) = counts.get_mut(part_of(bounds.low)) {
+                    *count += 1;
+                }
             }
             *block = Block::around(all);
         }
-        Ok(Self { blocks, length })
+        Ok(Self { blocks, counts, length })
+    }
+
+    /// Returns a number of elements that have their lower left corner in a rectangle. There may be
+    /// more if the rectangle is small.
+    pub fn count_at_least(&self, rectangle: Rectangle) -> usize {
+        let size = u16::MAX / DIVISIONS + 1;
+        let Rectangle { low, high } = rectangle;
+        let whole = |low: u16, high: u16| {
+            low.div_ceil(size)..high.checked_add(1).map_or(DIVISIONS, |end| end / size)
+        };
+        let rows = whole(low.y, high.y);
+        rows.flat_map(|row| {
+            whole(low.x, high.x).map(move |column| usize::from(row * DIVISIONS + column))
+        })
+        .filter_map(|part| self.counts.get(part))
+        .map(|&count| count as usize)
+        .sum()
     }
 
     /// Iterates over the elements of all blocks that may meet a rectangle.
@@ -95,6 +122,12 @@ impl<'t> Blocks<'t> {
             })
         })
     }
+}
+
+/// Returns the index of the count to which a point belongs.
+fn part_of(point: GridPoint) -> usize {
+    let size = u16::MAX / DIVISIONS + 1;
+    usize::from(point.y / size * DIVISIONS + point.x / size)
 }
 
 /// Returns where the first element begins at a corner or after it.

@@ -3,7 +3,7 @@
 //! Vertices and elements keep the order of the model, so every choice between equals is the same.
 
 use super::page::{GridPoint, Rectangle};
-use super::{ModelSource, Tiles};
+use super::{Listed, ModelSource, Tiles};
 use crate::geometry::Vertex;
 use crate::index::Index;
 use crate::model::{Corner, Element, Elements, PenWriter, Position};
@@ -19,7 +19,7 @@ const MOST_CORNERS: usize = u16::MAX as usize;
 
 /// How many times the least memory of the search is wanted. With it the search is as fast as it can
 /// be; with the least, every face is tested against every edge.
-const WANTED_TIMES: usize = 4;
+const WANTED_TIMES: usize = 3;
 
 /// Which elements are loaded.
 #[derive(Debug, Clone, Copy)]
@@ -129,7 +129,7 @@ impl Loaded<'_> {
 }
 
 impl<'t, S: ModelSource> Tiles<'t, S> {
-    /// Loads a part of the model.
+    /// Loads a part of the model. `listed` may spare a pass over the model.
     ///
     /// # Errors
     /// [`VisibilityError::Scratch`] or [`VisibilityError::TooManyCorners`] if the part is too large,
@@ -137,6 +137,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     pub(super) fn load<'a>(
         &self,
         reach: Reach,
+        listed: Option<&Listed<'_>>,
         scratch: &mut Scratch<'a>,
         cancel: &mut dyn Cancel,
     ) -> Result<Loaded<'a>, VisibilityError> {
@@ -144,7 +145,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let (mut corner_count, mut changes, mut pen) = (0, 0, 0);
         let firsts: &[u32] = scratch.take_filled(|room| {
             let mut count = 0;
-            for (at, outline) in self.outlines(reach.bounds()).enumerate() {
+            for (at, outline) in self.outlines(reach.bounds(), listed).enumerate() {
                 if at % 16 == 0 {
                     cancel.check()?;
                 }

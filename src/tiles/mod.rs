@@ -84,6 +84,10 @@ pub struct Sight {
 /// long as a tile can be divided.
 const MOST_ALONE: usize = 12;
 
+/// An element takes at least so many bytes in most models. A tile with more elements than that is
+/// divided before it is loaded.
+const LIKELY_BYTES: usize = 48;
+
 /// The search for the stretches of a model, tile after tile.
 pub struct Tiles<'t, S> {
     /// The model.
@@ -123,6 +127,15 @@ pub fn find_stretches<S: ModelSource, N: Index>(
     Ok(Some(tiles.survey))
 }
 
+/// The elements that may meet a rectangle, in the order of the model.
+#[derive(Debug, Clone, Copy)]
+struct Listed<'a> {
+    /// For each the index of its first corner.
+    firsts: &'a [u32],
+    /// The rectangle.
+    near: Rectangle,
+}
+
 /// What the edges and seams of a tile need.
 #[derive(Debug, Clone, Copy)]
 struct Needs {
@@ -134,6 +147,8 @@ struct Needs {
     long_sides: usize,
     /// The number of pairs of faces that are both larger, if seams are drawn.
     large_pairs: usize,
+    /// The number of elements on the tile.
+    elements: usize,
 }
 
 /// Counts the pairs of faces whose rectangles have the lower left corner of their intersection on a
@@ -208,9 +223,50 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         Ok(true)
     }
 
-    /// Iterates over the elements that may meet a rectangle.
-    fn outlines(&self, near: Rectangle) -> impl Iterator<Item = Outline<'t, S>> {
-        self.blocks.outlines(self.source, near)
+    /// Iterates over the elements that may meet a rectangle. They are taken from `listed`, if it has
+    /// all of them.
+    fn outlines(
+        &self,
+        near: Rectangle,
+        listed: Option<&Listed<'_>>,
+    ) -> impl Iterator<Item = Outline<'t, S>> {
+        let listed = listed.filter(|listed| listed.near.includes(near));
+        let of_list = listed.map_or(&[] as &[u32], |listed| listed.firsts).iter();
+        let window = self.survey.window(near);
+        let is_all = near == Rectangle::ALL;
+        let of_model = self.blocks.outlines(self.source, near);
+        of_list
+            .map(|&first| Outline::at(self.source, first as usize))
+            .chain(of_model.take_while(move |_| listed.is_none()))
+            .filter(move |outline| {
+                is_all || listed.is_some() || outline.may_meet(&self.sight, &window)
+            })
+    }
+
+    /// Lists the elements that may meet a rectangle. Returns `None` if they do not fit.
+    fn list<'a>(
+        &self,
+        near: Rectangle,
+        scratch: &mut Scratch<'a>,
+        cancel: &mut dyn Cancel,
+    ) -> Result<Option<Listed<'a>>, VisibilityError> {
+        let mut is_whole = true;
+        let firsts = scratch.take_filled(|room| {
+            let mut count = 0;
+            for outline in self.outlines(near, None) {
+                if count % 16 == 0 {
+                    cancel.check()?;
+                }
+                let Some(slot) = room.get_mut(count) else {
+                    is_whole = false;
+                    break;
+                };
+                *slot = outline.first() as u32;
+                count += 1;
+            }
+            Ok::<_, VisibilityError>(if is_whole { count } else { 0 })
+        })?;
+        Ok(is_whole.then_some(Listed { firsts, near }))
     }
 
     /// Returns how far on the grid a face may lie beside a seam or an edge that it touches.
@@ -239,16 +295,32 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> Result<bool, VisibilityError> {
         let can_divide = tile.divided().is_some();
         let rectangle = tile.rectangle();
+        let available = scratch.available_bytes();
+        let is_full =
+            |elements: usize| can_divide && elements.saturating_mul(LIKELY_BYTES) > available;
+        if is_full(self.blocks.count_at_least(rectangle)) {
+            return Ok(false);
+        }
         let limit = rectangle.extent();
         let no_small_faces = limit.iter().any(|&part| part < self.doubt());
-        let needs = self.needs(rectangle, no_small_faces, cancel)?;
+        // Most edges that begin in the tile end not far beside it.
+        let margin = limit.iter().min().map_or(0, |limit| limit / 4);
+        let listed = self.list(rectangle.grown(margin), &mut scratch, cancel)?;
+        if can_divide && listed.is_none_or(|listed| is_full(listed.firsts.len() / 2)) {
+            return Ok(false);
+        }
+        let listed = listed.as_ref();
+        let needs = self.needs(rectangle, no_small_faces, listed, cancel)?;
         if needs.all == Rectangle::NONE {
             return Ok(true);
+        }
+        if is_full(needs.elements) {
+            return Ok(false);
         }
         let mut batch = |reach: Rectangle, limit: Option<[u16; 2]>| {
             let mut scratch = scratch.reborrow();
             let reach = Reach::Rectangle(reach.grown(self.doubt()));
-            let loaded = &self.load(reach, &mut scratch, cancel)?;
+            let loaded = &self.load(reach, listed, &mut scratch, cancel)?;
             let near = self.sight.near;
             let mut owner = OfTile { tile: rectangle, limit, no_small_faces, loaded, near };
             self.search(loaded, &mut owner, can_divide, scratch, cancel, sink)
@@ -285,15 +357,17 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         &self,
         tile: Rectangle,
         no_small_faces: bool,
+        listed: Option<&Listed<'_>>,
         cancel: &mut dyn Cancel,
     ) -> Result<Needs, VisibilityError> {
         let none = Rectangle::NONE;
-        let mut needs = Needs { all: none, short: none, long_sides: 0, large_pairs: 0 };
+        let mut needs =
+            Needs { all: none, short: none, long_sides: 0, large_pairs: 0, elements: 0 };
         let (mut faces, mut large_faces) = (Pairs::default(), Pairs::default());
         let (mut of_faces, mut of_small_faces) = (none, none);
         let limit = tile.extent();
         let beyond = Rectangle { high: Rectangle::ALL.high, ..tile };
-        for (at, outline) in self.outlines(tile).enumerate() {
+        for (at, outline) in self.outlines(tile, listed).enumerate() {
             if at % 16 == 0 {
                 cancel.check()?;
             }
@@ -311,7 +385,11 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
                     needs.long_sides += 1;
                 }
             });
-            if !self.options.with_seams || outline.is_bar() || !around.meets(tile) {
+            if !around.meets(tile) {
+                continue;
+            }
+            needs.elements += 1;
+            if !self.options.with_seams || outline.is_bar() {
                 continue;
             }
             let Some(part) = around.intersection(beyond) else { continue };
@@ -342,7 +420,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
         let limit = tile.extent();
-        for outline in self.outlines(tile) {
+        for outline in self.outlines(tile, None) {
             if !outline.has_extent() {
                 continue;
             }
@@ -370,7 +448,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
         let reach = Reach::Segment(ends, self.doubt());
-        let loaded = self.load(reach, &mut scratch, cancel)?;
+        let loaded = self.load(reach, None, &mut scratch, cancel)?;
         let Some(here) = loaded.find(first) else { return Ok(()) };
         let Some(pair) = loaded.side(here, number) else { return Ok(()) };
         // All elements with this edge are loaded.
@@ -396,8 +474,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             (!outline.is_bar() && is_large && bounds.meets(tile) && outline.has_extent())
                 .then(|| (outline.first(), bounds))
         };
-        for (one, bounds) in self.outlines(tile).filter_map(large) {
-            for (other, others) in self.outlines(tile).filter_map(large) {
+        for (one, bounds) in self.outlines(tile, None).filter_map(large) {
+            for (other, others) in self.outlines(tile, None).filter_map(large) {
                 cancel.check()?;
                 let both = bounds.intersection(others).filter(|_| one < other);
                 if both.is_some_and(|both| tile.holds(both.low)) {
@@ -420,7 +498,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             let Some(ends) = self.seam(firsts, number, scratch.reborrow(), cancel)? else { break };
             let ends = ends.map_each(|end| self.survey.point(self.sight.projection, end));
             let mut scratch = scratch.reborrow();
-            let loaded = self.load(Reach::Segment(ends, self.doubt()), &mut scratch, cancel)?;
+            let loaded =
+                self.load(Reach::Segment(ends, self.doubt()), None, &mut scratch, cancel)?;
             let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
                 continue;
             };
@@ -438,7 +517,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         mut scratch: Scratch<'_>,
         cancel: &mut dyn Cancel,
     ) -> Result<Option<[Vertex; 2]>, VisibilityError> {
-        let loaded = self.load(Reach::Pair(firsts), &mut scratch, cancel)?;
+        let loaded = self.load(Reach::Pair(firsts), None, &mut scratch, cancel)?;
         let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
             return Ok(None);
         };

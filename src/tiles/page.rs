@@ -72,6 +72,11 @@ impl Rectangle {
         self.intersection(other).is_some()
     }
 
+    /// Whether another rectangle lies within this one.
+    pub fn includes(self, other: Self) -> bool {
+        self.union(other) == self
+    }
+
     /// Whether a point lies in the rectangle.
     pub fn holds(self, point: GridPoint) -> bool {
         self.meets(Self { low: point, high: point })
@@ -195,10 +200,52 @@ impl Survey {
         GridPoint { x, y }
     }
 
+    /// Returns a rectangle as bounds on the page.
+    pub(super) fn window(&self, rectangle: Rectangle) -> Window {
+        let Rectangle { low, high } = rectangle;
+        let bound =
+            |axis: usize, place: u32| self.low[axis] + (i64::from(place) << self.shift[axis]);
+        let (low, high) = ([low.x, low.y], [high.x, high.y]);
+        Window {
+            low: [0, 1].map(|axis: usize| bound(axis, low[axis].into())),
+            end: [0, 1].map(|axis: usize| bound(axis, u32::from(high[axis]) + 1)),
+        }
+    }
+
     /// Returns how far on the grid a point may be off whose view coordinates may be off by so many
     /// halves of a unit.
     pub(super) fn doubt(&self, halves: u32) -> u16 {
         self.doubt.saturating_mul(halves.into()).min(u16::MAX.into()) as u16
+    }
+}
+
+/// Bounds on the page, in units of 2^-20: from the least x and y to the first beyond.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Window {
+    low: [i64; 2],
+    end: [i64; 2],
+}
+
+impl Window {
+    /// Returns one bit for each of the four sides of the window beyond which a vertex lies (as
+    /// Sutherland's outcode). Its place on the page is not computed, which would take divisions:
+    /// x / w, rounded down, is below a whole number n if x is below n w.
+    ///
+    /// `vertex` must be in front of the eye. The bounds lie within ±2^41 / w, so products are below
+    /// 2^61.
+    pub fn outcode(&self, projection: Projection, vertex: Vertex) -> u32 {
+        let w = match projection {
+            Projection::Perspective => i64::from(vertex.z),
+            Projection::Parallel => 1,
+        };
+        let mut code = 0;
+        for (axis, part) in [vertex.x, vertex.y].into_iter().enumerate() {
+            let part = i64::from(part) << 20;
+            let bits =
+                u32::from(part < self.low[axis] * w) | u32::from(part >= self.end[axis] * w) << 1;
+            code = code << 2 | bits;
+        }
+        code
     }
 }
 
