@@ -306,9 +306,6 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         // Most edges that begin in the tile end not far beside it.
         let margin = limit.iter().min().map_or(0, |limit| limit / 4);
         let listed = self.list(rectangle.grown(margin), &mut scratch, cancel)?;
-        if can_divide && listed.is_none_or(|listed| is_full(listed.firsts.len() / 2)) {
-            return Ok(false);
-        }
         let listed = listed.as_ref();
         let needs = self.needs(rectangle, no_small_faces, listed, cancel)?;
         if needs.all == Rectangle::NONE {
