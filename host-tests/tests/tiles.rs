@@ -1,12 +1,13 @@
 //! Hidden lines found tile by tile, in a memory that does not hold the scene, are those of one
 //! search of the whole scene.
+#![allow(clippy::unwrap_used, reason = "a test fails by panicking")]
 
 use penup::fixed::Decimal;
-use penup::geometry::{Precision, Vertex};
+use penup::geometry::{Precision, Projection, Vertex};
 use penup::index::Index;
 use penup::model::{Corner, Elements, Model, PenName, PenWriter, Pens, Position, no_undo};
-use penup::stage::{NeverCancel, Scratch};
-use penup::tiles::{ModelSource, Projected, Sight, Tiles};
+use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
+use penup::tiles::{self, ModelSource, Projected, Sight, Tiles};
 use penup::view::{Camera, Lens, Pose, View, project_scene};
 use penup::visibility::{
     Crease, EdgeParameter, Options, Scene, SinkFull, Stretch, StretchSink, Unrounded,
@@ -14,6 +15,7 @@ use penup::visibility::{
 };
 use penup_host_tests::random::Random;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
+use penup_host_tests::scene_files::{self, Stretches};
 use proptest::prelude::*;
 
 /// A stretch in an order that does not depend on when it was found: its ends, where it begins and
@@ -210,7 +212,7 @@ fn camera(seed: u64, model: &Model<'_, u32>) -> Camera {
         middle + size * reach * f64::from(random.between(-1000, 1000)) / 1000.0
     };
     let at = [0, 1, 2].map(|axis| part(axis, 0.3));
-    let reach = if seed % 3 == 0 { 0.6 } else { 3.0 };
+    let reach = if seed.is_multiple_of(3) { 0.6 } else { 3.0 };
     let eye = [0, 1, 2].map(|axis| part(axis, reach));
     let lens = random.one_of(&[
         Lens::Perspective,
@@ -285,4 +287,93 @@ fn the_least_memory_makes_many_tiles() {
     let counts = |check: fn(u64) -> usize| (0..60).map(check).filter(|&tiles| tiles > 1).count();
     assert!(counts(check_scene) > 30);
     assert!(counts(check_model) > 30);
+}
+
+/// A torus of 3000 faces, as it is read.
+fn torus() -> RandomScene {
+    let model = scene_files::Model::torus(60, 50);
+    let (eye, at, up) = ([6.0, -7.0, 5.0], [0.0; 3], [0.0, 0.0, 1.0]);
+    let view = scene_files::View::new(&model, eye, at, up, Projection::Perspective);
+    RandomScene {
+        vertices: view.vertices,
+        corners: model.corners,
+        projection: Projection::Perspective,
+    }
+}
+
+/// How the torus is seen.
+const SIGHT: Sight = Sight {
+    projection: Projection::Perspective,
+    near: None,
+    precision: Precision { written: 0, unit: 0 },
+    error_bound: 1,
+};
+
+#[test]
+fn a_mesh_is_drawn_in_a_fraction_of_its_memory() {
+    let scene = torus();
+    let whole = Scene {
+        vertices: &scene.vertices,
+        elements: Elements::new(&scene.corners),
+        projection: scene.projection,
+        unrounded: Unrounded::UNKNOWN,
+    };
+    let least = scratch_bytes(&whole);
+    let mut words = vec![0u64; 3 * least / 8];
+    let options = Options { with_hidden: true, with_seams: true, ..Options::default() };
+    let mut known = Found { with_numbers: true, ..Found::default() };
+    find_stretches(&whole, options, Scratch::new(&mut words), &mut NeverCancel, &mut known)
+        .unwrap();
+    let known = known.sorted();
+    let source = &Given { scene: &scene, pens: Pens::default() };
+    for (divisor, at_least) in [(1, 2), (2, 8), (4, 20)] {
+        let (found, tiles) = in_tiles(source, SIGHT, options, least / divisor, true).unwrap();
+        assert!(tiles >= at_least, "{tiles} tiles in {} bytes", least / divisor);
+        assert!(found == known);
+    }
+    let refused = in_tiles(source, SIGHT, options, 1 << 10, true);
+    assert!(matches!(refused, Err(VisibilityError::Scratch(_))), "{refused:?}");
+}
+
+/// Cancels the search when it has been asked so many times.
+struct CancelAfter(usize);
+
+impl Cancel for CancelAfter {
+    fn check(&mut self) -> Result<(), Aborted> {
+        self.0 = self.0.checked_sub(1).ok_or(Aborted)?;
+        Ok(())
+    }
+}
+
+#[test]
+fn it_ends_when_it_is_cancelled_or_the_sink_is_full() {
+    let scene = torus();
+    let source = &Given { scene: &scene, pens: Pens::default() };
+    let mut words = vec![0u64; 3000];
+    let mut search = |cancel: &mut dyn Cancel, sink: &mut dyn StretchSink<u16>| {
+        let scratch = Scratch::new(&mut words);
+        tiles::find_stretches(source, SIGHT, Options::default(), scratch, cancel, sink).map(|_| ())
+    };
+    let mut all = Stretches(Vec::new());
+    assert_eq!(search(&mut NeverCancel, &mut all), Ok(()));
+    // Elements are read and sorted, and edges followed, with a check now and then.
+    for checks in [0, 10, 100, 1000, 10_000] {
+        let found = search(&mut CancelAfter(checks), &mut Stretches(Vec::new()));
+        assert_eq!(found, Err(VisibilityError::Aborted), "{checks}");
+    }
+    for room in [0, 1, all.0.len() - 1] {
+        let found = search(&mut NeverCancel, &mut Room(room));
+        assert_eq!(found, Err(VisibilityError::SinkFull));
+    }
+    assert_eq!(search(&mut NeverCancel, &mut Room(all.0.len())), Ok(()));
+}
+
+/// Has room for so many stretches.
+struct Room(usize);
+
+impl StretchSink for Room {
+    fn stretch(&mut self, _: Stretch) -> Result<(), SinkFull> {
+        self.0 = self.0.checked_sub(1).ok_or(SinkFull)?;
+        Ok(())
+    }
 }

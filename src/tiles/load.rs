@@ -3,14 +3,14 @@
 //! Vertices and elements keep the order of the model, so every choice between equals is the same.
 
 use super::page::{GridPoint, Rectangle};
-use super::{Listed, ModelSource, Tiles};
+use super::{LOOK, Listed, ModelSource, PLACE, Tiles};
 use crate::geometry::Vertex;
 use crate::index::Index;
 use crate::model::{Corner, Element, Elements, PenWriter, Position};
-use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
+use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch, StageError, heap_sort_cancellable};
 use crate::view::{cut, weld};
 use crate::visibility::{
-    Ownership, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError,
+    Ownership, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError, YieldCounter,
     find_owned_stretches, scratch_bytes,
 };
 
@@ -145,10 +145,11 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let (mut corner_count, mut changes, mut pen) = (0, 0, 0);
         let firsts: &[u32] = scratch.take_filled(|room| {
             let mut count = 0;
-            for (at, outline) in self.outlines(reach.bounds(), listed).enumerate() {
-                if at % 16 == 0 {
-                    cancel.check()?;
-                }
+            let yield_counter = &mut YieldCounter::new(cancel);
+            for outline in self.outlines(reach.bounds(), listed) {
+                yield_counter.spend(LOOK)?;
+                let Some(outline) = outline else { continue };
+                yield_counter.spend(PLACE)?;
                 let first = outline.first();
                 let bounds = outline.bounds(sight, &self.survey);
                 if bounds.is_none_or(|bounds| !reach.includes(first, bounds))
@@ -176,30 +177,33 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
                 Some(corner)
             })
         };
-        cancel.check()?;
         let numbers: &[u32] = scratch.take_filled(|room| {
             let mut count = 0;
             for corner in firsts.iter().flat_map(|&first| corners_of(first)) {
+                if count % 256 == 0 {
+                    cancel.check()?;
+                }
                 if count == room.len() {
-                    count = sort_without_repeats(room);
+                    count = sort_without_repeats(room, cancel)?;
                 }
                 let length = room.len();
                 *room.get_mut(count).ok_or_else(|| out_of(length))? = corner.vertex();
                 count += 1;
             }
             let room = room.get_mut(..count).unwrap_or(&mut []);
-            Ok::<_, VisibilityError>(sort_without_repeats(room))
+            Ok::<_, VisibilityError>(sort_without_repeats(room, cancel)?)
         })?;
         let limit = <Corner<u16>>::VERTEX_NUMBER_LIMIT;
         if numbers.len() > limit {
             return Err(OutOfScratch { needed: numbers.len(), available: limit }.into());
         }
-        cancel.check()?;
         let corners: &mut [Corner<u16>] = scratch.take(corner_count)?;
         let mut pens = PenWriter::new(scratch, changes)?;
         let mut slots = corners.iter_mut();
         let mut written = 0;
+        let yield_counter = &mut YieldCounter::new(cancel);
         for &first in firsts {
+            yield_counter.spend(LOOK)?;
             pens.element(written, source.pen(first as usize));
             for (corner, slot) in corners_of(first).zip(&mut slots) {
                 let number = numbers.binary_search(&corner.vertex()).unwrap_or(0);
@@ -209,18 +213,20 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         }
         let corners: &'a [Corner<u16>] = corners;
         let mut elements = Elements::with_pens(corners, pens.finish());
-        cancel.check()?;
         let known = numbers.iter().map_while(|&number| source.position(number));
         let positions: &mut [Position] = scratch.take(known.clone().count())?;
         for (slot, position) in positions.iter_mut().zip(known) {
+            yield_counter.spend(100)?;
             *slot = position;
         }
         let positions: &'a [Position] = positions;
         if !positions.is_empty() {
             elements = weld(positions, elements, scratch, cancel).map_err(refused)?.0;
         }
+        let yield_counter = &mut YieldCounter::new(cancel);
         let seen: &mut [Vertex] = scratch.take(numbers.len())?;
         for (slot, &number) in seen.iter_mut().zip(numbers) {
+            yield_counter.spend(LOOK / 3)?;
             *slot = source.vertex(number);
         }
         let mut vertices: &'a [Vertex] = seen;
@@ -231,6 +237,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         }
         let points: &mut [GridPoint] = scratch.take(vertices.len())?;
         for (slot, &vertex) in points.iter_mut().zip(vertices) {
+            yield_counter.spend(PLACE / 3)?;
             *slot = self.survey.point(sight.projection, vertex);
         }
         Ok(Loaded { firsts, numbers, positions, vertices, elements, points })
@@ -289,8 +296,8 @@ impl<N: Index> StretchSink<u16> for Renumbered<'_, N> {
 }
 
 /// Sorts numbers, moves each different one to the front, and returns how many these are.
-fn sort_without_repeats(numbers: &mut [u32]) -> usize {
-    heap_sort_by_key(numbers, |number| *number);
+fn sort_without_repeats(numbers: &mut [u32], cancel: &mut dyn Cancel) -> Result<usize, Aborted> {
+    heap_sort_cancellable(numbers, |number| *number, cancel)?;
     let mut kept = 0;
     for at in 0..numbers.len() {
         if kept == 0 || numbers[kept - 1] != numbers[at] {
@@ -298,7 +305,7 @@ fn sort_without_repeats(numbers: &mut [u32]) -> usize {
             kept += 1;
         }
     }
-    kept
+    Ok(kept)
 }
 
 /// The error that there is room for so many numbers and not for one more.

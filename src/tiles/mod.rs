@@ -37,7 +37,7 @@ use crate::geometry::{Precision, Projection, Vertex};
 use crate::index::Index;
 use crate::model::{Corner, Position};
 use crate::stage::{Cancel, Scratch};
-use crate::visibility::{Options, SinkFull, Stretch, StretchSink, VisibilityError};
+use crate::visibility::{Options, SinkFull, Stretch, StretchSink, VisibilityError, YieldCounter};
 use blocks::Blocks;
 use load::Reach;
 use outline::Outline;
@@ -83,6 +83,11 @@ pub struct Sight {
 /// The greatest number of long edges, or of pairs of large faces, that are followed one by one as
 /// long as a tile can be divided.
 const MOST_ALONE: usize = 12;
+
+/// The number of instructions for finding out whether an element may meet a rectangle.
+const LOOK: usize = 3000;
+/// The number of instructions for placing an element on the page.
+const PLACE: usize = 8000;
 
 /// An element takes at least so many bytes in most models. A tile with more elements than that is
 /// divided before it is loaded.
@@ -223,13 +228,14 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         Ok(true)
     }
 
-    /// Iterates over the elements that may meet a rectangle. They are taken from `listed`, if it has
-    /// all of them.
+    /// Iterates over the elements of the model. Those that may meet a rectangle are handed over;
+    /// each other one that must be looked at is a `None`, so that the caller can check for
+    /// cancelling. They are taken from `listed`, if it has all of them.
     fn outlines(
         &self,
         near: Rectangle,
         listed: Option<&Listed<'_>>,
-    ) -> impl Iterator<Item = Outline<'t, S>> {
+    ) -> impl Iterator<Item = Option<Outline<'t, S>>> {
         let listed = listed.filter(|listed| listed.near.includes(near));
         let of_list = listed.map_or(&[] as &[u32], |listed| listed.firsts).iter();
         let window = self.survey.window(near);
@@ -238,8 +244,9 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         of_list
             .map(|&first| Outline::at(self.source, first as usize))
             .chain(of_model.take_while(move |_| listed.is_none()))
-            .filter(move |outline| {
-                is_all || listed.is_some() || outline.may_meet(&self.sight, &window)
+            .map(move |outline| {
+                let is_near = is_all || listed.is_some() || outline.may_meet(&self.sight, &window);
+                is_near.then_some(outline)
             })
     }
 
@@ -253,10 +260,10 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let mut is_whole = true;
         let firsts = scratch.take_filled(|room| {
             let mut count = 0;
+            let yield_counter = &mut YieldCounter::new(cancel);
             for outline in self.outlines(near, None) {
-                if count % 16 == 0 {
-                    cancel.check()?;
-                }
+                yield_counter.spend(LOOK)?;
+                let Some(outline) = outline else { continue };
                 let Some(slot) = room.get_mut(count) else {
                     is_whole = false;
                     break;
@@ -364,10 +371,11 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let (mut of_faces, mut of_small_faces) = (none, none);
         let limit = tile.extent();
         let beyond = Rectangle { high: Rectangle::ALL.high, ..tile };
-        for (at, outline) in self.outlines(tile, listed).enumerate() {
-            if at % 16 == 0 {
-                cancel.check()?;
-            }
+        let yield_counter = &mut YieldCounter::new(cancel);
+        for outline in self.outlines(tile, listed) {
+            yield_counter.spend(LOOK)?;
+            let Some(outline) = outline else { continue };
+            yield_counter.spend(PLACE)?;
             let mut around = none;
             outline.each_side(&self.sight, &self.survey, &mut |_, [a, b]| {
                 let side = Rectangle::around(a, b);
@@ -418,9 +426,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> Result<(), VisibilityError> {
         let limit = tile.extent();
         for outline in self.outlines(tile, None) {
-            if !outline.has_extent() {
-                continue;
-            }
+            cancel.check()?;
+            let Some(outline) = outline.filter(Outline::has_extent) else { continue };
             let mut outcome = Ok(());
             outline.each_side(&self.sight, &self.survey, &mut |number, ends| {
                 let side = Rectangle::around(ends[0], ends[1]);
@@ -465,15 +472,19 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
         let limit = tile.extent();
-        let large = |outline: Outline<'t, S>| {
+        let large = |outline: Option<Outline<'t, S>>| {
+            let outline = outline?;
             let bounds = outline.bounds(&self.sight, &self.survey)?;
             let is_large = no_small_faces || !bounds.is_within(limit);
             (!outline.is_bar() && is_large && bounds.meets(tile) && outline.has_extent())
                 .then(|| (outline.first(), bounds))
         };
-        for (one, bounds) in self.outlines(tile, None).filter_map(large) {
-            for (other, others) in self.outlines(tile, None).filter_map(large) {
+        for one in self.outlines(tile, None).map(large) {
+            cancel.check()?;
+            let Some((one, bounds)) = one else { continue };
+            for other in self.outlines(tile, None).map(large) {
                 cancel.check()?;
+                let Some((other, others)) = other else { continue };
                 let both = bounds.intersection(others).filter(|_| one < other);
                 if both.is_some_and(|both| tile.holds(both.low)) {
                     self.follow_pair([one, other], scratch.reborrow(), cancel, sink)?;

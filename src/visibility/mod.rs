@@ -84,6 +84,7 @@ use grid::Grid;
 use scene_index::SceneIndex;
 use search::{Marks, StretchFinder};
 use triangles::Ears;
+#[cfg(not(feature = "tiles"))]
 use yield_counter::YieldCounter;
 
 pub use crate::geometry::EdgeParameter;
@@ -94,6 +95,7 @@ pub use wire::follow_wire;
 pub(crate) use {
     coarse_projection::page_position,
     owned::{Ownership, find_owned_stretches},
+    yield_counter::YieldCounter,
 };
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
