@@ -17,9 +17,10 @@
 //! index says which parts of it lie where on the page.
 //!
 //! # Memory
-//! A sixteenth of the memory at most is the index. A small scene takes 4 bytes for each element, 32
-//! for each vertex (20 if no positions are known), 2 for each corner, and what the search takes.
-//! The fewest elements for which there must be room are those that meet a single edge.
+//! A sixteenth of the memory at most is the index of the blocks; another KiB counts the elements on
+//! each part of the page. A small scene takes 8 bytes for each element, 32 for each vertex (20 if no
+//! positions are known), 2 for each corner, and what the search takes. The fewest elements for which
+//! there must be room are those that meet a single edge.
 //!
 //! # Limits
 //! Refused are an edge that meets more elements than fit into the memory, and a point at which more
@@ -349,9 +350,9 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
                 Err(error) => return Err(error),
             }
         }
-        self.follow_long_edges(rectangle, scratch.reborrow(), cancel, sink)?;
+        self.follow_long_edges(rectangle, listed, scratch.reborrow(), cancel, sink)?;
         if self.options.with_seams {
-            self.follow_large_pairs(rectangle, no_small_faces, scratch, cancel, sink)?;
+            self.follow_large_pairs(rectangle, no_small_faces, listed, scratch, cancel, sink)?;
         }
         Ok(true)
     }
@@ -420,12 +421,13 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     fn follow_long_edges<N: Index>(
         &self,
         tile: Rectangle,
+        listed: Option<&Listed<'_>>,
         mut scratch: Scratch<'_>,
         cancel: &mut dyn Cancel,
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
         let limit = tile.extent();
-        for outline in self.outlines(tile, None) {
+        for outline in self.outlines(tile, listed) {
             cancel.check()?;
             let Some(outline) = outline.filter(Outline::has_extent) else { continue };
             let mut outcome = Ok(());
@@ -467,6 +469,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         &self,
         tile: Rectangle,
         no_small_faces: bool,
+        listed: Option<&Listed<'_>>,
         mut scratch: Scratch<'_>,
         cancel: &mut dyn Cancel,
         sink: &mut dyn StretchSink<N>,
@@ -479,10 +482,10 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             (!outline.is_bar() && is_large && bounds.meets(tile) && outline.has_extent())
                 .then(|| (outline.first(), bounds))
         };
-        for one in self.outlines(tile, None).map(large) {
+        for one in self.outlines(tile, listed).map(large) {
             cancel.check()?;
             let Some((one, bounds)) = one else { continue };
-            for other in self.outlines(tile, None).map(large) {
+            for other in self.outlines(tile, listed).map(large) {
                 cancel.check()?;
                 let Some((other, others)) = other else { continue };
                 let both = bounds.intersection(others).filter(|_| one < other);
@@ -494,7 +497,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         Ok(())
     }
 
-    /// Follows the seams of two faces, which begin at these corners, one by one.
+    /// Follows the seams of two faces, which begin at these corners in ascending order, one by one.
     fn follow_pair<N: Index>(
         &self,
         firsts: [usize; 2],
@@ -525,7 +528,9 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         mut scratch: Scratch<'_>,
         cancel: &mut dyn Cancel,
     ) -> Result<Option<[Vertex; 2]>, VisibilityError> {
-        let loaded = self.load(Reach::Pair(firsts), None, &mut scratch, cancel)?;
+        let numbers = firsts.map_each(|first| first as u32);
+        let both = Listed { firsts: &numbers, near: Rectangle::ALL };
+        let loaded = self.load(Reach::Pair(firsts), Some(&both), &mut scratch, cancel)?;
         let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
             return Ok(None);
         };
