@@ -132,8 +132,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     /// Loads a part of the model. `listed` may spare a pass over the model.
     ///
     /// # Errors
-    /// [`VisibilityError::Scratch`] or [`VisibilityError::TooManyCorners`] if the part is too large,
-    /// [`VisibilityError::Aborted`].
+    /// [`VisibilityError::Scratch`] or [`VisibilityError::TooManyCorners`] if the part is too
+    /// large, [`VisibilityError::Aborted`].
     pub(super) fn load<'a>(
         &self,
         reach: Reach,
@@ -247,7 +247,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     /// `is_fast` the part is refused if the search would have too little memory to be fast.
     ///
     /// # Errors
-    /// See [`VisibilityError`]. If it is [`VisibilityError::Scratch`], nothing has been handed over.
+    /// See [`VisibilityError`]. If it is [`VisibilityError::Scratch`], nothing has been handed
+    /// over.
     pub(super) fn search<N: Index>(
         &self,
         loaded: &Loaded<'_>,

@@ -18,32 +18,33 @@
 //!
 //! # Memory
 //! A sixteenth of the memory at most is the index of the blocks; another KiB counts the elements on
-//! each part of the page. A small scene takes 8 bytes for each element, 32 for each vertex (20 if no
-//! positions are known), 2 for each corner, and what the search takes. The fewest elements for which
-//! there must be room are those that meet a single edge.
+//! each part of the page. A small scene takes 8 bytes for each element, 32 for each vertex (20 if
+//! no positions are known), 2 for each corner, and what the search takes. The fewest elements for
+//! which there must be room are those that meet a single edge.
 //!
 //! # Limits
 //! Refused are an edge that meets more elements than fit into the memory, and a point at which more
 //! elements meet.
 
+mod alone;
 mod blocks;
 mod load;
+mod needs;
 mod outline;
 mod owner;
 mod page;
 mod source;
 
-use crate::array::MapEach;
 use crate::geometry::{Precision, Projection, Vertex};
 use crate::index::Index;
 use crate::model::{Corner, Position};
 use crate::stage::{Cancel, Scratch};
-use crate::visibility::{Options, SinkFull, Stretch, StretchSink, VisibilityError, YieldCounter};
+use crate::visibility::{Options, StretchSink, VisibilityError, YieldCounter};
 use blocks::Blocks;
 use load::Reach;
 use outline::Outline;
-use owner::{OfTile, OneEdge, OneSeam};
-use page::{GridPoint, Rectangle, Tile};
+use owner::OfTile;
+use page::{Rectangle, Tile};
 
 pub use page::Survey;
 pub use source::Projected;
@@ -140,57 +141,6 @@ struct Listed<'a> {
     firsts: &'a [u32],
     /// The rectangle.
     near: Rectangle,
-}
-
-/// What the edges and seams of a tile need.
-#[derive(Debug, Clone, Copy)]
-struct Needs {
-    /// The rectangle around all of them, [`Rectangle::NONE`] if there are none.
-    all: Rectangle,
-    /// The rectangle around those that are not longer than the tile.
-    short: Rectangle,
-    /// The number of sides of elements that are longer.
-    long_sides: usize,
-    /// The number of pairs of faces that are both larger, if seams are drawn.
-    large_pairs: usize,
-    /// The number of elements on the tile.
-    elements: usize,
-}
-
-/// Counts the pairs of faces whose rectangles have the lower left corner of their intersection on a
-/// tile.
-///
-/// All faces that are counted meet the tile. The corner lies on the tile unless both faces begin to
-/// the left of it or both begin below it.
-#[derive(Debug, Clone, Copy, Default)]
-struct Pairs {
-    /// The number of faces.
-    all: usize,
-    /// The number of those that begin to the left of the tile.
-    from_left: usize,
-    /// The number of those that begin below it.
-    from_below: usize,
-    /// The number of those that do both.
-    from_both: usize,
-}
-
-impl Pairs {
-    /// Counts a face.
-    fn add(&mut self, face: Rectangle, tile: Rectangle) {
-        let from_left = face.low.x < tile.low.x;
-        let from_below = face.low.y < tile.low.y;
-        self.all += 1;
-        self.from_left += usize::from(from_left);
-        self.from_below += usize::from(from_below);
-        self.from_both += usize::from(from_left && from_below);
-    }
-
-    /// Returns the number of pairs.
-    fn count(&self) -> usize {
-        let pairs = |faces: usize| faces.saturating_mul(faces.saturating_sub(1)) / 2;
-        let beside = pairs(self.from_left) + pairs(self.from_below) - pairs(self.from_both);
-        pairs(self.all) - beside
-    }
 }
 
 impl<'t, S: ModelSource> Tiles<'t, S> {
@@ -355,197 +305,6 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             self.follow_large_pairs(rectangle, no_small_faces, listed, scratch, cancel, sink)?;
         }
         Ok(true)
-    }
-
-    /// Finds out what the edges and seams of a tile need.
-    fn needs(
-        &self,
-        tile: Rectangle,
-        no_small_faces: bool,
-        listed: Option<&Listed<'_>>,
-        cancel: &mut dyn Cancel,
-    ) -> Result<Needs, VisibilityError> {
-        let none = Rectangle::NONE;
-        let mut needs =
-            Needs { all: none, short: none, long_sides: 0, large_pairs: 0, elements: 0 };
-        let (mut faces, mut large_faces) = (Pairs::default(), Pairs::default());
-        let (mut of_faces, mut of_small_faces) = (none, none);
-        let limit = tile.extent();
-        let beyond = Rectangle { high: Rectangle::ALL.high, ..tile };
-        let yield_counter = &mut YieldCounter::new(cancel);
-        for outline in self.outlines(tile, listed) {
-            yield_counter.spend(LOOK)?;
-            let Some(outline) = outline else { continue };
-            yield_counter.spend(PLACE)?;
-            let mut around = none;
-            outline.each_side(&self.sight, &self.survey, &mut |_, [a, b]| {
-                let side = Rectangle::around(a, b);
-                around = around.union(side);
-                if !tile.holds(side.low) {
-                    return;
-                }
-                needs.all = needs.all.union(side);
-                if side.is_within(limit) {
-                    needs.short = needs.short.union(side);
-                } else {
-                    needs.long_sides += 1;
-                }
-            });
-            if !around.meets(tile) {
-                continue;
-            }
-            needs.elements += 1;
-            if !self.options.with_seams || outline.is_bar() {
-                continue;
-            }
-            let Some(part) = around.intersection(beyond) else { continue };
-            faces.add(around, tile);
-            of_faces = of_faces.union(part);
-            if around.is_within(limit) && !no_small_faces {
-                of_small_faces = of_small_faces.union(part);
-            } else {
-                large_faces.add(around, tile);
-            }
-        }
-        needs.large_pairs = large_faces.count();
-        if faces.count() > 0 {
-            needs.all = needs.all.union(of_faces);
-        }
-        if faces.count() > needs.large_pairs {
-            needs.short = needs.short.union(of_small_faces);
-        }
-        Ok(needs)
-    }
-
-    /// Follows the edges of a tile that are longer than the tile, one by one.
-    fn follow_long_edges<N: Index>(
-        &self,
-        tile: Rectangle,
-        listed: Option<&Listed<'_>>,
-        mut scratch: Scratch<'_>,
-        cancel: &mut dyn Cancel,
-        sink: &mut dyn StretchSink<N>,
-    ) -> Result<(), VisibilityError> {
-        let limit = tile.extent();
-        for outline in self.outlines(tile, listed) {
-            cancel.check()?;
-            let Some(outline) = outline.filter(Outline::has_extent) else { continue };
-            let mut outcome = Ok(());
-            outline.each_side(&self.sight, &self.survey, &mut |number, ends| {
-                let side = Rectangle::around(ends[0], ends[1]);
-                if outcome.is_ok() && tile.holds(side.low) && !side.is_within(limit) {
-                    let side = (outline.first(), number);
-                    outcome = self.follow_edge(side, ends, scratch.reborrow(), cancel, sink);
-                }
-            });
-            outcome?;
-        }
-        Ok(())
-    }
-
-    /// Follows the edge of one side of an element, which is given by its first corner and the
-    /// number of the side, if it is the first side along that edge.
-    fn follow_edge<N: Index>(
-        &self,
-        (first, number): (usize, usize),
-        ends: [GridPoint; 2],
-        mut scratch: Scratch<'_>,
-        cancel: &mut dyn Cancel,
-        sink: &mut dyn StretchSink<N>,
-    ) -> Result<(), VisibilityError> {
-        let reach = Reach::Segment(ends, self.doubt());
-        let loaded = self.load(reach, None, &mut scratch, cancel)?;
-        let Some(here) = loaded.find(first) else { return Ok(()) };
-        let Some(pair) = loaded.side(here, number) else { return Ok(()) };
-        // All elements with this edge are loaded.
-        if !loaded.is_first_side(here + number, pair) || loaded.is_cut(pair, self.sight.near) {
-            return Ok(());
-        }
-        self.search(&loaded, &mut OneEdge(pair), false, scratch, cancel, sink)
-    }
-
-    /// Follows the seams of a tile whose faces are both larger than the tile, one by one.
-    fn follow_large_pairs<N: Index>(
-        &self,
-        tile: Rectangle,
-        no_small_faces: bool,
-        listed: Option<&Listed<'_>>,
-        mut scratch: Scratch<'_>,
-        cancel: &mut dyn Cancel,
-        sink: &mut dyn StretchSink<N>,
-    ) -> Result<(), VisibilityError> {
-        let limit = tile.extent();
-        let large = |outline: Option<Outline<'t, S>>| {
-            let outline = outline?;
-            let bounds = outline.bounds(&self.sight, &self.survey)?;
-            let is_large = no_small_faces || !bounds.is_within(limit);
-            (!outline.is_bar() && is_large && bounds.meets(tile) && outline.has_extent())
-                .then(|| (outline.first(), bounds))
-        };
-        for one in self.outlines(tile, listed).map(large) {
-            cancel.check()?;
-            let Some((one, bounds)) = one else { continue };
-            for other in self.outlines(tile, listed).map(large) {
-                cancel.check()?;
-                let Some((other, others)) = other else { continue };
-                let both = bounds.intersection(others).filter(|_| one < other);
-                if both.is_some_and(|both| tile.holds(both.low)) {
-                    self.follow_pair([one, other], scratch.reborrow(), cancel, sink)?;
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Follows the seams of two faces, which begin at these corners in ascending order, one by one.
-    fn follow_pair<N: Index>(
-        &self,
-        firsts: [usize; 2],
-        mut scratch: Scratch<'_>,
-        cancel: &mut dyn Cancel,
-        sink: &mut dyn StretchSink<N>,
-    ) -> Result<(), VisibilityError> {
-        for number in 0.. {
-            let Some(ends) = self.seam(firsts, number, scratch.reborrow(), cancel)? else { break };
-            let ends = ends.map_each(|end| self.survey.point(self.sight.projection, end));
-            let mut scratch = scratch.reborrow();
-            let loaded =
-                self.load(Reach::Segment(ends, self.doubt()), None, &mut scratch, cancel)?;
-            let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
-                continue;
-            };
-            let mut owner = OneSeam::new([one, other], number, true);
-            self.search(&loaded, &mut owner, false, scratch, cancel, sink)?;
-        }
-        Ok(())
-    }
-
-    /// Returns the ends of the seam with this number of two faces. `None` if they have fewer.
-    fn seam(
-        &self,
-        firsts: [usize; 2],
-        number: usize,
-        mut scratch: Scratch<'_>,
-        cancel: &mut dyn Cancel,
-    ) -> Result<Option<[Vertex; 2]>, VisibilityError> {
-        let numbers = firsts.map_each(|first| first as u32);
-        let both = Listed { firsts: &numbers, near: Rectangle::ALL };
-        let loaded = self.load(Reach::Pair(firsts), Some(&both), &mut scratch, cancel)?;
-        let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
-            return Ok(None);
-        };
-        let mut owner = OneSeam::new([one, other], number, false);
-        self.search::<u16>(&loaded, &mut owner, false, scratch, cancel, &mut Nowhere)?;
-        Ok(owner.ends)
-    }
-}
-
-/// Receives no stretch, because none is followed.
-struct Nowhere;
-
-impl StretchSink<u16> for Nowhere {
-    fn stretch(&mut self, _: Stretch<u16>) -> Result<(), SinkFull> {
-        Ok(())
     }
 }
 

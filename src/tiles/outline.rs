@@ -78,8 +78,8 @@ impl<'s, S: ModelSource> Outline<'s, S> {
         }
     }
 
-    /// Whether the rectangle around the outline may meet a window. It takes a third of the time that
-    /// [`Outline::bounds`] takes.
+    /// Whether the rectangle around the outline may meet a window. It takes a third of the time
+    /// that [`Outline::bounds`] takes.
     pub fn may_meet(&self, sight: &Sight, window: &Window) -> bool {
         let mut beyond = u32::MAX;
         for corner in self.first..self.end {
