@@ -54,6 +54,8 @@ pub mod curve;
 pub mod model;
 pub mod view;
 pub mod visibility;
+#[cfg(feature = "tiles")]
+pub mod tiles;
 pub mod convex;
 pub mod drawing;
 pub mod order;

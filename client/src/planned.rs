@@ -9,6 +9,7 @@ use penup::machine::{Contacts, EventRing, PulserState, Setting, Settings};
 use penup::motion::{EventKind, EventQueue, StepEvent, StepTrain, TICKS_PER_SECOND};
 use penup::plotter::{Board, NotStored, Record, Replies, Stored};
 use penup::protocol::RealTime;
+use penup::storage::Noted;
 use penup_job::path::Run;
 use penup_job::watch::PenPath;
 
@@ -117,7 +118,11 @@ impl Board for PlannedBoard {
         self.board.note_progress(strokes)
     }
 
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, u32)> {
+    fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
+        self.board.note_point(points)
+    }
+
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         self.board.progress(notes)
     }
 

@@ -43,7 +43,7 @@ pub fn project_scene<'a, I: Index>(
     scratch: &mut Scratch<'a>,
     cancel: &mut dyn Cancel,
 ) -> Result<Seen<'a, I>, StageError> {
-    let (elements, degenerate_faces) = weld(model, scratch, cancel)?;
+    let (elements, degenerate_faces) = weld(model.vertices(), model.elements(), scratch, cancel)?;
     let (vertices, elements) = match curves {
         Some(curves) => curves.add(view, model, elements, scratch, cancel)?,
         None => {
@@ -91,7 +91,7 @@ pub fn distinct_edges<'a, I: Index>(
 
 /// Cuts off what is nearer than `near`: returns the vertices, with those of the cuts after them,
 /// and the elements that are left.
-fn cut<'a, I: Index>(
+pub(crate) fn cut<'a, I: Index>(
     vertices: &[Vertex],
     elements: Elements<'_, I>,
     near: i32,
@@ -210,17 +210,15 @@ fn without_repeats<T: Copy + PartialEq>(sorted: &mut [T]) -> &[T] {
 }
 
 /// Returns the point where the edge from `p` to `q`, one end of which is nearer than `near`, meets
-/// the near plane.
-fn on_plane(p: Vertex, q: Vertex, near: i32) -> Vertex {
-    let depth = i64::from(q.z) - i64::from(p.z); // not zero
+/// the near plane. It is the same in both directions.
+pub(crate) fn on_plane(p: Vertex, q: Vertex, near: i32) -> Vertex {
+    let (p, q) = if p.z < q.z { (p, q) } else { (q, p) };
+    let depth = i64::from(q.z) - i64::from(p.z); // above zero
     let part = i64::from(near) - i64::from(p.z);
     // Differences of coordinates are within 2^20, so products are below 2^41.
     let between = |p: i32, q: i32| {
         let rise = (i64::from(q) - i64::from(p)) * part;
-        p + crate::fixed::divide_rounding(
-            i128::from(rise * depth.signum()),
-            i128::from(depth.abs()),
-        ) as i32
+        p + crate::fixed::divide_rounding(i128::from(rise), i128::from(depth)) as i32
     };
     Vertex { x: between(p.x, q.x), y: between(p.y, q.y), z: near }
 }

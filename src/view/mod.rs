@@ -21,6 +21,11 @@ mod weld;
 pub use camera::{Camera, Direction, Lens, Pose, SightLines};
 pub use clip::{Seen, distinct_edges, project_scene};
 pub use curves::Flattening;
+#[cfg(feature = "tiles")]
+pub(crate) use {
+    clip::{cut, on_plane},
+    weld::{spans_area, weld},
+};
 
 use crate::array::MapEach;
 use crate::fixed::square_root;

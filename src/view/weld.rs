@@ -3,23 +3,22 @@
 
 use crate::array::MapEach;
 use crate::index::Index;
-use crate::model::{Corner, Element, Elements, Model, PenWriter, Position};
+use crate::model::{Corner, Element, Elements, PenWriter, Position};
 use crate::stage::{Cancel, OutOfScratch, Scratch, StageError};
 
-/// Returns the elements of the model with each vertex replaced by the first one at the same
+/// Returns the elements of a model with each vertex replaced by the first one at the same
 /// position and without the faces that have no area, and the number of these faces. Returns the
 /// model's own elements if there is nothing to do. A remaining face may then have the same corner
 /// twice in a row; visibility can process that.
 ///
 /// If there is something to do, it takes 2 bytes of memory for each corner and 4 for each change of
 /// the pen. While it runs it takes 4 to 8 more bytes for each vertex.
-pub(super) fn weld<'a, I: Index>(
-    model: &'a Model<'_, I>,
+pub(crate) fn weld<'a, I: Index>(
+    positions: &'a [Position],
+    elements: Elements<'a, I>,
     scratch: &mut Scratch<'a>,
     cancel: &mut dyn Cancel,
 ) -> Result<(Elements<'a, I>, u32), StageError> {
-    let positions = model.vertices();
-    let elements = model.elements();
     let degenerate = elements.iter().filter(|element| !has_extent(element, positions)).count();
     cancel.check()?;
     if degenerate == 0 && PositionTable::<I>::new(positions, &mut scratch.reborrow())?.1 == 0 {
@@ -57,9 +56,15 @@ pub(super) fn weld<'a, I: Index>(
 /// Whether an element is a bar or a face with an area.
 fn has_extent<I: Index>(element: &Element<'_, I>, positions: &[Position]) -> bool {
     let Element::Face(corners) = element else { return true };
-    let mut sides = corners.iter().filter_map(|corner| {
-        let [from, to] = [corners.first()?, corner].map_each(|c| positions.get(c.vertex().get()));
-        let [from, to] = [from?.coordinates(), to?.coordinates()];
+    let mut corners = corners.iter().filter_map(|c| positions.get(c.vertex().get()).copied());
+    corners.next().is_some_and(|start| spans_area(start, corners))
+}
+
+/// Whether a face that begins at `start` and goes on through `others` has an area.
+pub(crate) fn spans_area(start: Position, others: impl Iterator<Item = Position>) -> bool {
+    let from = start.coordinates();
+    let mut sides = others.filter_map(|position| {
+        let to = position.coordinates();
         let side = [0, 1, 2].map_each(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
         (side != [0; 3]).then_some(side)
     });
@@ -136,7 +141,7 @@ fn hash(position: &Position) -> u32 {
 mod tests {
     use super::*;
     use crate::fixed::Decimal;
-    use crate::model::no_undo;
+    use crate::model::{Model, no_undo};
     use crate::stage::NeverCancel;
     use std::vec::Vec;
 
@@ -158,7 +163,13 @@ mod tests {
             }
         }
         let mut words = [0; 64];
-        let (elements, _) = weld(&model, &mut Scratch::new(&mut words), &mut NeverCancel).unwrap();
+        let (elements, _) = weld(
+            model.vertices(),
+            model.elements(),
+            &mut Scratch::new(&mut words),
+            &mut NeverCancel,
+        )
+        .unwrap();
         elements.corners().iter().map(|c| (c.vertex(), c.of_bar(), c.is_last())).collect()
     }
 
@@ -197,11 +208,15 @@ mod tests {
         model.add_face([1, 2, 3].into_iter(), &mut no_undo).unwrap();
         let mut words = [0; 2];
         let mut scratch = Scratch::new(&mut words);
-        let (elements, degenerate) = weld(&model, &mut scratch, &mut NeverCancel).unwrap();
+        let (elements, degenerate) =
+            weld(model.vertices(), model.elements(), &mut scratch, &mut NeverCancel).unwrap();
         assert_eq!(degenerate, 0);
         assert!(core::ptr::eq(elements.corners(), model.elements().corners()));
         assert_eq!(scratch.available_bytes(), 16);
-        assert!(weld(&model, &mut Scratch::new(&mut [0]), &mut NeverCancel).is_err());
+        assert!(
+            weld(model.vertices(), model.elements(), &mut Scratch::new(&mut [0]), &mut NeverCancel)
+                .is_err()
+        );
     }
 
     #[test]

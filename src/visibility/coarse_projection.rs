@@ -163,6 +163,10 @@ impl Mapping {
             high = (high.0.max(x), high.1.max(y));
             yield_counter.spend(TWO_DIVISIONS)?;
         }
+        // The rounded ends of a seam may lie beside all vertices. On a whole page that does not
+        // matter; on a small part of it, it may be many points of the coarse grid.
+        #[cfg(feature = "tiles")]
+        let (low, high) = with_margin(projection, vertices, low, high);
         let shift_for = |low: i64, high: i64| {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(COARSE_BITS)
@@ -182,6 +186,32 @@ impl Mapping {
             y: coarse(y, self.low.1, self.shift.1),
         }
     }
+}
+
+/// Returns the rectangle around all vertices on the page, and around all points whose view
+/// coordinates are rounded from between theirs.
+#[cfg(feature = "tiles")]
+fn with_margin(
+    projection: Projection,
+    vertices: &[Vertex],
+    low: (i64, i64),
+    high: (i64, i64),
+) -> ((i64, i64), (i64, i64)) {
+    let nearest = vertices.iter().map(|vertex| vertex.z).min();
+    let (Projection::Perspective, Some(nearest @ 1..)) = (projection, nearest) else {
+        return (low, high);
+    };
+    // In a parallel view, rounding stays between. Here x and z change by up to half a unit.
+    let parts = [low.0, low.1, high.0, high.1].map(i64::unsigned_abs);
+    let farthest = parts.into_iter().max().unwrap_or(0);
+    let margin = (((1 << 20) + farthest) >> 1) as i64 / i64::from(nearest) + 1;
+    ((low.0 - margin, low.1 - margin), (high.0 + margin, high.1 + margin))
+}
+
+/// Projects a vertex onto the page: x and y in units of 2^-20, rounded down.
+#[cfg(feature = "tiles")]
+pub(crate) fn page_position(projection: Projection, vertex: Vertex) -> [i64; 2] {
+    fine(projection, vertex).into()
 }
 
 /// Projects a vertex onto the page, in units of 2^-20, rounded down.
@@ -344,9 +374,9 @@ mod tests {
     #[test]
     fn places_fill_the_grid_and_keep_the_order() -> Result<(), VisibilityError> {
         let vertices = [
-            Vertex::new(-1 << 19, 0, 1),
+            Vertex::new(-1 << 19, 0, 1 << 10),
             Vertex::new(1 << 19, 3, 1 << 19),
-            Vertex::new(1 << 19, 4, 1),
+            Vertex::new(1 << 19, 4, 1 << 10),
         ];
         for projection in [Projection::Perspective, Projection::Parallel] {
             let mut words = [0u64; 4];
@@ -356,7 +386,8 @@ mod tests {
             let coarse_projection =
                 CoarseProjection::new(&scene(projection, &vertices), &mut scratch, yield_counter)?;
             let xs: [u16; 3] = [0u16, 1, 2].map(|n| coarse_projection.position(n).x);
-            assert!(xs[0] == 0 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
+            // The ends of a seam may lie a little beside the vertices.
+            assert!(xs[0] <= 2 && xs[0] < xs[1] && xs[1] <= xs[2], "{xs:?}");
             assert!(xs[2] >= 1 << (COARSE_BITS - 1) && xs[2] < 1 << COARSE_BITS);
         }
         Ok(())

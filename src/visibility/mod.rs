@@ -56,6 +56,8 @@ mod edges;
 mod face_set;
 mod faces;
 mod grid;
+#[cfg(feature = "tiles")]
+mod owned;
 mod coarse_projection;
 mod yield_counter;
 mod profile;
@@ -82,12 +84,19 @@ use grid::Grid;
 use scene_index::SceneIndex;
 use search::{Marks, StretchFinder};
 use triangles::Ears;
+#[cfg(not(feature = "tiles"))]
 use yield_counter::YieldCounter;
 
 pub use crate::geometry::EdgeParameter;
 pub use crease::Crease;
 pub use unrounded::Unrounded;
 pub use wire::follow_wire;
+#[cfg(feature = "tiles")]
+pub(crate) use {
+    coarse_projection::page_position,
+    owned::{Ownership, find_owned_stretches},
+    yield_counter::YieldCounter,
+};
 
 /// A scene as the camera sees it: rounded vertices, and the faces and bars between them.
 #[derive(Debug, Clone, Copy)]

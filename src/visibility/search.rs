@@ -11,6 +11,8 @@ use super::edge_query::EdgeQuery;
 use super::edges::sides;
 use super::face_set::FaceSet;
 use super::grid::{Grid, coarse_depth};
+#[cfg(feature = "tiles")]
+use super::owned::Ownership;
 use super::profile::{EdgeInterval, FEWEST_PIECES, Profile, ProfilePiece, mark};
 use super::raster::Bounds;
 use super::scene_index::SceneIndex;
@@ -18,7 +20,7 @@ use super::seams::seam;
 use super::yield_counter::YieldCounter;
 use super::{Options, Stretch, StretchSink, VisibilityError};
 use crate::array::MapEach;
-use crate::geometry::{COORDINATE_LIMIT, EdgeParameter};
+use crate::geometry::{COORDINATE_LIMIT, EdgeParameter, Vertex};
 use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
 use core::ops::Range;
@@ -83,6 +85,9 @@ pub struct StretchFinder<'s, I: Index> {
     marks: Marks<'s, I>,
     /// Which kinds of stretches the user wants to see.
     options: Options,
+    /// Which edges and seams are followed; all of them with `None`.
+    #[cfg(feature = "tiles")]
+    owner: Option<&'s mut dyn Ownership<I>>,
 }
 
 impl<'s, I: Index> StretchFinder<'s, I> {
@@ -99,7 +104,51 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         marks: Marks<'s, I>,
         options: Options,
     ) -> Self {
-        Self { around, grid, marks, options }
+        Self {
+            around,
+            grid,
+            marks,
+            options,
+            #[cfg(feature = "tiles")]
+            owner: None,
+        }
+    }
+
+    /// Follows only the edges and seams that `owner` says are its own.
+    #[cfg(feature = "tiles")]
+    pub fn owned_by(self, owner: &'s mut dyn Ownership<I>) -> Self {
+        Self { owner: Some(owner), ..self }
+    }
+
+    /// Whether to follow the edge between two vertices.
+    #[inline(always)] // Without owners it is nothing.
+    fn owns_edge(&mut self, _ends: [I; 2]) -> bool {
+        #[cfg(feature = "tiles")]
+        return self.owner.as_mut().is_none_or(|owner| owner.owns_edge(_ends));
+        #[cfg(not(feature = "tiles"))]
+        true
+    }
+
+    /// Whether to look for the seams of the elements with two ranks.
+    #[inline(always)] // Without owners it is nothing.
+    fn owns_pair(&mut self, _ranks: [usize; 2]) -> bool {
+        #[cfg(feature = "tiles")]
+        {
+            let faces = &self.around.faces;
+            let owner = self.owner.as_mut();
+            owner.is_none_or(|owner| owner.owns_pair(_ranks.map_each(|rank| faces.get(rank).first)))
+        }
+        #[cfg(not(feature = "tiles"))]
+        true
+    }
+
+    /// Whether to follow the seam between two points.
+    #[inline(always)] // Without owners it is nothing.
+    fn owns_seam(&mut self, _ends: [Vertex; 2]) -> bool {
+        #[cfg(feature = "tiles")]
+        return self.owner.as_mut().is_none_or(|owner| owner.owns_seam(_ends));
+        #[cfg(not(feature = "tiles"))]
+        true
     }
 
     /// Finds the stretches of the edges of a range of elements, in the order of the model. The
@@ -116,7 +165,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         for (first, element) in self.around.outlines.elements_in(corners) {
             for (number, p, q) in sides(element) {
                 let side = first + number;
-                if self.around.chosen.contains(side) {
+                if self.around.chosen.contains(side) && self.owns_edge([p, q]) {
                     let coarse_projection = &self.around.coarse_projection;
                     let edge_query =
                         EdgeQuery::new(side, coarse_projection.end(p), coarse_projection.end(q));
@@ -148,7 +197,10 @@ impl<'s, I: Index> StretchFinder<'s, I> {
             let outcome = met.each(&mut |other| {
                 let may_pass =
                     plane.as_ref().is_none_or(|plane| self.around.is_on_both_sides(plane, other));
-                if may_pass && extent.meets(&self.around.extent(other)) {
+                if may_pass
+                    && extent.meets(&self.around.extent(other))
+                    && self.owns_pair([one, other])
+                {
                     self.follow_seams_of(one, other, yield_counter, sink)?;
                 }
                 yield_counter.spend(200).map_err(VisibilityError::from)
@@ -193,7 +245,9 @@ impl<'s, I: Index> StretchFinder<'s, I> {
                 });
                 let of_one = coarse_projection.heights(triangle_other, triangle_one);
                 let of_other = coarse_projection.heights(triangle_one, triangle_other);
-                if let Some((p, q)) = seam(corners_one, corners_other, of_one, of_other) {
+                if let Some((p, q)) = seam(corners_one, corners_other, of_one, of_other)
+                    && self.owns_seam([p, q])
+                {
                     let (p, q) = (coarse_projection.free_end(p), coarse_projection.free_end(q));
                     let edge_query = EdgeQuery::of_seam(triangles, p, q);
                     self.follow(&edge_query, [Some(one), Some(other)], yield_counter, sink)?;
@@ -290,7 +344,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         seam_of: [Option<usize>; 2],
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
-        let Self { around, grid, marks: Marks { seen, profile, .. }, options } = self;
+        let Self { around, grid, marks: Marks { seen, profile, .. }, options, .. } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(edge_query.near);
         let cells_along = grid.cells_along(edge_query.p.position, edge_query.q.position, near);

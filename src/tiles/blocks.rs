@@ -1,0 +1,137 @@
+//! A coarse index of the model: where on the page the elements of each stretch of corners lie.
+
+use super::outline::Outline;
+use super::page::{GridPoint, Rectangle, Survey};
+use super::{ModelSource, Sight};
+use crate::stage::{Cancel, Scratch};
+use crate::visibility::VisibilityError;
+use bytemuck::{Pod, Zeroable};
+
+/// The part of the working memory that the index takes at most is one in so many bytes.
+const SHARE: usize = 16;
+/// The fewest corners in a block: the index gains little from fewer.
+const FEWEST_CORNERS: usize = 24;
+
+/// The rectangle around all elements of a block, in units of 2^8 points of the grid.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Block {
+    /// The lower left corner.
+    low: [u8; 2],
+    /// The upper right corner; it lies to the left of the other if the block is empty.
+    high: [u8; 2],
+}
+
+impl Block {
+    /// Makes the smallest one that contains a rectangle.
+    fn around(bounds: Rectangle) -> Self {
+        let coarse = |point: GridPoint| [(point.x >> 8) as u8, (point.y >> 8) as u8];
+        Self { low: coarse(bounds.low), high: coarse(bounds.high) }
+    }
+
+    /// Whether it may meet another.
+    fn meets(self, other: Self) -> bool {
+        (0..2).all(|axis: usize| {
+            self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis]
+        })
+    }
+}
+
+/// The page is divided into so many rows and columns to count the elements on it.
+const DIVISIONS: u16 = 16;
+
+/// The index of a model.
+#[derive(Debug)]
+pub(super) struct Blocks<'t> {
+    /// The blocks, in the order of the model.
+    blocks: &'t [Block],
+    /// How many elements have their lower left corner in each part of the page, row by row.
+    counts: &'t [u32],
+    /// The number of corners of a block. An element belongs to the block in which it begins.
+    length: usize,
+}
+
+impl<'t> Blocks<'t> {
+    /// Goes through the model and makes the index.
+    ///
+    /// # Errors
+    /// [`VisibilityError::Scratch`] or [`VisibilityError::Aborted`].
+    pub fn new<S: ModelSource>(
+        source: &S,
+        sight: &Sight,
+        survey: &Survey,
+        scratch: &mut Scratch<'t>,
+        cancel: &mut dyn Cancel,
+    ) -> Result<Self, VisibilityError> {
+        let corners = source.corner_count();
+        let most = (scratch.available_bytes() / (SHARE * size_of::<Block>())).max(1);
+        let length = corners.div_ceil(most).max(FEWEST_CORNERS);
+        let blocks: &mut [Block] = scratch.take(corners.div_ceil(length))?;
+        let counts: &mut [u32] = scratch.take(usize::from(DIVISIONS * DIVISIONS))?;
+        let mut first = 0;
+        for (number, block) in blocks.iter_mut().enumerate() {
+            let mut all = Rectangle::NONE;
+            while first < corners.min((number + 1) * length) {
+                cancel.check()?;
+                let outline = Outline::at(source, first);
+                first = outline.end();
+                let Some(bounds) = outline.bounds(sight, survey) else { continue };
+                all = all.union(bounds);
+                if let Some(count) = counts.get_mut(part_of(bounds.low)) {
+                    *count += 1;
+                }
+            }
+            *block = Block::around(all);
+        }
+        Ok(Self { blocks, counts, length })
+    }
+
+    /// Returns a number of elements that have their lower left corner in a rectangle. There may be
+    /// more if the rectangle is small.
+    pub fn count_at_least(&self, rectangle: Rectangle) -> usize {
+        let size = u16::MAX / DIVISIONS + 1;
+        let Rectangle { low, high } = rectangle;
+        let whole = |low: u16, high: u16| {
+            low.div_ceil(size)..high.checked_add(1).map_or(DIVISIONS, |end| end / size)
+        };
+        let rows = whole(low.y, high.y);
+        rows.flat_map(|row| {
+            whole(low.x, high.x).map(move |column| usize::from(row * DIVISIONS + column))
+        })
+        .filter_map(|part| self.counts.get(part))
+        .map(|&count| count as usize)
+        .sum()
+    }
+
+    /// Iterates over the elements of all blocks that may meet a rectangle.
+    pub fn outlines<'s, S: ModelSource>(
+        &self,
+        source: &'s S,
+        near: Rectangle,
+    ) -> impl Iterator<Item = Outline<'s, S>> {
+        let wanted = Block::around(near);
+        let is_near = move |(_, block): &(usize, &Block)| block.meets(wanted);
+        let length = self.length;
+        self.blocks.iter().enumerate().filter(is_near).flat_map(move |(number, _)| {
+            let end = source.corner_count().min((number + 1) * length);
+            let mut next = start_after(source, number * length);
+            core::iter::from_fn(move || {
+                let outline = (next < end).then(|| Outline::at(source, next))?;
+                next = outline.end();
+                Some(outline)
+            })
+        })
+    }
+}
+
+/// Returns the index of the count to which a point belongs.
+fn part_of(point: GridPoint) -> usize {
+    let size = u16::MAX / DIVISIONS + 1;
+    usize::from(point.y / size * DIVISIONS + point.x / size)
+}
+
+/// Returns where the first element begins at a corner or after it.
+fn start_after<S: ModelSource>(source: &S, corner: usize) -> usize {
+    let Some(before) = corner.checked_sub(1) else { return 0 };
+    Outline::at(source, before).end()
+}
