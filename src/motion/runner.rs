@@ -192,7 +192,7 @@ impl<'m> Runner<'m> {
             pen_is_down: pen.lift.is_none().then_some(false),
             pen_height: None,
             lift: Lift::default(),
-            timing: PenTiming::default(),
+            timing: PenTiming::new(),
             #[cfg(feature = "resume")]
             raised_at: 0,
             stopping: false,

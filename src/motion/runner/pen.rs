@@ -26,7 +26,7 @@ pub struct PenOverlap {
 }
 
 /// What the pen does beside the motion. Times are sixteenths of ticks.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct PenTiming {
     /// Until the pen, which was told to go up, is up.
     rising: u32,
@@ -46,6 +46,11 @@ struct Lowering {
 }
 
 impl PenTiming {
+    /// The pen does nothing beside the motion.
+    pub(super) const fn new() -> Self {
+        Self { rising: 0, until_lowered: None, lowering: None }
+    }
+
     /// So much time passes, which was planned.
     #[inline(always)]
     pub(super) fn pass(&mut self, time: u32) {
@@ -252,7 +257,7 @@ impl Runner<'_> {
 
     /// Forgets what the pen does, which somebody else has raised.
     pub(super) fn forget_timing(&mut self) {
-        self.timing = PenTiming::default();
+        self.timing = PenTiming::new();
     }
 
     /// Stands for so long, below 2^28.

@@ -5,10 +5,15 @@ use super::{Pace, Progress, Runner};
 use crate::motion::{EventQueue, StepEvent};
 
 /// The pen does nothing beside the motion.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct PenTiming;
 
 impl PenTiming {
+    /// The pen does nothing.
+    pub(super) const fn new() -> Self {
+        Self
+    }
+
     /// So much time passes.
     #[inline(always)]
     pub(super) const fn pass(&mut self, _: u32) {}
