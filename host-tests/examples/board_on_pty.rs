@@ -2,7 +2,9 @@
 //! use it, and judges what the pins ink. `cargo xtask senders` runs it.
 //!
 //! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is
-//! the name of the terminal. Then each line of the input is answered by one line: `forget` forgets
+//! the name of the terminal, which comes when the board has greeted: a program that opens the terminal
+//! meets a board that runs, however slowly it has started. The greeting can be read there. Then each
+//! line of the input is answered by one line: `forget` forgets
 //! the ink so far; `judge SLACK FILE` compares the ink since then with the lines of FILE, each of
 //! which is a polyline of points `x,y` in steps, and answers `same` or what differs; `heard` prints
 //! what the board has been sent since the last call, escaped. It ends with its input.
@@ -10,7 +12,7 @@
 use std::error::Error;
 use std::io::{BufRead as _, Read as _, Write as _};
 use std::sync::mpsc::{self, TryRecvError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use penup_client::emulator::{EmulatedBoard, Emulator, Options, Pico, PicoByUsb, image_path};
 use penup_host_tests::ink::{Ink, Segment, difference};
@@ -27,6 +29,23 @@ fn boot(board: &str) -> Result<Box<dyn EmulatedBoard>, Box<dyn Error>> {
         }
         other => return Err(format!("no board {other}").into()),
     })
+}
+
+/// How long a board may take to greet.
+const BOOT_LIMIT: Duration = Duration::from_secs(60);
+
+/// Waits until the board has greeted, and returns the greeting.
+fn greeting(board: &mut dyn EmulatedBoard) -> Result<Vec<u8>, Box<dyn Error>> {
+    let deadline = Instant::now() + BOOT_LIMIT;
+    let (mut heard, mut buffer) = (Vec::new(), [0; 256]);
+    while !(heard.starts_with(b"\r\nGrbl ") && heard.ends_with(b"]\r\n")) {
+        if Instant::now() > deadline {
+            return Err(format!("no greeting, but `{}`", heard.escape_ascii()).into());
+        }
+        let count = board.receive(&mut buffer, Duration::from_millis(10))?;
+        heard.extend_from_slice(buffer.get(..count).unwrap_or_default());
+    }
+    Ok(heard)
 }
 
 /// Reads the polylines of a file.
@@ -48,6 +67,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut board = boot(&name)?;
     let (mut wire, terminal) = TTYPort::pair()?;
     wire.set_timeout(Duration::from_millis(1))?;
+    wire.write_all(&greeting(board.as_mut())?)?;
     println!("{}", terminal.name().ok_or("the terminal has no name")?);
     let (sender, orders) = mpsc::channel();
     std::thread::spawn(move || {

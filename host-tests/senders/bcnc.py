@@ -58,7 +58,11 @@ class Machine(Sender):
 machine = Machine()
 state = lambda: CNC.vars["state"]  # noqa: E731
 place = lambda: (CNC.vars["mx"], CNC.vars["my"])  # noqa: E731
-errors = lambda: [line for kind, line in machine.log_lines() if kind == Sender.MSG_ERROR]  # noqa: E731
+
+
+def errors():
+    return [line for kind, line in machine.log_lines() if kind == Sender.MSG_ERROR]
+
 
 checks.check("it opens the port", machine.open(board.port, 115200))
 checks.check("it is idle", wait_for(lambda: state() == "Idle"), state())

@@ -37,18 +37,18 @@ class Board:
         """Forgets the ink so far."""
         self.ask("forget")
 
-    def differs(self, polylines, rounding=0):
+    def differs(self, polylines):
         """What differs between the ink and polylines in millimetres; nothing if it is the same. The
         last moves may still be on their way when the machine says that it is idle.
 
         Both ends of a line are rounded to a step, and so is each point between them: together that
-        is at most 1.07 steps across it. `rounding` is how far the program has rounded, in steps."""
+        is at most 1.07 steps across it."""
         path = os.path.join(self.folder, "figure.txt")
         with open(path, "w") as file:
             for line in polylines:
                 file.write(" ".join(f"{x * STEPS},{y * STEPS}" for x, y in line) + "\n")
         for _ in range(20):
-            answer = self.ask(f"judge {rounding + 0.07} {path}")
+            answer = self.ask(f"judge 0.07 {path}")
             if answer == "same":
                 return ""
             time.sleep(0.5)
@@ -102,5 +102,6 @@ class Checks:
 
     def check(self, name, passes, said=""):
         reason = "" if passes else " " + re.sub(r"\s+", " ", str(said))[:300]
-        print(("pass " if passes else "fail ") + name + (": " + reason if reason else ""), flush=True)
+        result = "pass " if passes else "fail "
+        print(result + name + (": " + reason if reason else ""), flush=True)
         return bool(passes)

@@ -98,7 +98,8 @@ try:
     if not any(str(line).startswith("Grbl") for line in read):
         command("reset")
     version = lambda: settings[-1].get("version")  # noqa: E731
-    checks.check("it recognises Grbl 1.1", wait_for(lambda: str(version()).startswith("1.1")), version())
+    checks.check("it recognises Grbl 1.1", wait_for(lambda: str(version()).startswith("1.1")),
+                 version())
     found = lambda: settings[-1].get("settings", {})  # noqa: E731
     checks.check("$$ is read", wait_for(lambda: "$132" in found()), sorted(found()))
     send("$#")
@@ -120,7 +121,8 @@ try:
     checks.check("a jog moves", wait_for(lambda: place() == (20.0, 5.0)), place())
     wait_for(lambda: state() == "Idle")
     send("G10 L20 P1 X0 Y0")
-    checks.check("the work position is read", wait_for(lambda: place("wpos") == (0.0, 0.0)), place("wpos"))
+    checks.check("the work position is read", wait_for(lambda: place("wpos") == (0.0, 0.0)),
+                 place("wpos"))
     send("G10 L2 P1 X0 Y0")
     send("G92 X1 Y2")
     checks.check("G92 shifts it", wait_for(lambda: place("wpos") == (1.0, 2.0)), place("wpos"))
@@ -183,7 +185,8 @@ try:
     mark = len(read)
     command("gcode:stop", {"force": True})
     checks.check("a stop by force gives it up",
-                 wait_for(lambda: any(str(line).startswith("Grbl") for line in read[mark:])), read[mark:])
+                 wait_for(lambda: any(str(line).startswith("Grbl") for line in read[mark:])),
+                 read[mark:])
     checks.check("it is idle afterwards", wait_for(lambda: state() == "Idle"), state())
     checks.check("there is no alarm", not any("ALARM" in str(line) for line in read), read[mark:])
     send("G0 X7 Y8")
@@ -192,14 +195,15 @@ try:
     send("$J=X200 F150")
     wait_for(lambda: state() == "Jog")
     command("jogCancel")
-    checks.check("a jog is cancelled", wait_for(lambda: state() == "Idle") and place()[0] < 200, place())
+    checks.check("a jog is cancelled", wait_for(lambda: state() == "Idle") and place()[0] < 200,
+                 place())
     mark = len(read)
     send("G0 X1 X2")
     checks.check("an error has Grbl's number", wait_for(lambda: any("error:25" in line for line in
                  errors(mark))), errors(mark))
     command("homing")
-    checks.check("homing that is off is error:5", wait_for(lambda: any("error:5 " in line for line in
-                 errors(mark))), errors(mark))
+    checks.check("homing that is off is error:5",
+                 wait_for(lambda: any("error:5 " in line for line in errors(mark))), errors(mark))
     command("unlock")
     command("sleep")
     checks.check("it sleeps", wait_for(lambda: state() == "Sleep"), state())

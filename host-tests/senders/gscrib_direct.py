@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import os
+import select
 import threading
 import time
 
@@ -34,9 +35,20 @@ def attempt(name, action):
     return checks.check(name, not errors, errors)
 
 
-# The board has greeted before anybody opened the port, as one at a USB port does that does not
-# reset when it is opened.
-time.sleep(1)
+def greeting():
+    """What the port has for who opens it."""
+    file = os.open(board.port, os.O_RDWR | os.O_NOCTTY)
+    try:
+        return os.read(file, 256) if select.select([file], [], [], 0)[0] else b""
+    finally:
+        os.close(file)
+
+
+# The board has greeted before anybody opens the port, as one at a USB port does that does not reset
+# when it is opened. gscrib sends `G4 P0` at once and waits for the `ok`, or for a greeting. After a
+# greeting it sends nothing more, but still waits for an `ok` without end. So if it opened the port
+# while the board still started, the board would lose the line, and gscrib would stand still.
+checks.check("the board runs before the port is opened", b"Grbl " in greeting())
 machine = builder()
 attempt("it connects to a port that does not greet", lambda: machine.set_length_units("mm"))
 attempt("the distance mode is set", lambda: machine.set_distance_mode("absolute"))

@@ -3,15 +3,22 @@ board."""
 
 import importlib.metadata
 import os
+import re
 import subprocess
 import sys
 
 import serial
 
-from board import STEPS, Board, Checks, figure, wait_for
+from board import Board, Checks, figure, wait_for
 
 HEIGHT = 80
 """The height of the page in millimetres."""
+
+DIGIT = 0.0001
+"""The last digit that every profile writes."""
+INCH = 25.4
+SCALE = 25.4 * 0.0393701 - 1
+"""How much larger vpype reads a drawing: svgelements takes 0.0393701 inches for a millimetre."""
 
 PROFILES = {
     # Whether y counts downward, and the settings that the profile needs.
@@ -22,11 +29,35 @@ PROFILES = {
     "step_motor": (True, ["$208=1"]),
     "step_motor_relative": (True, ["$208=1"]),
 }
+FIGURE = figure()
 
-# The relative profiles round each line, so that a long stroke ends elsewhere than it should.
-FIGURE = figure(32)
-INCHES = 0.0001 * 25.4 * STEPS
-"""How far the profiles in inches round, in steps."""
+
+def shaped(points):
+    """Points as polylines with as many points as those of the figure have."""
+    points = iter(points)
+    return [[next(points) for _ in line] for line in FIGURE]
+
+
+def points_of(path):
+    """The points in millimetres to which the lines of a file go, and how far vpype may have rounded
+    each along an axis: by half its last digit, and by that much again in each relative line,
+    because it rounds the lines and not their sum."""
+    (x, y), unit, relative = (0, 0), 1, False
+    points, roundings = [], []
+    with open(path) as file:
+        for line in file:
+            words = re.findall("([A-Z])([-+.0-9]+)", re.sub(r"[(].*?[)]", "", line))
+            modes = [float(number) for letter, number in words if letter == "G"]
+            unit = INCH if 20 in modes else 1 if 21 in modes else unit
+            relative = 91 in modes or relative and 90 not in modes
+            to = {letter: float(number) * unit for letter, number in words}
+            if "X" in to:
+                x, y = (x + to["X"], y + to["Y"]) if relative else (to["X"], to["Y"])
+                points.append((x, y))
+                lines = len(points) if relative else 1
+                roundings.append(lines * DIGIT * unit / 2)
+    return points, roundings
+
 
 board, checks = Board(), Checks()
 checks.version(
@@ -80,9 +111,15 @@ for profile, (downward, settings) in PROFILES.items():
     wait_for(is_idle)
     refused = [answer for answer in answers if answer != "ok"]
     checks.check(f"{profile} is accepted", not refused, refused)
-    drawn = [[(x, y if downward else HEIGHT - y) for x, y in line] for line in FIGURE]
-    rounding = (len(FIGURE[1]) if "relative" in profile else 1) * INCHES / 2
-    difference = board.differs(drawn, rounding if profile.startswith("gcode") else 0)
-    checks.check(f"the ink of {profile} is the drawing", not difference, difference)
+    # The ink is judged by what vpype has written, so that its rounding excuses nothing of ours.
+    points, roundings = points_of(written)
+    drawn = [(x, y if downward else HEIGHT - y) for line in FIGURE for x, y in line]
+    beside = [max(abs(x - at_x), abs(y - at_y)) - max(at_x, at_y, HEIGHT) * SCALE - rounding
+              for (x, y), (at_x, at_y), rounding in zip(points, drawn, roundings)]
+    # What remains is the rounding of floating point, which lies far below a digit.
+    checks.check(f"{profile} writes the drawing",
+                 len(points) >= len(drawn) and max(beside) < DIGIT / 1000, beside)
+    difference = board.differs(shaped(points))
+    checks.check(f"the ink of {profile} is what it writes", not difference, difference)
 port.close()
 board.end()

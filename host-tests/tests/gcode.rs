@@ -84,6 +84,25 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     assert_eq!(position_of(&mut bench), "5.000,5.000");
 }
 
+/// A thousandth of an inch is no whole number of 2^-16 inches: rounded to these, each line would be
+/// off by 0.7 %, and one of a tenth of that by 7 %.
+#[test]
+fn relative_lines_in_inches_add_up() {
+    const LINES: u16 = 1000;
+    let mut bench = bench();
+    bench
+        .board
+        .receive(format!("G20 G91\n{}", "G0 X.001 Y.0001\n".repeat(LINES.into())).as_bytes());
+    bench.finish();
+    let (_, sum) = ink::inked(&bench);
+    // Each line is rounded to 2^-16 mm, and their sum to a step.
+    let rounding = f64::from(LINES) * 2f64.powi(-17) * 80.0 + 0.5;
+    for (steps, inches) in sum.into_iter().zip([1.0, 0.1]) {
+        let beside = f64::from(steps) - inches * 25.4 * 80.0;
+        assert!(beside.abs() <= rounding, "{beside} steps beside {inches} inches");
+    }
+}
+
 #[test]
 fn circles_are_round_on_the_page_whatever_the_steps() {
     for (x, y) in [(80.0, 50.0), (40.0, 120.0), (79.8, 80.3)] {

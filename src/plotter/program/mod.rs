@@ -433,9 +433,10 @@ impl Program {
 
     /// A length as given in the current unit, in millimetres.
     fn length(&self, number: Decimal) -> Result<Millimetres, CommandError> {
-        let bits = number.to_binary(16).map_err(|_| CommandError::NumberOutOfRange)?;
+        // An inch is 127/5 mm. Sixteen more bits leave only the rounding to 2^-16 mm.
+        let bits = number.to_binary_truncated(32).map_err(|_| CommandError::NumberOutOfRange)?;
         let bits = product(bits, if self.inches { 127 } else { 5 });
-        i32::try_from(divide_rounding(bits, 5))
+        i32::try_from(divide_rounding(bits, 5 << 16))
             .map(Millimetres::from_bits)
             .map_err(|_| CommandError::NumberOutOfRange)
     }
