@@ -174,7 +174,7 @@ impl Mapping {
             // Both x and z are off.
             Projection::Perspective => {
                 let farthest = high.0.max(-low.0).max(high.1.max(-low.1));
-                ((1 << 20) + farthest) / i64::from(nearest) + 1
+                ((1 << 20) + farthest) / i64::from(nearest.max(1)) + 1
             }
             Projection::Parallel => 1 << 20,
         };
