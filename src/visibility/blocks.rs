@@ -8,7 +8,10 @@
 //! nearest first) are recorded on the profile of the edge.
 //!
 //! The blocks touch in the model, but in the view each corner was rounded separately. Therefore the
-//! tests "in one plane" and "on one line" use the positions of the model.
+//! tests "in one plane" and "on one line" use the positions of the model. They leave room for the
+//! precision of the model, so which of several faces is the nearest may depend on the order in which
+//! they are asked. They are asked in the order of their ranks, and those that do not meet the edge
+//! within the error of both do not count, so the result does not depend on the grid of the search.
 
 use super::coarse_projection::CoarseProjection;
 use super::edge_query::{CrossedPolygon, EdgeQuery};
@@ -16,6 +19,7 @@ use super::faces::Face;
 use super::profile::{EdgeInterval, Profile};
 use super::scene_index::SceneIndex;
 use crate::array::MapEach;
+use crate::geometry::{COORDINATE_LIMIT, Vertex};
 use crate::index::Index;
 
 /// One of the two sides of an edge, and the bits of the profile's marks that hold the rank of the
@@ -89,6 +93,9 @@ impl<I: Index> EdgeQuery<I> {
             let Some(touching) = self.touching(&around.coarse_projection, triangle) else {
                 continue;
             };
+            if self.is_apart_from(&around.coarse_projection, triangle) {
+                continue;
+            }
             let piece = CrossedPolygon::new(&touching.corners, &touching.sides);
             for bank in [LEFT, RIGHT] {
                 let crossings =
@@ -97,7 +104,7 @@ impl<I: Index> EdgeQuery<I> {
                     self.passage(&around.coarse_projection, piece, crossings, touching.facing);
                 if let Some(passage) = passage {
                     let part: EdgeInterval = self.part(&around.coarse_projection, passage);
-                    profile.update(part, |marks| {
+                    profile.update(part, &|marks| {
                         let known = bank.get(marks);
                         if known.is_none_or(|known| self.is_nearer(around, &touching, known, bank))
                         {
@@ -109,6 +116,20 @@ impl<I: Index> EdgeQuery<I> {
                 }
             }
         }
+    }
+
+    /// Whether a triangle whose plane contains this edge certainly has no point in common with it,
+    /// within the errors of both. A side of such a triangle may be in line with the edge, far from
+    /// it; where rounding bends that line, the triangle would seem to lie beside the edge.
+    fn is_apart_from(&self, coarse_projection: &CoarseProjection<'_>, triangle: [I; 3]) -> bool {
+        let parts: [fn(Vertex) -> i32; 3] = [|at| at.x, |at| at.y, |at| at.z];
+        // With an error of the whole range nothing is apart.
+        let error = coarse_projection.unrounded.error_bound().min(2 * COORDINATE_LIMIT as u32);
+        parts.into_iter().any(|part| {
+            let (p, q) = (part(self.p.vertex), part(self.q.vertex));
+            let [a, b, c] = triangle.map_each(|number| part(coarse_projection.vertex(number)));
+            a.max(b).max(c) + (error as i32) < p.min(q) || a.min(b).min(c) - error as i32 > p.max(q)
+        })
     }
 
     /// Whether the faces recorded on both sides of a piece of this edge lie in one plane.

@@ -10,7 +10,8 @@ use super::yield_counter::YieldCounter;
 use super::{Unrounded, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::{
-    Axis, EdgeParameter, Projection, Vertex, page_offset, page_side, plane_side, plane_side_margin,
+    Axis, COORDINATE_LIMIT, EdgeParameter, Projection, Vertex, page_offset, page_side, plane_side,
+    plane_side_margin,
 };
 use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
@@ -148,6 +149,9 @@ struct Mapping {
     low: (i64, i64),
     /// The number of bits by which x and y are shifted right to give coarse coordinates.
     shift: (u32, u32),
+    /// How far a point may lie beside its true place on the page, in units of 2^-20, if its view
+    /// coordinates are off by one unit.
+    unit: i64,
 }
 
 impl Mapping {
@@ -158,11 +162,22 @@ impl Mapping {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, Aborted> {
         let (mut low, mut high) = ((i64::MAX, i64::MAX), (i64::MIN, i64::MIN));
-        for (x, y) in vertices.iter().map(|&vertex| fine(projection, vertex)) {
+        let mut nearest = COORDINATE_LIMIT;
+        for &vertex in vertices {
+            let (x, y) = fine(projection, vertex);
             low = (low.0.min(x), low.1.min(y));
             high = (high.0.max(x), high.1.max(y));
+            nearest = nearest.min(vertex.z);
             yield_counter.spend(TWO_DIVISIONS)?;
         }
+        let unit = match projection {
+            // Both x and z are off.
+            Projection::Perspective => {
+                let farthest = high.0.max(-low.0).max(high.1.max(-low.1));
+                ((1 << 20) + farthest) / i64::from(nearest.max(1)) + 1
+            }
+            Projection::Parallel => 1 << 20,
+        };
         // The rounded ends of a seam may lie beside all vertices. On a whole page that does not
         // matter; on a small part of it, it may be many points of the coarse grid.
         #[cfg(feature = "tiles")]
@@ -171,7 +186,16 @@ impl Mapping {
             let extent = high.saturating_sub(low).max(0);
             (64 - extent.leading_zeros()).saturating_sub(COARSE_BITS)
         };
-        Ok(Self { projection, low, shift: (shift_for(low.0, high.0), shift_for(low.1, high.1)) })
+        let shift = (shift_for(low.0, high.0), shift_for(low.1, high.1));
+        Ok(Self { projection, low, shift, unit })
+    }
+
+    /// Returns how far a point may lie beside its true place on the coarse grid if its view
+    /// coordinates are off by so many units.
+    fn doubt(&self, units: u32) -> i32 {
+        // The unit is below 2^41.
+        let fine = self.unit * i64::from(units.min(1 << 20));
+        (fine >> self.shift.0.min(self.shift.1)).min(1 << COARSE_BITS) as i32 + 1
     }
 
     /// Returns the point of the coarse grid for a vertex. A vertex outside the grid gets the
@@ -348,6 +372,12 @@ impl<'a> CoarseProjection<'a> {
     /// Returns [`Self::height`] over `triangle` for each corner of the triangle `of`.
     pub fn heights<I: Index>(&self, triangle: [I; 3], of: [I; 3]) -> [i64; 3] {
         of.map_each(|corner| self.height(triangle, self.end(corner)))
+    }
+
+    /// Returns how far on the coarse grid a face may lie beside an edge that it touches in the
+    /// model: by the errors of both.
+    pub fn doubt(&self) -> i32 {
+        self.mapping.doubt(self.unrounded.error_bound())
     }
 
     /// Returns an axis of the page along which p and q differ, and the sign of their difference.

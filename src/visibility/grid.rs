@@ -158,13 +158,23 @@ impl<'a, I: Index> Grid<'a, I> {
         }
     }
 
-    /// Returns the cells on the path of an edge from `p` to `q`. No point of the edge is nearer
-    /// than the coarse depth `near`.
-    pub fn cells_along(&self, p: CoarsePoint, q: CoarsePoint, near: u16) -> EdgeCells<'_, I> {
+    /// Returns the cells on the path of an edge from `p` to `q`, and those that are at most `margin`
+    /// units of the coarse grid beside it. No point of the edge is nearer than the coarse depth
+    /// `near`.
+    pub fn cells_along(
+        &self,
+        p: CoarsePoint,
+        q: CoarsePoint,
+        near: u16,
+        margin: i32,
+    ) -> EdgeCells<'_, I> {
+        // The rounded ends of a seam may lie beyond the last cell.
+        let [p, q] = [p, q].map_each(|at| at.low(self.shape.far));
         let (low, high) = if p.y <= q.y { (p, q) } else { (q, p) };
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
-        EdgeCells { grid: self, near, low, high, slope: if dy > 0 { (dx << 16) / dy } else { 0 } }
+        let slope = if dy > 0 { (dx << 16) / dy } else { 0 };
+        EdgeCells { grid: self, near, margin, low, high, slope }
     }
 }
 
@@ -175,6 +185,8 @@ pub struct EdgeCells<'g, I> {
     grid: &'g Grid<'g, I>,
     /// The coarse depth of the nearest point of the edge.
     near: u16,
+    /// How far beside the edge cells are visited, too, in units of the coarse grid.
+    margin: i32,
     /// The lower end of the edge, which is not above `high`.
     low: CoarsePoint,
     /// The upper end of the edge.
@@ -189,23 +201,25 @@ impl<'g, I: Index> EdgeCells<'g, I> {
     /// The edge lies less than one unit to the right of the line between the coarse points, and
     /// less than one unit above it.
     pub fn visit(&self, visit: &mut dyn FnMut(CellView<'g, I>) -> bool) -> bool {
-        let Shape { shift_x, shift_y, .. } = self.grid.shape;
+        let Shape { shift_x, shift_y, far } = self.grid.shape;
+        let margin = self.margin;
         let (low_x, low_y) = (i32::from(self.low.x), i32::from(self.low.y));
         let dy = i32::from(self.high.y) - low_y;
-        let left = i32::from(self.low.x.min(self.high.x));
-        let right = i32::from(self.low.x.max(self.high.x));
-        for row in self.low.y >> shift_y..=self.high.y >> shift_y {
+        let left = (i32::from(self.low.x.min(self.high.x)) - margin).max(0);
+        let right = (i32::from(self.low.x.max(self.high.x)) + margin).min(far.x.into());
+        let top = (low_y + dy + margin).min(far.y.into());
+        for row in (low_y - margin).max(0) >> shift_y..=top >> shift_y {
             let (mut from, mut to) = (left, right);
             if dy > 0 {
                 // The product is rounded down, towards the lower end. It is below 2^30, as the
                 // slope is at most 2^30 / dy.
                 let x_at = |y: i32| low_x + ((self.slope * (y - low_y).clamp(0, dy)) >> 16);
-                let x_below = x_at((i32::from(row) << shift_y) - 1);
-                let x_above = x_at((i32::from(row) + 1) << shift_y);
-                from = from.max(x_below.min(x_above) - 2);
-                to = to.min(x_below.max(x_above) + 3);
+                let x_below = x_at((row << shift_y) - 1 - margin);
+                let x_above = x_at(((row + 1) << shift_y) + margin);
+                from = from.max(x_below.min(x_above) - 2 - margin);
+                to = to.min(x_below.max(x_above) + 3 + margin);
             }
-            let first = row.get() * self.grid.columns;
+            let first = row as usize * self.grid.columns;
             for column in (from >> shift_x)..=(to >> shift_x) {
                 if !visit(self.grid.view(first + column as usize, self.near)) {
                     return false;

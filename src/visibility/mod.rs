@@ -30,7 +30,7 @@
 //!
 //! # Memory
 //! [`scratch_bytes`] returns the smallest working memory that is enough. With more memory the grid
-//! is finer, and fewer faces are tested against each edge.
+//! is finer, and fewer faces are tested against each edge. The result is the same.
 //!
 //! | scene | vertices | faces | least bytes |
 //! |---|---|---|---|

@@ -116,11 +116,11 @@ impl<'a> Profile<'a> {
 
     /// Adds `marks` to the pieces of a part of the edge, for example that a face hides it.
     pub fn mark(&mut self, part: EdgeInterval, marks: u64) {
-        self.update(part, |known| known | marks);
+        self.update(part, &|known| known | marks);
     }
 
     /// Changes the marks of the pieces of a part of the edge by `change`.
-    pub fn update(&mut self, part: EdgeInterval, change: impl Fn(u64) -> u64) {
+    pub fn update(&mut self, part: EdgeInterval, change: &dyn Fn(u64) -> u64) {
         if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;
         }

@@ -21,7 +21,7 @@ pub struct Shape {
     /// A cell is 2^`shift_y` units of the coarse grid high.
     pub shift_y: u32,
     /// The upper right corner of the page, in units of the coarse grid.
-    far: CoarsePoint,
+    pub far: CoarsePoint,
 }
 
 impl Shape {
@@ -162,7 +162,9 @@ impl<'c, I: Index> Raster<'c, I> {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<usize, Aborted> {
         self.cells.fill(Cell::uncovered(I::ZERO));
-        self.visit(coarse_projection, outlines, faces, yield_counter, |cell, _| cell.lengthen())?;
+        self.visit(coarse_projection, outlines, faces, yield_counter, &mut |cell, _| {
+            cell.lengthen()
+        })?;
         let mut begin = I::ZERO;
         for cell in self.cells.iter_mut() {
             let count = cell.end();
@@ -181,7 +183,7 @@ impl<'c, I: Index> Raster<'c, I> {
         entries: &mut [I],
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
-        self.visit(coarse_projection, outlines, faces, yield_counter, |cell, rank| {
+        self.visit(coarse_projection, outlines, faces, yield_counter, &mut |cell, rank| {
             entries[cell.end().get()] = rank;
             cell.lengthen();
         })
@@ -195,7 +197,7 @@ impl<'c, I: Index> Raster<'c, I> {
         outlines: Outlines<'_, I>,
         faces: &Faces<'_, I>,
         yield_counter: &mut YieldCounter<'_>,
-        mut enter: impl FnMut(&mut Cell<I>, I),
+        enter: &mut dyn FnMut(&mut Cell<I>, I),
     ) -> Result<(), Aborted> {
         for rank in 0..faces.len() {
             let face = faces.get(rank);

@@ -347,7 +347,9 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let Self { around, grid, marks: Marks { seen, profile, .. }, options, .. } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(edge_query.near);
-        let cells_along = grid.cells_along(edge_query.p.position, edge_query.q.position, near);
+        let margin = if options.merged_blocks { around.coarse_projection.doubt() } else { 0 };
+        let cells_along =
+            grid.cells_along(edge_query.p.position, edge_query.q.position, near, margin);
         let (mut any_covered, mut all_covered) = (false, true);
         cells_along.visit(&mut |cell| {
             any_covered |= cell.cover.is_some();
@@ -361,18 +363,12 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         seen.clear();
         for rank in seam_of.into_iter().flatten() {
             seen.insert(rank);
-            if options.merged_blocks {
-                edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
-            }
         }
         let mut spent = yield_counter.spend(1000);
         let mut test_face = |rank: I| {
             let rank = rank.get();
             if seen.insert(rank) {
                 edge_query.mark_face(around, faces_by_rank.get(rank), profile);
-                if options.merged_blocks {
-                    edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
-                }
             }
             spent = spent.and_then(|()| yield_counter.spend(FACE_TEST));
             spent.is_ok() && !profile.is_hidden()
@@ -388,6 +384,16 @@ impl<'s, I: Index> StretchFinder<'s, I> {
                     .take_while(|&&rank| !faces_by_rank.begins_behind(rank.get(), edge_query.far))
                     .all(|&rank| test_face(rank))
             });
-        spent
+        spent?;
+        if options.merged_blocks && !profile.is_hidden() {
+            // Within the precision of the model, several faces may be equally near, and then it
+            // matters which comes first. So they are asked in the order of their ranks, whatever
+            // the cells are.
+            seen.each(&mut |rank| {
+                edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
+                yield_counter.spend(FACE_TEST)
+            })?;
+        }
+        Ok(())
     }
 }
