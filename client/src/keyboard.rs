@@ -8,8 +8,8 @@
 use crate::link::Order;
 
 /// What the keys do, for the user.
-pub const KEYS: &str = "space pauses and goes on, + and - change the speed, in a pause u and d set the \
-                        lowered pen higher or lower, q gives up";
+pub const KEYS: &str = "space pauses and goes on, + and - change the speed, in a pause u and d set \
+                        the lowered pen higher or lower, q gives up";
 
 /// A key that was pressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -6,8 +6,8 @@
 //! send. [`plot`] draws it, by a plotter that computes it, or by strokes of this computer, as
 //! [`compute`] chooses. [`sender`] sends these lines over a [`link`] and follows the plotter's
 //! replies with [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an
-//! [`emulator`] of one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`] follows the pen,
-//! [`penup_job::picture`] renders its path, [`png`] the image of that, [`penup_job::export`] writes
+//! [`emulator`] of one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`]
+//! follows the pen, [`penup_job::picture`] renders its path, [`png`] the image of that, [`penup_job::export`] writes
 //! it for other machines, and [`output`] writes the files. [`penup_job::results`] are what is known
 //! about a job afterwards.
 //!

@@ -246,7 +246,8 @@ impl Plot<'_> {
             let unit = if number == 0 { " s" } else { "" };
             let _ = writeln!(
                 svg,
-                "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\" font-size=\"10\">{}{unit}</text>",
+                "<text x=\"{x:.1}\" y=\"{}\" text-anchor=\"middle\" font-size=\"10\">\
+                 {}{unit}</text>",
                 y + 9.0,
                 (time * 1000.0).round() / 1000.0,
             );
