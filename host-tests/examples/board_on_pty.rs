@@ -61,6 +61,9 @@ fn figure(file: &str) -> Result<Vec<Segment>, Box<dyn Error>> {
     Ok(segments)
 }
 
+/// How many bytes of the board may wait for the program at the terminal.
+const MOST_UNREAD: usize = 1 << 20;
+
 fn main() -> Result<(), Box<dyn Error>> {
     let name = std::env::args().nth(1).ok_or("the board is missing")?;
     let mut board = boot(&name)?;
@@ -76,7 +79,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     // The other end stays open here, so that the programs may open and close it.
     let _terminal = terminal;
     let (mut ink, mut sent) = (Ink::default(), Vec::new());
-    let mut buffer = [0; 256];
+    let (mut buffer, mut unread) = ([0; 256], Vec::new());
     loop {
         if let Ok(count) = wire.read(&mut buffer) {
             let bytes = buffer.get(..count).unwrap_or_default();
@@ -84,8 +87,16 @@ fn main() -> Result<(), Box<dyn Error>> {
             board.send(bytes)?;
         }
         let count = board.receive(&mut buffer, Duration::from_millis(1))?;
-        // What nobody reads is lost.
-        let _ = wire.write_all(buffer.get(..count).unwrap_or_default());
+        // What the program does not read at once waits for it.
+        unread.extend_from_slice(buffer.get(..count).unwrap_or_default());
+        if !unread.is_empty()
+            && let Ok(count) = wire.write(&unread)
+        {
+            unread.drain(..count);
+        }
+        if unread.len() > MOST_UNREAD {
+            return Err("the program at the terminal does not read what the board sends".into());
+        }
         for change in board.pin_changes()? {
             ink.change(change);
         }
