@@ -243,7 +243,7 @@ test("keys, undo, names of controls", async () => {
   const { stdout } = await run(PENUP, ["preview", "--help"]);
   const flags = [...stdout.matchAll(/^ +--([a-z-]+)/gm)].map(([, name]) => name);
   const own = new Set(
-    "svg png json motion set repeat board machine quiet gcode hpgl reloop multipass".split(" "),
+    "svg png json motion set repeat board machine quiet gcode hpgl".split(" "),
   );
   for (const name of flags.filter((flag) => !own.has(flag))) {
     assert.equal(await page.locator(`#option-${name}`).count(), 1, name);
@@ -440,7 +440,7 @@ test("through the client: turn, dash, plot, hold, resume; the ink is the preview
     assert.equal(await status(path, { Origin: "http://evil.example" }), 403);
     assert.equal(await status(path, { Origin: own.origin, Host: "evil.example" }), 403);
     assert.equal(await status("/0123/plotter", { Origin: own.origin }), 403, "a wrong token");
-    // The page goes, and somebody with the token sends 200 MB, and then what is no frame.
+    // The page goes, and somebody with the token sends 200 MB, what is no frame, and garbage.
     await page.click("#disconnect");
     const masked = (size) => {
       const head = Buffer.alloc(14);
@@ -448,9 +448,17 @@ test("through the client: turn, dash, plot, hold, resume; the ink is the preview
       head.writeBigUInt64BE(BigInt(size), 2);
       return head;
     };
+    /** A whole frame of this kind with a few letters, masked by zeros. */
+    const frame = (kind, letters) => {
+      const content = Buffer.from(letters, "latin1");
+      return Buffer.concat([Buffer.from([kind, 0x80 | content.length, 0, 0, 0, 0]), content]);
+    };
     for (const [bytes, code] of [
       [masked(200 << 20), 1009],
       [Buffer.from([0xf3, 0x81, 0, 0, 0, 0, 7]), 1002],
+      [frame(0x82, "\x18\x00garbage\x7f"), 1003],
+      [frame(0x81, "$X"), 1003],
+      [frame(0x81, '{"pen":-1}'), 1003],
     ]) {
       assert.equal(await refusedWith(own, path, bytes), code);
     }
@@ -641,6 +649,55 @@ test("pictures are saved, as SVG and as PNG", async () => {
   assert.deepEqual(problems, []);
 });
 
+test("passes are drawn one after the other, and saved as the program saves them", async () => {
+  await fresh("#file=notched.obj&page=80x60");
+  const once = await computed();
+  await page.fill("#option-multipass", "0");
+  await page.press("#option-multipass", "Enter");
+  await page.waitForSelector("#option-multipass-problem:not([hidden])");
+  await page.fill("#option-multipass", "3");
+  await page.press("#option-multipass", "Enter");
+  await page.check("#option-reloop");
+  assert.equal(
+    await page.inputValue("#command"),
+    "penup preview notched.obj --page 80x60 --multipass 3 --reloop --gcode notched.gcode",
+  );
+  const drawn = await computed();
+  assert.deepEqual(drawn.strokes, once.strokes, "the first pass is shown");
+  await page.click("#tab-check");
+  assert.match(await text("#check-state"), /for 3 passes/);
+  const [download] = await Promise.all([
+    page.waitForEvent("download"),
+    page.click("#export-gcode"),
+  ]);
+  const [own, json] = [join(folder, "passes.gcode"), join(folder, "passes.json")];
+  const options = "--page 80x60 --multipass 3 --reloop".split(" ");
+  await run(PENUP, ["preview", scene("notched"), ...options, "--gcode", own, "--json", json]);
+  const { duration_s } = JSON.parse(await readFile(json, "utf8"));
+  assert.equal(await readFile(await download.path(), "utf8"), await readFile(own, "utf8"));
+  const seconds = await page.evaluate(() => window.penup.drawing.allSeconds);
+  assert.ok(Math.abs(seconds - duration_s) < 0.5, `${seconds} and ${duration_s} s`);
+  // The plotter of the page draws all passes, each over the last.
+  await page.click("#tab-draw");
+  await page.selectOption("#pace", "1000");
+  await page.click("#plot");
+  await state("Drawn 3 times");
+  const ink = await page.evaluate(() => {
+    const { path, count } = window.penup.plotting;
+    return [...path.subarray(0, count)];
+  });
+  const length = segmentsOfPath(ink, 60).reduce(
+    (sum, [p, q]) => sum + Math.hypot(q[0] - p[0], q[1] - p[1]),
+    0,
+  );
+  const first = segmentsOf(once.svg).reduce(
+    (sum, [p, q]) => sum + Math.hypot(q[0] - p[0], q[1] - p[1]),
+    0,
+  );
+  assert.ok(Math.abs(length / first - 3) < 0.01, `${length} mm for ${first} mm thrice`);
+  assert.deepEqual(problems, []);
+});
+
 test("speeds, heights and a square by hand, and a job that has stopped", async () => {
   await fresh("#file=lattice3.obj");
   await page.click("#tab-draw");
@@ -700,6 +757,24 @@ test("speeds, heights and a square by hand, and a job that has stopped", async (
   });
   assert.match(said, /4 of 9 strokes/);
   assert.deepEqual(problems, []);
+});
+
+test("whoever wants less motion sees none", async () => {
+  await fresh("#file=notched.obj");
+  const moving = () =>
+    page.evaluate(() => {
+      const longest = (list) => Math.max(...list.split(",").map(parseFloat));
+      return [...document.querySelectorAll("*")].filter((it) => {
+        const style = getComputedStyle(it);
+        return longest(style.transitionDuration) > 0 || style.animationName !== "none";
+      }).length;
+    });
+  await page.emulateMedia({ reducedMotion: "no-preference" });
+  assert.ok((await moving()) > 0, "buttons change softly");
+  await page.emulateMedia({ reducedMotion: "reduce" });
+  assert.equal(await moving(), 0);
+  const scrolls = await page.evaluate(() => getComputedStyle(document.documentElement).scrollBehavior);
+  assert.equal(scrolls, "auto");
 });
 
 test("dark, and on a phone", async () => {

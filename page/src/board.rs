@@ -2,7 +2,7 @@
 //! it, and a record of what its pins do.
 
 use crate::number::Number;
-use crate::options::text_of;
+use crate::options::{NamedValues, text_of};
 use penup::board_table::{BOARDS, BoardRow};
 use penup::boards::host::HostBoard;
 use penup::machine::{EventRing, PulserState, Setting};
@@ -108,15 +108,23 @@ impl Board {
         Picture { page: Page { width, height }, runs: self.pen.runs() }.svg()
     }
 
-    /// What the pins have drawn as G-code for Grbl, as the client writes it.
-    pub fn gcode(&mut self) -> String {
+    /// What the pins have drawn as G-code for Grbl, as the client writes it with these options: a
+    /// JSON array of pairs of name and value.
+    ///
+    /// # Errors
+    /// A sentence for the user.
+    pub fn gcode(&mut self, options: &str) -> Result<String, String> {
         let speed = self.plotter.machine().settings().get(Setting::DrawSpeed).to_num();
-        export::gcode(&self.lines(), speed)
+        Ok(export::gcode(&self.lines(options)?, speed))
     }
 
-    /// What the pins have drawn as HP-GL, as the client writes it.
-    pub fn hpgl(&mut self) -> String {
-        export::hpgl(&self.lines())
+    /// What the pins have drawn as HP-GL, as the client writes it with these options: a JSON array
+    /// of pairs of name and value.
+    ///
+    /// # Errors
+    /// A sentence for the user.
+    pub fn hpgl(&mut self, options: &str) -> Result<String, String> {
+        Ok(export::hpgl(&self.lines(options)?))
     }
 
     /// The strokes of the last drawing in their order, in mm on the page: for each the pen, the
@@ -133,10 +141,10 @@ impl Board {
 }
 
 impl Board {
-    /// The lines that the pins have drawn.
-    fn lines(&mut self) -> Vec<export::Line> {
-        let once = export::Retracing { passes: 1, reloops: false };
-        export::lines(&self.pen.runs(), once)
+    /// The lines that the pins have drawn, as they are saved with these options.
+    fn lines(&mut self, options: &str) -> Result<Vec<export::Line>, String> {
+        let retracing = NamedValues::parse(options)?.retracing()?;
+        Ok(export::lines(&self.pen.runs(), retracing))
     }
 }
 

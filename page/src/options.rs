@@ -5,6 +5,7 @@ use crate::words::{for_page, sentence};
 use penup::plotter::{OPTIONS, PlotOptions};
 use penup::protocol::Escape;
 use penup_job::Settings;
+use penup_job::export::Retracing;
 use penup_job::view::{
     AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
 };
@@ -13,6 +14,12 @@ use penup_readers::PLAN_OPTIONS;
 use penup_readers::page::{A4, NAMED_PAGES, Page};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
+
+/// The option that tells how often everything is drawn, and the most times.
+const MULTIPASS: &str = "multipass";
+const MOST_PASSES: u32 = 100;
+/// The option that begins closed lines at random points in the programs for other machines.
+const RELOOP: &str = "reloop";
 
 /// The name of the option for the size of the page.
 const PAGE: &str = "page";
@@ -84,7 +91,38 @@ pub fn options() -> String {
         let heading = "Plan: a drawing of straight lines at one height";
         Control::new(option.name, heading, option.value, option.help)
     }));
+    // They stand with the other options of the strokes' order.
+    let behind = controls.iter().rposition(|control| control.heading == "Drawing");
+    let behind = behind.map_or(controls.len(), |at| at + 1);
+    let passes = Control {
+        default: Some("1".to_owned()),
+        range: Some(format!("1 to {MOST_PASSES}")),
+        ..Control::new(
+            MULTIPASS,
+            "Drawing",
+            "N",
+            "Draw everything this many times; a plotter draws the whole again, and what is saved \
+             as G-code and HP-GL draws each line again without lifting the pen",
+        )
+    };
+    let reloop = Control::new(
+        RELOOP,
+        "Drawing",
+        "",
+        "Begin closed lines at random points in what is saved as G-code and HP-GL, so that the \
+         marks of the pen do not stand in a row",
+    );
+    controls.splice(behind..behind, [passes, reloop]);
     text_of(&controls)
+}
+
+/// How often everything is drawn, with these options: a JSON array of pairs of name and value.
+///
+/// # Errors
+/// A sentence for the user.
+#[wasm_bindgen]
+pub fn passes(options: &str) -> Result<u32, String> {
+    NamedValues::parse(options)?.retracing().map(|retracing| retracing.passes)
 }
 
 impl Control {
@@ -163,12 +201,26 @@ impl NamedValues {
     /// # Errors
     /// A sentence for the user: values contradict each other, or the file.
     pub fn settings_for(&self, source: &Source) -> Result<Settings, String> {
+        self.retracing()?;
         let mut page = source.page;
         if let (Some(named), false) = (self.page()?, source.is_arranged) {
             page.sheet = named;
         }
         let settings = self.wishes()?.settings_for(&page, &*source.lines);
         settings.map_err(|reason| for_page(&sentence(&reason)))
+    }
+
+    /// What is done with each line of a drawing that is saved for another machine.
+    ///
+    /// # Errors
+    /// A sentence for the user: the number of passes is none.
+    pub(crate) fn retracing(&self) -> Result<Retracing, String> {
+        let passes = self.given(MULTIPASS).unwrap_or("1").parse().ok();
+        let passes =
+            passes.filter(|passes| (1..=MOST_PASSES).contains(passes)).ok_or_else(|| {
+                format!("\u{201c}{MULTIPASS}\u{201d} is a whole number from 1 to {MOST_PASSES}.")
+            })?;
+        Ok(Retracing { passes, reloops: self.given(RELOOP).is_some() })
     }
 
     /// What the user wishes.

@@ -60,5 +60,8 @@ export function command(file, pairs, isSwitch) {
     if (isSwitch(name)) return `--${name}`;
     return value.startsWith("-") ? `--${name}=${word(value)}` : `--${name} ${word(value)}`;
   });
+  // The program refuses this option if it writes no file that it concerns.
+  if (pairs.some(([name]) => name === "reloop"))
+    flags.push(`--gcode ${word(file.replace(/\.\w+$/, "") + ".gcode")}`);
   return ["penup preview", word(file), ...flags].join(" ");
 }

@@ -97,13 +97,16 @@ export class Drawing {
   }
 
   take(computed, job) {
-    const { path, ends, pens, ink, up, notes } = computed;
+    const { path, ends, pens, ink, up, notes, times } = computed;
+    // The slider replays the first pass.
     const seconds = path.length ? path[path.length - SAMPLE] : 0;
+    const all = clock(computed.seconds) + (times > 1 ? ` for ${times} passes` : "");
     const strokes = ends.length / 4;
     this.computed = { ...computed, seconds, name: job.name, page: job.page };
+    this.allSeconds = computed.seconds;
     this.begins = computed.begins;
     figures($("figures"), [
-      ["Time", clock(seconds)],
+      ["Time", all],
       ["Ink", length(ink)],
       ["Moves with the pen up", length(up)],
       ["Strokes", String(strokes)],
@@ -111,7 +114,7 @@ export class Drawing {
       ["Efficiency", `${((100 * ink) / Math.max(ink + up, 1e-9)).toFixed(1)} %`],
       ["Pens", pens.join(", ")],
     ]);
-    $("check-state").textContent = `${clock(seconds)} with ${strokes} strokes`;
+    $("check-state").textContent = `${all} with ${strokes} strokes`;
     $("check-problem").textContent = notes.join(" ");
     $("check-problem").hidden = !notes.length;
     $("at").max = String(seconds);

@@ -5,6 +5,7 @@ import { Helper } from "./workers.js";
 import { clock, figures, length } from "./drawing.js";
 import { cannot, join } from "./serial.js";
 import { join as joinProgram } from "./socket.js";
+import { passes } from "./penup_page.js";
 
 const $ = (id) => document.getElementById(id);
 const SAMPLE = 4;
@@ -44,6 +45,8 @@ export class Plotting {
     }
     this.phase = "closed";
     this.clear();
+    /** The job that is drawn several times, how often in all, and how often it is still begun. */
+    this.passes = { job: null, all: 1, left: 0 };
     this.place = null;
     this.isHeld = false;
     $("plotter").addEventListener("change", () => this.choose());
@@ -116,6 +119,7 @@ export class Plotting {
     this.session?.end();
     this.board?.end();
     this.session = this.board = this.close = this.order = null;
+    this.passes.left = 0;
     this.enter("closed");
   }
 
@@ -181,8 +185,20 @@ export class Plotting {
     this.clear();
     this.planned = this.lines();
     await this.board?.ask("begin_again");
+    const all = passes(job.options);
+    this.passes = { job, all, left: all - 1 };
     await this.tell("plot", job);
     this.view.draw();
+  }
+
+  /** Begins the next pass of the drawing. Returns whether there is one. */
+  isDrawnAgain() {
+    if (!this.passes.left) return false;
+    this.passes.left--;
+    const { job, all, left } = this.passes;
+    this.log(`Pass ${all - left} of ${all} begins.`);
+    this.tell("plot", job);
+    return true;
   }
 
   async tell(call, args) {
@@ -210,6 +226,7 @@ export class Plotting {
 
   /** Goes on with the job that has stopped. */
   async goOn(isAtOrigin) {
+    this.passes = { job: null, all: 1, left: 0 };
     this.problem("");
     this.order?.("begin");
     this.clear();
@@ -261,19 +278,28 @@ export class Plotting {
         this.readSetting(event.text);
         break;
       case "failed":
+        this.passes.left = 0;
         this.log(event.text);
         this.problem(event.text);
         break;
       case "stopped":
+        this.passes.left = 0;
         this.hasEnded = true;
         this.say("Given up: the pen is up.");
         break;
       case "drawn":
+        if (this.isDrawnAgain()) break;
         this.hasEnded = true;
-        this.say(`Drawn: ${event.report ?? "all of it"}.`);
+        this.say(`Drawn${this.timesDrawn()}: ${event.report ?? "all of it"}.`);
         $("progress").value = 1;
         break;
     }
+  }
+
+  /** How often everything was drawn, in words. */
+  timesDrawn() {
+    const { all } = this.passes;
+    return all > 1 ? ` ${all} times` : "";
   }
 
   enter(phase) {

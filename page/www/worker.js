@@ -4,12 +4,14 @@
 // {id, value} or {id, error}, and what comes without being asked for is {event, …}.
 
 import { summary } from "./strokes.js";
-import init, { Board, Session, Sheet, fault } from "./penup_page.js";
+import init, { Board, Session, Sheet, fault, passes } from "./penup_page.js";
 
 /** The time in ms after which a session gives up a plotter that says nothing. */
 const SILENCE = { emulated: 120_000, serial: 5_000, program: 20_000 };
 /** How much of the plotter's time passes between two looks at the session, in ms. */
 const REPLAY_STEP = 200;
+/** Numbers of a sample of a path, of which the first is the time. */
+const SAMPLE = 4;
 
 let sheet, board, session;
 
@@ -40,54 +42,27 @@ const calls = {
   async compute({ name, bytes, isRead, options, page, room, memory }) {
     board = new Board(memory, JSON.stringify(room));
     session = new Session(1e12);
-    const paths = [];
     const notes = [];
-    let now = 0,
-      report = null,
-      reported = 0,
-      begun = false;
-    session.connect(now);
-    session.plot(name, bytes, isRead, options);
-    for (;;) {
-      const out = session.take_out();
-      if (out.length) board.receive(out);
-      board.advance(begun ? REPLAY_STEP : 1);
-      now += begun ? REPLAY_STEP : 1;
-      const sent = board.take_sent();
-      if (sent.length) session.receive(sent, now);
-      session.tick(now);
-      for (const event of JSON.parse(session.take_events())) {
-        if (event.kind === "failed") throw event.text;
-        if (event.kind === "note") notes.push(event.text);
-        if (event.kind === "phase" && event.name === "drawing") begun = true;
-        if (event.kind === "pen") {
-          board.change_pen(event.pen);
-          session.resume();
-        }
-        if (event.kind === "drawn") report = event.report;
-        if (event.kind === "status" && event.strokes && performance.now() - reported > 100) {
-          reported = performance.now();
-          postMessage({ event: "computing", strokes: event.strokes });
-        }
-      }
-      const path = board.take_path();
-      if (path.length) paths.push(path);
-      if (report !== null) break;
-    }
-    const path = new Float32Array(paths.reduce((sum, part) => sum + part.length, 0));
-    let at = 0;
-    for (const part of paths) {
-      path.set(part, at);
-      at += part.length;
-    }
+    const clock = { now: 0 };
+    session.connect(clock.now);
+    const job = [name, bytes, isRead, options];
+    const { report, path } = drawn(job, clock, notes);
     const strokes = board.strokes();
     const more = summary(path, strokes);
     const { ends, begins } = more;
     // As a blob it need not be copied.
     const svg = new Blob([board.svg(page[0], page[1])], { type: "image/svg+xml" });
-    const gcode = new Blob([board.gcode()], { type: "text/plain" });
-    const hpgl = new Blob([board.hpgl()], { type: "text/plain" });
-    const value = { path, strokes, svg, gcode, hpgl, report, notes, ...more };
+    const gcode = new Blob([board.gcode(options)], { type: "text/plain" });
+    const hpgl = new Blob([board.hpgl(options)], { type: "text/plain" });
+    // What is shown is the first pass. Each other one begins where one has ended.
+    const times = passes(options);
+    let seconds = lengthOf(path);
+    if (times > 1) {
+      board.begin_again();
+      seconds += (times - 1) * lengthOf(drawn(job, clock, []).path);
+    }
+    const figures = { report, notes, times, seconds };
+    const value = { path, strokes, svg, gcode, hpgl, ...figures, ...more };
     return [value, [path.buffer, strokes.buffer, ends.buffer, begins.buffer]];
   },
 
@@ -176,6 +151,53 @@ const calls = {
     return board.svg(page[0], page[1]);
   },
 };
+
+/** The time in seconds that a path takes. */
+const lengthOf = (path) => (path.length ? path[path.length - SAMPLE] : 0);
+
+/**
+ * Has the session draw a job by the emulated plotter, which runs ahead of time. Adds what the
+ * plotter says to `notes`. Returns its report and the path of the pen.
+ */
+function drawn([name, bytes, isRead, options], clock, notes) {
+  const paths = [];
+  let report = null,
+    reported = 0,
+    begun = false;
+  session.plot(name, bytes, isRead, options);
+  while (report === null) {
+    const out = session.take_out();
+    if (out.length) board.receive(out);
+    board.advance(begun ? REPLAY_STEP : 1);
+    clock.now += begun ? REPLAY_STEP : 1;
+    const sent = board.take_sent();
+    if (sent.length) session.receive(sent, clock.now);
+    session.tick(clock.now);
+    for (const event of JSON.parse(session.take_events())) {
+      if (event.kind === "failed") throw event.text;
+      if (event.kind === "note") notes.push(event.text);
+      if (event.kind === "phase" && event.name === "drawing") begun = true;
+      if (event.kind === "pen") {
+        board.change_pen(event.pen);
+        session.resume();
+      }
+      if (event.kind === "drawn") report = event.report;
+      if (event.kind === "status" && event.strokes && performance.now() - reported > 100) {
+        reported = performance.now();
+        postMessage({ event: "computing", strokes: event.strokes });
+      }
+    }
+    const path = board.take_path();
+    if (path.length) paths.push(path);
+  }
+  const path = new Float32Array(paths.reduce((sum, part) => sum + part.length, 0));
+  let at = 0;
+  for (const part of paths) {
+    path.set(part, at);
+    at += part.length;
+  }
+  return { report, path };
+}
 
 /** Does `work`; what breaks is told to the page. */
 function guarded(work) {

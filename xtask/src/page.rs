@@ -64,28 +64,46 @@ pub struct TestArguments {
 
 /// Builds the page and the client, and tests them in Chromium without a window.
 pub fn test(arguments: &TestArguments) -> Result<()> {
-    let installed = set_up::browser()?;
-    build()?;
     // The page is joined to this board by the client.
     set_up::emulator(&LM3S6965)?;
     firmware::check(&LM3S6965, &firmware::build(&LM3S6965)?)?;
+    let mut node = if arguments.measure { node(&[], "measure.mjs")? } else { tests()? };
+    if arguments.pictures {
+        node.env("PENUP_PICTURES", crate::root().join("docs"));
+    }
+    run(&mut node)
+}
+
+/// What [`tests`] returns, or nothing, said on the terminal, if the compiler cannot build for a
+/// browser, as Debian's cannot.
+pub fn tests_if_possible() -> Result<Option<Command>> {
+    if let Err(error) = set_up::target(TARGET) {
+        say!("penup: the page is NOT tested: {error:#}")?;
+        return Ok(None);
+    }
+    tests().map(Some)
+}
+
+/// Builds the page and the client. Returns the command that tests them in Chromium, and that needs
+/// the firmware of the LM3S6965.
+fn tests() -> Result<Command> {
+    node(&["--test"], "tests.mjs")
+}
+
+/// Builds the page and the client. Returns the command that runs a program of the page's tests by
+/// Node with these options.
+fn node(options: &[&str], program: &str) -> Result<Command> {
+    let installed = set_up::browser()?;
+    build()?;
     let root = crate::root();
     run(cargo().current_dir(&root).args(["build", "--quiet", "--package", "penup-client"]))?;
-    let tests = root.join("page/browser-tests");
     let mut node = Command::new("node");
-    if arguments.measure {
-        node.arg(tests.join("measure.mjs"));
-    } else {
-        node.arg("--test").arg(tests.join("tests.mjs"));
-    }
-    if arguments.pictures {
-        node.env("PENUP_PICTURES", root.join("docs"));
-    }
+    node.args(options).arg(root.join("page/browser-tests").join(program));
     let penup = root.join("target/debug/penup").with_extension(env::consts::EXE_EXTENSION);
     node.env("PENUP", penup)
         .env("PENUP_ROOT", &root)
         .env("PENUP_PAGE", folder())
         .env("PENUP_PAGE_TESTS", installed.packages)
         .env("PENUP_CHROMIUM", installed.chromium);
-    run(&mut node)
+    Ok(node)
 }

@@ -13,7 +13,7 @@ use serde_json::Value;
 use crate::command::describe;
 
 /// The prefixes of the names of the longest test programs, which run first.
-const LONGEST: [&str; 2] = ["pico_", "qemu_"];
+const LONGEST: [&str; 4] = ["pico_", "qemu_", "command", "stack"];
 
 /// Builds what the command `cargo test …` would run, except the doctests. Returns a command for
 /// each test program, with its package's directory as the current one.
