@@ -7,9 +7,9 @@
 //! [`compute`] chooses. [`sender`] sends these lines over a [`link`] and follows the plotter's
 //! replies with [`penup_job::protocol`] and [`progress`]. Behind the link is a serial port, an
 //! [`emulator`] of one of the [`machines`], or the [`preview`] in memory. [`penup_job::watch`]
-//! follows the pen, [`penup_job::picture`] renders its path, [`png`] the image of that, [`penup_job::export`] writes
-//! it for other machines, and [`output`] writes the files. [`penup_job::results`] are what is known
-//! about a job afterwards.
+//! follows the pen, [`penup_job::picture`] renders its path, [`png`] the image of that,
+//! [`penup_job::export`] writes it for other machines, and [`output`] writes the files.
+//! [`penup_job::results`] are what is known about a job afterwards.
 //!
 //! [`operate`] are the commands for the machine itself, [`ports`] finds it, [`rejoin`] waits for it
 //! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command
@@ -30,7 +30,6 @@ pub mod fit;
 pub mod interrupt;
 pub mod keyboard;
 pub mod link;
-pub mod machine_settings;
 pub mod machines;
 pub mod manual;
 pub mod motion_plot;
@@ -51,3 +50,4 @@ pub mod tape;
 pub mod workspace;
 
 use penup::board_table as table;
+use penup_job::machine_settings;

@@ -19,6 +19,7 @@ use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
 use penup::view::View;
 use penup::visibility::{EdgeParameter, Stretch};
+use penup_job::machine_settings::is_grid;
 use penup_job::path::{PagePoint, Run};
 use penup_job::protocol::{MODEL, PLOT};
 use penup_job::results::{JobReport, JobResult, Lengths, Timings};
@@ -301,13 +302,6 @@ impl<I: Index> Link for InMemory<I> {
         let ticks = self.board.now() / MILLISECOND;
         self.began.map_or_else(Instant::now, |began| began + Duration::from_millis(ticks))
     }
-}
-
-/// Whether each motor moves one axis, both by the same way in a step, so that the pins tell where
-/// the pen is.
-fn is_grid(settings: &Settings) -> bool {
-    let [x, y] = settings.page_steps();
-    settings.get(Setting::Kinematics) == 0 && x == y
 }
 
 /// The path of the pen that `strokes` describe, from the origin on.

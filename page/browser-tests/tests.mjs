@@ -243,7 +243,7 @@ test("keys, undo, names of controls", async () => {
   const { stdout } = await run(PENUP, ["preview", "--help"]);
   const flags = [...stdout.matchAll(/^ +--([a-z-]+)/gm)].map(([, name]) => name);
   const own = new Set(
-    "svg png json motion set repeat board machine quiet gcode hpgl".split(" "),
+    "svg png json motion repeat board machine quiet gcode hpgl".split(" "),
   );
   for (const name of flags.filter((flag) => !own.has(flag))) {
     assert.equal(await page.locator(`#option-${name}`).count(), 1, name);
@@ -695,6 +695,50 @@ test("passes are drawn one after the other, and saved as the program saves them"
     0,
   );
   assert.ok(Math.abs(length / first - 3) < 0.01, `${length} mm for ${first} mm thrice`);
+  assert.deepEqual(problems, []);
+});
+
+test("the drawing is computed with the settings of the machine", async () => {
+  await fresh("#file=notched.obj&page=80x60");
+  const usual = await computed();
+  await page.click("#tab-check");
+  const file = (name, content) => ({ name, mimeType: "text/plain", buffer: Buffer.from(content) });
+  const said = (want) =>
+    page.waitForFunction(
+      (text) => new RegExp(text).test(document.querySelector("#error p").textContent),
+      want,
+    );
+  await page.setInputFiles("#machine-file", file("port.toml", "port = 1\n"));
+  await said("no table");
+  await page.setInputFiles("#machine-file", file("bad.toml", "[settings]\nfast = 1\n"));
+  await said("fast = 1");
+  // A machine that is too small, and one whose motors move both axes.
+  await page.setInputFiles("#machine-file", file("small.toml", "[settings]\n130 = 40 # x\n"));
+  await page.waitForFunction(() =>
+    /130|travel|machine/i.test(document.getElementById("check-problem").textContent),
+  );
+  await page.setInputFiles("#machine-file", file("corexy.toml", "[settings]\n230 = 1\n"));
+  await said("penup preview");
+  const slow = "[settings]\n204 = 10\n\n100 = 40.0 # steps per mm of x\n101 = 40.0\n";
+  await page.setInputFiles("#machine-file", file("slow.toml", slow));
+  await page.waitForFunction(
+    () => document.getElementById("option-set").value === "204=10,100=40.0,101=40.0",
+  );
+  const drawn = await computed();
+  const expected = await preview(scene("notched"));
+  assert.deepEqual(drawn.strokes, expected.strokes);
+  assert.equal(drawn.svg, expected.svg);
+  assert.ok(Math.abs(drawn.seconds - expected.duration_s) < 0.5);
+  assert.ok(drawn.seconds > usual.seconds, "it is slower");
+  // So is the emulated plotter.
+  await page.click("#tab-draw");
+  await page.selectOption("#pace", "1000");
+  await page.click("#plot");
+  await state("Drawn");
+  const picture = await page.evaluate(() =>
+    window.penup.plotting.board.ask("picture", { page: [80, 60] }),
+  );
+  assert.deepEqual(inkOf(picture), inkOf(expected.svg));
   assert.deepEqual(problems, []);
 });
 

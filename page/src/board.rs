@@ -39,9 +39,13 @@ impl fmt::Debug for Board {
 impl Board {
     /// Starts the plotter, at the page's origin with the pen up. It has the memory of the board of
     /// the name `limits`, or if there is none, enough for a model that needs the `room`, which
-    /// [`Sheet`](crate::Sheet) tells of a file (without it, for one that is not very large).
+    /// [`Sheet`](crate::Sheet) tells of a file (without it, for one that is not very large). The
+    /// machine has the settings that the `options` say: a JSON array of pairs of name and value.
+    ///
+    /// # Errors
+    /// A sentence for the user: there is no such machine.
     #[wasm_bindgen(constructor)]
-    pub fn new(limits: &str, room: &str) -> Self {
+    pub fn new(limits: &str, room: &str, options: &str) -> Result<Self, String> {
         crate::note_faults();
         let room = serde_json::from_str(room).unwrap_or_else(|_| Room::usual());
         // The numbers here are twice as wide as those of a board.
@@ -53,11 +57,12 @@ impl Board {
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
         pins.set_queue(room.steps);
-        let plotter = Plotter::new(room.lend(), pins);
+        let machine = NamedValues::parse(options)?.machine()?;
+        let plotter = Plotter::with_settings(room.lend(), pins, machine);
         plotter.greet(&mut board);
         let steps = plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>());
         let pen = PenWatch::new(1.0 / steps[0]);
-        Self { board, plotter, pen, steps, path: SampledPath::new(steps) }
+        Ok(Self { board, plotter, pen, steps, path: SampledPath::new(steps) })
     }
 
     /// Receives bytes by the serial line.

@@ -2,10 +2,12 @@
 
 use crate::source::Source;
 use crate::words::{for_page, sentence};
+use penup::machine;
 use penup::plotter::{OPTIONS, PlotOptions};
 use penup::protocol::Escape;
 use penup_job::Settings;
 use penup_job::export::Retracing;
+use penup_job::machine_settings::{AssignedSetting, is_grid, simulated};
 use penup_job::view::{
     AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
 };
@@ -20,6 +22,9 @@ const MULTIPASS: &str = "multipass";
 const MOST_PASSES: u32 = 100;
 /// The option that begins closed lines at random points in the programs for other machines.
 const RELOOP: &str = "reloop";
+
+/// The option that sets up the emulated machine.
+const SET: &str = "set";
 
 /// The name of the option for the size of the page.
 const PAGE: &str = "page";
@@ -113,6 +118,13 @@ pub fn options() -> String {
          marks of the pen do not stand in a row",
     );
     controls.splice(behind..behind, [passes, reloop]);
+    controls.push(Control::new(
+        SET,
+        "Machine",
+        "NUMBER=VALUE",
+        "Compute and emulate a machine with these settings, with commas between them, for example \
+         204=20,110=4000",
+    ));
     text_of(&controls)
 }
 
@@ -202,6 +214,7 @@ impl NamedValues {
     /// A sentence for the user: values contradict each other, or the file.
     pub fn settings_for(&self, source: &Source) -> Result<Settings, String> {
         self.retracing()?;
+        self.machine()?;
         let mut page = source.page;
         if let (Some(named), false) = (self.page()?, source.is_arranged) {
             page.sheet = named;
@@ -221,6 +234,24 @@ impl NamedValues {
                 format!("\u{201c}{MULTIPASS}\u{201d} is a whole number from 1 to {MOST_PASSES}.")
             })?;
         Ok(Retracing { passes, reloops: self.given(RELOOP).is_some() })
+    }
+
+    /// The settings of the machine that the page emulates.
+    ///
+    /// # Errors
+    /// A sentence for the user: there is no such machine, or the page cannot show it.
+    pub(crate) fn machine(&self) -> Result<machine::Settings, String> {
+        let words = self.given(SET).unwrap_or_default().split([',', ' ', ';']);
+        let words = words.map(str::trim).filter(|word| !word.is_empty());
+        let assigned = words.map(AssignedSetting::parse).collect::<Result<Vec<_>, _>>();
+        let machine = simulated(&assigned.map_err(|reason| sentence(&reason))?);
+        let machine = machine.map_err(|reason| sentence(&reason.to_string()))?;
+        if !is_grid(&machine) {
+            return Err("The page emulates machines of which each motor moves one axis, by the \
+                        same steps per mm: penup preview computes this one."
+                .to_owned());
+        }
+        Ok(machine)
     }
 
     /// What the user wishes.

@@ -21,7 +21,8 @@ struct Pipe {
 
 impl Pipe {
     fn new(line: fn(&mut u64, bool, Vec<u8>) -> Vec<u8>) -> Self {
-        let (session, board) = (Session::new(5000.0), Board::new("", ""));
+        let session = Session::new(5000.0);
+        let board = Board::new("", "", "[]").expect("the default machine");
         let mut pipe = Self { session, board, now: 0.0, events: Vec::new(), line, count: 0 };
         pipe.session.connect(0.0);
         pipe

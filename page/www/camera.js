@@ -55,9 +55,11 @@ export function toLink(pairs) {
 
 /** The command that draws the same. */
 export function command(file, pairs, isSwitch) {
-  const word = (text) => (/^[\w.,/+-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
-  const flags = pairs.map(([name, value]) => {
+  const word = (text) => (/^[\w.,/+=-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`);
+  const flags = pairs.flatMap(([name, value]) => {
     if (isSwitch(name)) return `--${name}`;
+    // The program takes one setting at a time.
+    if (name === "set") return value.split(/[\s,;]+/).filter(Boolean).map((own) => `--set ${word(own)}`);
     return value.startsWith("-") ? `--${name}=${word(value)}` : `--${name} ${word(value)}`;
   });
   // The program refuses this option if it writes no file that it concerns.

@@ -366,6 +366,17 @@ function listenToPage() {
     if (chosen) openFile(chosen);
     event.target.value = "";
   });
+  $("machine-file").addEventListener("change", async (event) => {
+    const [chosen] = event.target.files;
+    event.target.value = "";
+    if (!chosen) return;
+    try {
+      change("set", settingsOf(chosen.name, await chosen.text()));
+      announce(`The machine has the settings of ${chosen.name}`);
+    } catch (error) {
+      fail(error.message ?? error);
+    }
+  });
   $("example").addEventListener("change", (event) => {
     const name = event.target.value;
     event.target.value = "";
@@ -421,6 +432,26 @@ function listenToPage() {
     const [chosen] = event.dataTransfer.files;
     if (chosen) openFile(chosen);
   });
+}
+
+/**
+ * The settings in a file of `penup settings save`, as the value of the option “set”. Fails with a
+ * sentence for the user.
+ */
+function settingsOf(name, text) {
+  const [, table] = text.split(/^\s*\[settings\]\s*$/m);
+  if (table === undefined)
+    throw `${name} has no table [settings]: is it a file of penup settings save?`;
+  const rows = table.split(/^\s*\[/m)[0].split(/\r?\n/);
+  return rows
+    .map((row) => row.replace(/#.*/, "").trim())
+    .filter(Boolean)
+    .map((row) => {
+      const [, number, value] = /^"?(\d+)"?\s*=\s*(-?\d+(?:\.\d+)?)$/.exec(row) ?? [];
+      if (!number) throw `${name} holds “${row}”, and settings have numbers, as in 100 = 80.`;
+      return `${number}=${value}`;
+    })
+    .join(",");
 }
 
 async function copy(text, done) {

@@ -27,6 +27,8 @@ const HINTS = {
   serial: "Chromium, Chrome or Edge, and a plotter that runs penup. The page talks to it.",
   program: "The program penup has its line, so any browser will do. One page at a time holds it.",
 };
+/** The settings of the emulated machine that these options say. */
+const machineOf = (options = "[]") => new Map(JSON.parse(options)).get("set") ?? "";
 /** How dark the lines are that are still to be drawn. */
 const PLANNED = 0.28;
 /** The side of the test square in mm. */
@@ -136,9 +138,12 @@ export class Plotting {
       if (said.event === "path") this.draw(said.path);
       else this.hear(said);
     });
-    this.room = this.job()?.room;
+    const { room, options } = this.job() ?? {};
+    this.room = room;
+    this.machine = machineOf(options);
+    const pace = Number($("pace").value);
     this.board
-      .ask("board", { pipe: port1, pace: Number($("pace").value), room: this.room }, [port1])
+      .ask("board", { pipe: port1, pace, room, options }, [port1])
       .catch((text) => this.problem(text));
     this.begin(port2, "emulated");
   }
@@ -173,9 +178,10 @@ export class Plotting {
   async plot() {
     const job = this.job();
     if (!job) return this.problem("There is no drawing: open a file first.");
-    // An emulated plotter without room for a larger model is replaced.
+    // An emulated plotter without room for a larger model, or of other settings, is replaced.
     const isSmall = (room) => Object.keys(room).some((own) => !(this.room?.[own] >= room[own]));
-    if (this.board && isSmall(job.room)) this.end();
+    const isOther = machineOf(job.options) !== this.machine;
+    if (this.board && (isSmall(job.room) || isOther)) this.end();
     if (!this.session) {
       if (this.isFar) return this.problem("Connect the plotter first.");
       this.emulate();

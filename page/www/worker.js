@@ -40,7 +40,7 @@ const calls = {
 
   /** Computes the whole drawing ahead, by a session with an emulated plotter. */
   async compute({ name, bytes, isRead, options, page, room, memory }) {
-    board = new Board(memory, JSON.stringify(room));
+    board = new Board(memory, JSON.stringify(room), options);
     session = new Session(1e12);
     const notes = [];
     const clock = { now: 0 };
@@ -117,8 +117,8 @@ const calls = {
   },
 
   /** Is the emulated plotter, at the other end of such a pipe. */
-  board({ pipe, pace, room }) {
-    board = new Board("", JSON.stringify(room ?? null));
+  board({ pipe, pace, room, options }) {
+    board = new Board("", JSON.stringify(room ?? null), options ?? "[]");
     calls.pace({ pace });
     pipe.onmessage = ({ data }) => guarded(() => board.receive(data.bytes));
     let last = performance.now();

@@ -1,6 +1,7 @@
 //! Settings of a machine by number and value, and the machine that the library on this computer
 //! simulates with them.
 
+use penup::fixed::Decimal;
 use penup::machine::{SETTINGS, Setting, SettingError, Settings, Value};
 use penup::protocol::CommandError;
 
@@ -32,7 +33,7 @@ impl AssignedSetting {
     /// The reason why it is none, for the user.
     ///
     /// ```
-    /// use penup_client::machine_settings::AssignedSetting;
+    /// use penup_job::machine_settings::AssignedSetting;
     /// assert_eq!(AssignedSetting::parse("$100=88.9")?.number, 100);
     /// assert!(AssignedSetting::parse("100=fast").is_err());
     /// # Ok::<(), String>(())
@@ -85,11 +86,19 @@ pub fn simulated(assigned: &[AssignedSetting]) -> Result<Settings, NoSuchMachine
     Ok(settings)
 }
 
+/// Whether each motor moves one axis, both by the same way in a step, so that the pins tell where
+/// the pen is.
+pub fn is_grid(settings: &Settings) -> bool {
+    let [x, y] = settings.page_steps();
+    settings.get(Setting::Kinematics) == 0 && x == y
+}
+
 fn set(settings: &mut Settings, assigned: &AssignedSetting) -> Result<(), SettingError> {
     let setting = Setting::numbered(assigned.number).ok_or(SettingError::Unknown)?;
-    let value = assigned.value.parse::<Value>();
-    let value = value.map_err(|_| SettingError::OutOfRange(setting))?;
-    settings.set(setting, value)
+    // As a plotter reads it.
+    let value = Decimal::parse(&assigned.value).ok();
+    let value = value.and_then(|value| value.to_millimetres().ok());
+    settings.set(setting, value.ok_or(SettingError::OutOfRange(setting))?)
 }
 
 #[cfg(test)]
