@@ -108,6 +108,12 @@ pub enum Error {
         /// The reason, and what to do.
         reason: String,
     },
+    /// A drawing that has stopped cannot go on.
+    #[error("cannot go on: {reason}")]
+    NotResumed {
+        /// The reason, and what to do.
+        reason: String,
+    },
     /// The motion of a machine that is not Cartesian is not plotted.
     #[error("the motion is plotted for machines with setting 230=0 only: leave out --motion")]
     MotionOfOtherMachine,
@@ -400,6 +406,7 @@ impl Error {
             | Self::NotDrawn { .. }
             | Self::TooLarge { .. }
             | Self::NotStreamed { .. }
+            | Self::NotResumed { .. }
             | Self::NoSuchMachine(_)
             | Self::MotionOfOtherMachine
             | Self::Board { .. }

@@ -15,11 +15,11 @@ use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress};
 use crate::run::{Outputs, Source, note, read, summary, write_pictures};
-use crate::sender::{Patience, Sender};
+use crate::sender::{Patience, Sender, Stopped};
 use crate::workspace;
 use penup::machine::{self, Setting};
 use penup_job::picture::Picture;
-use penup_job::protocol::Status;
+use penup_job::protocol::{GO_ON_AT_ORIGIN, Status};
 use penup_job::results::JobReport;
 use penup_job::room::Room;
 use penup_job::streamed::{Form, StreamedJob};
@@ -125,6 +125,9 @@ impl Plot<'_> {
         known: &Known,
         progress: &mut dyn Progress,
     ) -> Result<Option<JobReport>, Error> {
+        if self.args.resume {
+            return self.go_on(sender, known, progress);
+        }
         let job = &self.source.job;
         let compute = if self.args.from > 0 { Compute::Host } else { self.args.compute };
         let choice = compute::choose(known, job, compute)?;
@@ -155,6 +158,52 @@ impl Plot<'_> {
         Ok(report)
     }
 
+    /// Sends the rest of this drawing, which a loss of power or a reset has stopped.
+    fn go_on(
+        &self,
+        sender: &mut Sender<'_>,
+        known: &Known,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<JobReport>, Error> {
+        let refused = |reason: &str| Error::NotResumed { reason: reason.to_owned() };
+        let stopped = sender.stopped_drawing()?.ok_or_else(|| {
+            refused(
+                "no drawing has stopped that was sent while it was drawn; `penup resume` goes on \
+                 with one that the plotter has computed",
+            )
+        })?;
+        let Some(mut host) = compute::choose(known, &self.source.job, Compute::Host)?.host else {
+            return Err(refused("this computer cannot compute it"));
+        };
+        // The drawing may have begun behind its first strokes, by --from.
+        let (mut whole, report) = host.streamed(Form::Strokes, 0)?;
+        let begin = whole.size().strokes.checked_sub(stopped.all);
+        if let Some(begin) = begin.filter(|begin| *begin > 0) {
+            whole = host.streamed(Form::Strokes, begin)?.0;
+        }
+        let Some(begin) = begin.filter(|_| whole.id() == stopped.id) else {
+            return Err(refused(
+                "another drawing has stopped: name the same file with the same options, and set \
+                 the machine as it was",
+            ));
+        };
+        if stopped.is_lost && !self.args.at_origin {
+            return Err(refused(
+                "nobody has said where the pen is: home the machine by `penup home`, or put the \
+                 pen at the origin by hand and add --at-origin",
+            ));
+        }
+        if self.args.at_origin {
+            sender.ask(GO_ON_AT_ORIGIN)?;
+        }
+        let mut rest = host.streamed(Form::Strokes, begin + stopped.drawn)?.0;
+        rest.set_id(stopped.id);
+        let Stopped { drawn, all, .. } = stopped;
+        self.note(&[format!("{drawn} of {all} strokes are drawn: the rest is sent")]);
+        self.send(sender, &rest, progress)?;
+        Ok(report)
+    }
+
     /// Sends strokes while they are drawn.
     fn send(
         &self,
@@ -168,9 +217,15 @@ impl Plot<'_> {
         if sent.is_err() && begun > 0 {
             // The last stroke that was begun may not be whole.
             let left_out = u64::from(self.args.from) + begun - 1;
-            self.note(&[format!(
-                "to go on at the stroke that was begun last, add --from {left_out}"
-            )]);
+            let text = if self.args.resume {
+                "to go on at the stroke that was begun last, do the same again".to_owned()
+            } else {
+                format!(
+                    "to go on at the stroke that was begun last, add --from {left_out}, or \
+                     --resume if the plotter has flash for how far it comes"
+                )
+            };
+            self.note(&[text]);
         }
         sent
     }
@@ -195,6 +250,14 @@ impl Plot<'_> {
             return Err(busy());
         }
         let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
+        let size = streamed.size().strokes;
+        let drawn = taken.strokes.and_then(|all| size.checked_sub(all));
+        if let Some(drawn) = drawn.filter(|drawn| *drawn > 0) {
+            // The rest of a drawing that had stopped has the number of the whole.
+            let id = streamed.id();
+            streamed = host.streamed(Form::Strokes, self.args.from + drawn)?.0;
+            streamed.set_id(id);
+        }
         if streamed.id() != taken.id || !streamed.skip(taken.targets) {
             return Err(busy());
         }

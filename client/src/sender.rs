@@ -20,7 +20,7 @@ mod patience;
 mod streaming;
 
 pub use patience::Patience;
-pub use streaming::Taken;
+pub use streaming::{Stopped, Taken};
 
 use crate::error::Error;
 use crate::link::{Link, Order};

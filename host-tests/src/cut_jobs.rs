@@ -100,7 +100,18 @@ pub fn switch_on(
     flash: CutFlash,
     work: impl FnOnce(&mut Powered<'_, '_>),
 ) -> (CutFlash, Vec<Stamped>) {
-    let mut memory = Box::new(Memory::<1024, 4096, 16384, PORTS>::new());
+    switch_on_with::<16384>(flash, work)
+}
+
+/// Does what [`switch_on`] does with a board that has so many `WORDS` of working memory.
+///
+/// # Panics
+/// As [`switch_on`].
+pub fn switch_on_with<const WORDS: usize>(
+    flash: CutFlash,
+    work: impl FnOnce(&mut Powered<'_, '_>),
+) -> (CutFlash, Vec<Stamped>) {
+    let mut memory = Box::new(Memory::<1024, 4096, WORDS, PORTS>::new());
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();

@@ -188,6 +188,18 @@ impl StreamedJob {
         self.header.id
     }
 
+    /// Gives the drawing another number, by which a plotter knows the whole of which it is the rest.
+    /// As G-code it has none.
+    pub fn set_id(&mut self, id: u32) {
+        let (Form::Strokes, Some(&(end, _))) = (self.form, self.begins.get(1)) else { return };
+        self.header.id = id;
+        let header = self.header.line();
+        self.text.replace_range(..end, &header);
+        for (begin, _) in self.begins.iter_mut().skip(1) {
+            *begin = *begin + header.len() - end;
+        }
+    }
+
     /// The number of targets: of points, those to which the pen moves without drawing among them.
     pub fn targets(&self) -> u32 {
         self.header.targets

@@ -91,6 +91,9 @@ impl Machine<'_> {
             return false;
         }
         self.activity.set_source(Source::Late(late));
+        if late.within_stroke {
+            self.interrupt_stroke();
+        }
         true
     }
 
@@ -117,6 +120,8 @@ impl Machine<'_> {
         if late.within_stroke && draws {
             // The motion planner will count the rest of the stroke as another one.
             self.progress.go_on_with_stroke();
+        } else if late.within_stroke {
+            self.complete_stroke();
         }
         self.activity.set_source(Source::Path);
         false

@@ -118,6 +118,24 @@ impl Machine<'_> {
         }
     }
 
+    /// The pen is raised within a stroke whose rest is late, so the stroke is not drawn yet.
+    #[cfg(feature = "stream")]
+    pub(super) const fn interrupt_stroke(&mut self) {
+        if let Some(open) = &mut self.log.open {
+            open.begin = open.begin.wrapping_add(1);
+            open.noted = open.noted.wrapping_add(1);
+        }
+    }
+
+    /// What was late is no rest of the stroke: that was whole, and is still to be noted.
+    #[cfg(feature = "stream")]
+    pub(super) const fn complete_stroke(&mut self) {
+        if let Some(open) = &mut self.log.open {
+            open.begin = open.begin.wrapping_sub(1);
+            open.noted = open.noted.wrapping_sub(1);
+        }
+    }
+
     /// The path was planned to its end.
     pub(super) fn complete_log(&mut self) {
         let is_end = matches!(
@@ -138,6 +156,14 @@ impl Machine<'_> {
         let StrokeLog {} = self.log;
         false
     }
+
+    /// The pen is raised within a stroke.
+    #[cfg(feature = "stream")]
+    pub(super) const fn interrupt_stroke(&mut self) {}
+
+    /// The stroke was whole.
+    #[cfg(feature = "stream")]
+    pub(super) const fn complete_stroke(&mut self) {}
 
     /// Stops noting strokes.
     pub(super) const fn end_log(&mut self) {}

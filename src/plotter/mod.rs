@@ -609,7 +609,7 @@ impl<I: Index> Inner<'_, I> {
             #[cfg(feature = "hpgl")]
             Command::HpGl => return Err(CommandError::UnknownSystemCommand),
             #[cfg(feature = "stream")]
-            Command::BeginStream(header) => self.begin_streamed(header)?,
+            Command::BeginStream(header) => self.begin_streamed(header, board)?,
             #[cfg(feature = "stream")]
             Command::Strokes(strokes) => self.take_strokes(strokes)?,
             #[cfg(feature = "stream")]

@@ -71,7 +71,7 @@ impl<I: Index> Inner<'_, I> {
             #[cfg(feature = "resume")]
             Drawing::Stopped { at_origin } => self
                 .load_stopped(at_origin, listener.board)
-                .and_then(|drawn| self.begin_rest(drawn, &mut listener)),
+                .and_then(|drawn| drawn.map_or(Ok(()), |it| self.begin_rest(it, &mut listener))),
         };
         let requests = listener.requests;
         if requests.has(RealTime::EMERGENCY) {
@@ -79,6 +79,23 @@ impl<I: Index> Inner<'_, I> {
         }
         begun?;
         self.report_degenerate(board);
+        self.act(requests);
+        Ok(())
+    }
+
+    /// Waits until the last moves are made, while the user is listened to.
+    ///
+    /// # Errors
+    /// [`Aborted`] if the user does not want what comes next.
+    #[cfg(all(feature = "stream", feature = "resume"))]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn stand<B: Board>(&mut self, board: &mut B) -> Result<(), Aborted> {
+        let [x, y] = self.machine.position_mm();
+        let (position, inches) = ([x, y, self.program.z()], self.in_inches());
+        let requests = RealTime::default();
+        let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
+        self.settle(&mut listener)?;
+        let requests = listener.requests;
         self.act(requests);
         Ok(())
     }

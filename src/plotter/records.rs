@@ -124,6 +124,10 @@ pub(super) fn save_parameters<B: Board>(
 
 /// A mark at the beginning of a kept job; a job with another layout has another mark.
 const JOB_LAYOUT: u32 = u32::from_le_bytes(*b"job1");
+/// A mark in place of [`JOB_LAYOUT`] for a job of which nothing is kept, because it was sent while
+/// it was drawn.
+#[cfg(all(feature = "stream", feature = "resume"))]
+const STREAMED_LAYOUT: u32 = u32::from_le_bytes(*b"jobs");
 /// Number of words before a job's memory: the layout, the steps per millimetre of x and y, and the
 /// job's figures.
 const JOB_HEADER: usize = 3 + FIGURES;
@@ -153,6 +157,16 @@ pub(super) fn save_job<B: Board, I: Index>(
     }
     let memory = words.get(..job.words()).ok_or(NotStored)?;
     board.save(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
+}
+
+/// Keeps, in place of the last job, that one was sent while it was drawn, by the number by which its
+/// sender knows it. Its strokes are not kept.
+///
+/// # Errors
+/// [`NotStored`]: the previous job is still kept.
+#[cfg(all(feature = "stream", feature = "resume"))]
+pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotStored> {
+    board.save(Record::Job, &[&STREAMED_LAYOUT.to_le_bytes(), &id.to_le_bytes()])
 }
 
 /// Loads the job that was kept last. Its memory is then in `words`.

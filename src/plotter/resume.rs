@@ -5,6 +5,10 @@
 //! settings that decide where ink falls, and the model. If one of these has changed, the job is not
 //! continued, because its parts would not fit together.
 //!
+//! Of a job that a computer sends while it is drawn, the strokes are not kept, but how many of them
+//! are drawn and by which number its sender knows it. `$stream` tells both, so that the sender can
+//! go on there.
+//!
 //! After a restart the machine does not know where the pen is. It must be homed, or the user puts
 //! the pen at the origin by hand and says so.
 //!
@@ -22,6 +26,13 @@ pub(super) struct Resumption {
     /// job of which that is kept.
     #[cfg(feature = "resume")]
     progress: Option<[u32; 2]>,
+    /// How many strokes are noted at once, less one: more than one stroke in jobs that are sent
+    /// and have more strokes than the flash notes.
+    #[cfg(feature = "resume")]
+    more_at_once: u32,
+    /// How many strokes of a job that is sent were drawn before its sender went on.
+    #[cfg(feature = "resume")]
+    drawn_before: u32,
     /// Whether the position of the pen is not known since the job stopped.
     #[cfg(feature = "resume")]
     is_lost: bool,
@@ -61,8 +72,13 @@ mod with_feature {
 
     /// A mark at the beginning of the notes; those with another layout have another mark.
     const LAYOUT: u32 = u32::from_le_bytes(*b"run2");
+    /// The mark of the notes of a job that is sent while it is drawn.
+    const STREAMED: u32 = u32::from_le_bytes(*b"str1");
+    /// The most strokes that are noted at once.
+    const MOST_AT_ONCE: u32 = 1 << 12;
     /// Number of words before the settings: layout, version, strokes, whether the model is known,
-    /// and the checksums of model and options.
+    /// and the checksums of model and options. For a job that is sent the last three are how many
+    /// strokes are noted at once, the number by which its sender knows it, and 0.
     const HEAD: usize = 6;
     /// Size of the notes in words: each setting takes two.
     const WORDS: usize = HEAD + 2 * PLACING.len();
@@ -78,11 +94,17 @@ mod with_feature {
         digest.finalize()
     }
 
-    /// The notes of a job of so many strokes. `contents` are the checksums of the model and of the
-    /// options from which it was computed, if they are known.
-    fn begin_notes(settings: &Settings, strokes: u32, contents: Option<[u32; 2]>) -> Notes {
+    /// The three words of notes that tell what a job was computed from: the checksums of the model
+    /// and of the options, if they are known.
+    fn words_of(contents: Option<[u32; 2]>) -> [u32; 3] {
         let [model, options] = contents.unwrap_or_default();
-        let head = [LAYOUT, version(), strokes, u32::from(contents.is_some()), model, options];
+        [u32::from(contents.is_some()), model, options]
+    }
+
+    /// The notes of a job of so many strokes, with a mark and the three words that tell more of it.
+    fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
+        let [first, second, third] = more;
+        let head = [layout, version(), strokes, first, second, third];
         let settings = PLACING.into_iter().flat_map(|setting| {
             [setting.info().number.into(), settings.get(setting).to_bits().cast_unsigned()]
         });
@@ -124,8 +146,9 @@ mod with_feature {
         /// Looks for a job that the last run of the firmware did not finish.
         #[inline(never)] // Keeps its frame off the stack while the stages run.
         pub(in crate::plotter) fn find_stopped<B: Board>(&mut self, board: &mut B) {
+            let found = read(board);
             self.resumption.progress =
-                read(board).map(|(notes, noted)| [noted.parts, strokes(&notes)]);
+                found.map(|(notes, noted)| [done(&notes, noted), strokes(&notes)]);
             self.resumption.is_lost = true;
         }
 
@@ -142,7 +165,8 @@ mod with_feature {
                 return;
             }
             let strokes = self.machine.status().job.strokes;
-            let notes = begin_notes(self.machine.settings(), strokes, contents);
+            let more = words_of(contents);
+            let notes = begin_notes(self.machine.settings(), LAYOUT, strokes, more);
             if board.begin_progress(notes.as_flattened(), strokes).is_err() {
                 return refuse(board);
             }
@@ -167,7 +191,12 @@ mod with_feature {
         /// Keeps that so many strokes have been drawn.
         #[inline(never)] // Inlined, it would take room in the main loop.
         fn note_stroke<B: Board>(&mut self, strokes: u32, board: &mut B) {
-            if board.note_progress(strokes).is_err() {
+            let at_once = self.resumption.more_at_once + 1;
+            let strokes = strokes.saturating_add(self.resumption.drawn_before);
+            let is_end = self.resumption.progress.is_some_and(|[_, all]| strokes == all);
+            // The last few strokes count as soon as all of them are drawn.
+            let parts = if is_end { strokes.div_ceil(at_once) } else { strokes / at_once };
+            if board.note_progress(parts).is_err() {
                 self.machine.end_log();
                 self.resumption.progress = None;
                 return refuse(board);
@@ -191,7 +220,8 @@ mod with_feature {
         }
 
         /// Loads the job that has stopped, and returns how much of it is drawn. With `at_origin`
-        /// the user has put the pen at the origin.
+        /// the user has put the pen at the origin. `None` if its sender has the strokes, and the
+        /// plotter knows no more than that the pen is at the origin.
         ///
         /// # Errors
         /// [`CommandError::NothingToResume`] if no job has stopped, or the reason why it cannot go
@@ -201,12 +231,23 @@ mod with_feature {
             &mut self,
             at_origin: bool,
             board: &mut B,
-        ) -> Result<Noted, CommandError> {
+        ) -> Result<Option<Noted>, CommandError> {
             let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
-            if noted.parts >= strokes(&notes) {
+            if done(&notes, noted) >= strokes(&notes) {
                 return Err(CommandError::NothingToResume);
             }
             self.check_notes(&notes)?;
+            if is_streamed(&notes) {
+                Reply(board).line(format_args!(
+                    "[MSG:the job was sent while it was drawn: its sender sends the rest]"
+                ));
+                if !at_origin {
+                    return Err(CommandError::NothingToResume);
+                }
+                self.machine.declare_origin()?;
+                self.resumption.is_lost = false;
+                return Ok(None);
+            }
             if self.resumption.is_lost && !at_origin {
                 return Err(CommandError::PositionUnknown);
             }
@@ -217,9 +258,9 @@ mod with_feature {
             if at_origin {
                 self.machine.declare_origin()?;
             }
-            self.resumption =
-                Resumption { progress: Some([noted.parts, strokes(&notes)]), is_lost: false };
-            Ok(noted)
+            let progress = Some([noted.parts, strokes(&notes)]);
+            self.resumption = Resumption { progress, ..Resumption::default() };
+            Ok(Some(noted))
         }
 
         /// Checks that what a job depends on is as it was when the job began.
@@ -240,7 +281,8 @@ mod with_feature {
                 }
             }
             let is_empty = self.model.vertices().is_empty();
-            if is_known != 0 && !is_empty && model != self.model.checksum() {
+            let is_computed = is_known != 0 && !is_streamed(notes);
+            if is_computed && !is_empty && model != self.model.checksum() {
                 return Err(CommandError::OtherModel);
             }
             Ok(())
@@ -285,12 +327,106 @@ mod with_feature {
         }
     }
 
+    impl<I: Index> Inner<'_, I> {
+        /// Begins to keep how far a job comes that is sent while it is drawn, and that its sender
+        /// knows by the number `id`. If it is the rest of the job that has stopped, goes on with
+        /// what is kept of that. Nothing may move yet.
+        #[cfg(feature = "stream")]
+        #[inline(never)] // Keeps its frame off the stack while the stages run.
+        pub(in crate::plotter) fn keep_streamed<B: Board>(&mut self, id: u32, board: &mut B) {
+            let stopped = core::mem::take(&mut self.resumption).progress;
+            if self.machine.state() != State::Run || !board.keeps_progress() {
+                return;
+            }
+            let strokes = self.machine.status().job.strokes;
+            // The sender of the rest calls it by the number of the whole.
+            let is_rest = |[done, all]: &[u32; 2]| done < all && strokes == all - done;
+            if let Some([drawn, all]) = stopped.filter(is_rest)
+                && let Some((notes, _)) = read(board)
+                && is_streamed(&notes)
+                && let [_, _, _, at_once, found, ..] = notes.map(u32::from_le_bytes)
+                && found == id
+            {
+                self.machine.log_strokes(0);
+                self.resumption = Resumption {
+                    progress: Some([drawn, all]),
+                    more_at_once: at_once.saturating_sub(1),
+                    drawn_before: drawn,
+                    is_lost: false,
+                };
+                return;
+            }
+            // It takes the place of the job that `$again` would draw, which is not the last one any
+            // more.
+            if records::save_streamed(id, board).is_err() {
+                return refuse(board);
+            }
+            let mut at_once = 1;
+            while at_once <= MOST_AT_ONCE {
+                let more = [at_once, id, 0];
+                let notes = begin_notes(self.machine.settings(), STREAMED, strokes, more);
+                let parts = strokes.div_ceil(at_once);
+                if board.begin_progress(notes.as_flattened(), parts).is_ok() {
+                    self.machine.log_strokes(0);
+                    self.resumption.more_at_once = at_once - 1;
+                    self.resumption.progress = Some([0, strokes]);
+                    return;
+                }
+                at_once *= 2;
+            }
+            refuse(board);
+        }
+
+        /// Says how far a job has come that was sent while it was drawn and has stopped, so that
+        /// its sender can go on: the number by which it knows the job, how many strokes are drawn
+        /// and how many there are, and whether the position of the pen is unknown since then.
+        /// Returns whether there is such a job.
+        ///
+        /// # Errors
+        /// What the job depends on has changed.
+        #[cfg(feature = "stream")]
+        #[inline(never)] // Keeps its frame off the stack while the stages run.
+        pub(in crate::plotter) fn report_stopped_stream<B: Board>(
+            &self,
+            board: &mut B,
+        ) -> Result<bool, CommandError> {
+            let Some([drawn, all]) = self.resumption.stopped(self.machine.state()) else {
+                return Ok(false);
+            };
+            let Some((notes, _)) = read(board).filter(|(notes, _)| is_streamed(notes)) else {
+                return Ok(false);
+            };
+            self.check_notes(&notes)?;
+            let [_, _, _, _, id, ..] = notes.map(u32::from_le_bytes);
+            let is_lost = u8::from(self.resumption.is_lost);
+            Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost}]"));
+            Ok(true)
+        }
+    }
+
+    /// Whether the notes are those of a job that is sent while it is drawn.
+    fn is_streamed(notes: &Notes) -> bool {
+        let [layout, ..] = notes.map(u32::from_le_bytes);
+        layout == STREAMED
+    }
+
+    /// How many strokes of a job with these notes are drawn once so much is noted.
+    fn done(notes: &Notes, noted: Noted) -> u32 {
+        let [_, _, strokes, at_once, ..] = notes.map(u32::from_le_bytes);
+        if is_streamed(notes) {
+            noted.parts.saturating_mul(at_once).min(strokes)
+        } else {
+            noted.parts
+        }
+    }
+
     /// Reads the notes of the kept job, and how much of it is drawn.
     fn read<B: Board>(board: &mut B) -> Option<(Notes, Noted)> {
         let mut notes: Notes = [[0; 4]; WORDS];
         let (length, noted) = board.progress(notes.as_flattened_mut())?;
         let [layout, ..] = notes.map(u32::from_le_bytes);
-        (length == size_of::<Notes>() && layout == LAYOUT).then_some((notes, noted))
+        let is_known = layout == LAYOUT || layout == STREAMED;
+        (length == size_of::<Notes>() && is_known).then_some((notes, noted))
     }
 
     /// The number of strokes of a job.
@@ -330,6 +466,22 @@ mod without_feature {
     }
 
     impl<I: Index> Inner<'_, I> {
+        /// Keeps nothing of a job that is sent while it is drawn.
+        #[cfg(feature = "stream")]
+        pub(in crate::plotter) const fn keep_streamed<B: Board>(&mut self, _: u32, _: &mut B) {}
+
+        /// Whether a job has stopped that was sent while it was drawn: none.
+        ///
+        /// # Errors
+        /// None.
+        #[cfg(feature = "stream")]
+        pub(in crate::plotter) const fn report_stopped_stream<B: Board>(
+            &self,
+            _: &mut B,
+        ) -> Result<bool, super::CommandError> {
+            Ok(false)
+        }
+
         /// Looks for a job that has stopped: there is none.
         pub(in crate::plotter) const fn find_stopped<B: Board>(&mut self, _: &mut B) {}
 

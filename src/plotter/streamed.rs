@@ -124,17 +124,26 @@ impl<I: Index> Inner<'_, I> {
     /// [`CommandError::OtherSteps`] if it was computed for other steps, or the machine's refusal of
     /// its bounds. Nothing moves then.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn begin_streamed(&mut self, text: &str) -> Result<(), CommandError> {
+    pub(super) fn begin_streamed<B: Board>(
+        &mut self,
+        text: &str,
+        board: &mut B,
+    ) -> Result<(), CommandError> {
         let header = StreamHeader::parse(text)?;
         let steps = self.machine.settings().page_steps().map(|steps| steps.to_bits());
         if self.machine.state() == State::Idle && steps != header.steps {
             return Err(CommandError::OtherSteps);
+        }
+        #[cfg(feature = "resume")]
+        if self.machine.state() == State::Idle && self.stand(board).is_err() {
+            return Err(CommandError::Aborted);
         }
         self.machine.start_streamed(header.size, [header.least, header.greatest])?;
         self.copy_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
         self.streamed = Streamed { header, taken: 0, released: 0 };
+        self.keep_streamed(header.id, board);
         Ok(())
     }
 
@@ -188,13 +197,15 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// Says how much of the job has come, so that its sender can go on.
+    /// Says how much of the job has come, or how far a job has come that has stopped, so that its
+    /// sender can go on.
     ///
     /// # Errors
-    /// [`CommandError::NoStream`].
+    /// [`CommandError::NoStream`], or what the job that has stopped depends on has changed.
     pub(super) fn report_streamed<B: Board>(&self, board: &mut B) -> Result<(), CommandError> {
         if !self.is_streamed() {
-            return Err(CommandError::NoStream);
+            let is_stopped = self.report_stopped_stream(board)?;
+            return if is_stopped { Ok(()) } else { Err(CommandError::NoStream) };
         }
         let Streamed { header, taken, .. } = self.streamed;
         Reply(board).line(format_args!("[STREAM:{},{taken},{}]", header.id, header.targets));

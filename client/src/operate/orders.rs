@@ -58,6 +58,11 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
     link.obey_keys();
     let mut progress = progress(args.plotter.format.json, is_quiet);
     let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+    if sender.stopped_drawing()?.is_some() {
+        let reason = "a computer sent this drawing while it was drawn: name its file, with the \
+                      same options, in `penup plot FILE --port DEVICE --resume`";
+        return Err(Error::NotResumed { reason: reason.to_owned() });
+    }
     let drawn = sender.go_on(args.at_origin, progress.as_mut()).and_then(|()| sender.status());
     sender.end();
     Ok(done("the rest of the job is drawn", &drawn?))

@@ -17,6 +17,21 @@ pub struct Taken {
     pub id: u32,
     /// How many of its targets have come.
     pub targets: u32,
+    /// How many strokes are drawn in all, if the plotter has said so.
+    pub strokes: Option<u32>,
+}
+
+/// A drawing that was sent while it was drawn, and that the plotter has stopped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Stopped {
+    /// The number by which the plotter knows it: [`StreamedJob::id`].
+    pub id: u32,
+    /// How many of its strokes are drawn.
+    pub drawn: u32,
+    /// How many strokes it has.
+    pub all: u32,
+    /// Whether nobody has said where the pen is since then.
+    pub is_lost: bool,
 }
 
 /// What is known of a drawing while its lines are sent.
@@ -92,7 +107,8 @@ impl<'a> Sender<'a> {
                 Err(error) => return Err(error),
             };
             if let Some(taken) = replies.iter().find_map(taken_in) {
-                return Ok(Some((sender, taken)));
+                let strokes = status.strokes.and_then(|(_, all)| u32::try_from(all).ok());
+                return Ok(Some((sender, Taken { strokes, ..taken })));
             }
         }
         Ok(None)
@@ -110,6 +126,28 @@ impl<'a> Sender<'a> {
             Err(Error::Refused { .. }) => Ok(Form::GCode),
             other => other.map(|_| Form::Strokes),
         }
+    }
+
+    /// How far a drawing has come that was sent while it was drawn and has stopped; `None` if there
+    /// is none.
+    ///
+    /// # Errors
+    /// What it depends on has changed, or as [`Sender::ask`].
+    pub fn stopped_drawing(&mut self) -> Result<Option<Stopped>, Error> {
+        for _ in 0..super::MOST_QUESTIONS {
+            match self.ask(STREAM) {
+                Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
+                    return Ok(None);
+                }
+                answered => {
+                    let stopped = answered?.iter().find_map(stopped_in);
+                    if stopped.is_some() {
+                        return Ok(stopped);
+                    }
+                }
+            }
+        }
+        Ok(None)
     }
 
     /// Sends a drawing while it is drawn, and waits until the machine is idle again.
@@ -133,11 +171,20 @@ impl<'a> Sender<'a> {
     }
 }
 
+/// The answer to `$stream` after a stop: `[STOPPED:id,drawn,all,lost]`.
+fn stopped_in(reply: &Reply) -> Option<Stopped> {
+    let Reply::Other(line) = reply else { return None };
+    let mut numbers = line.strip_prefix("[STOPPED:")?.strip_suffix(']')?.split(',');
+    let mut next = || numbers.next()?.parse::<u32>().ok();
+    let (id, drawn, all, lost) = (next()?, next()?, next()?, next()?);
+    Some(Stopped { id, drawn, all, is_lost: lost != 0 })
+}
+
 /// The answer to `$stream`: `[STREAM:id,taken,all]`.
 fn taken_in(reply: &Reply) -> Option<Taken> {
     let Reply::Other(line) = reply else { return None };
     let mut numbers = line.strip_prefix("[STREAM:")?.strip_suffix(']')?.split(',');
     let mut next = || numbers.next()?.parse::<u32>().ok();
     let (id, targets, _) = (next()?, next()?, next()?);
-    Some(Taken { id, targets })
+    Some(Taken { id, targets, strokes: None })
 }

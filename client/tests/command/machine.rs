@@ -400,6 +400,49 @@ fn a_job_goes_on_after_a_loss_of_power() {
 }
 
 #[test]
+fn a_drawing_that_is_sent_goes_on_after_a_loss_of_power() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let mut client = plotter.plot_rows(folder.path(), &["--compute", "host"]);
+    plotter.slow.store(true, Ordering::Relaxed);
+    while plotter.heard.load(Ordering::Relaxed) < 700 {
+        std::thread::sleep(Duration::from_millis(5));
+        assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
+    }
+    // The plotter has room for all strokes, which come within a second.
+    std::thread::sleep(Duration::from_secs(2));
+    plotter.slow.store(false, Ordering::Relaxed);
+    client.kill().expect("killed");
+    client.wait().expect("it ends");
+    while plotter.strokes(folder.path()) < 3 {}
+    plotter.cut.store(true, Ordering::Relaxed);
+    while plotter.cut.load(Ordering::Relaxed) {}
+    let (code, stopped) = plotter.json(folder.path(), &["status"]);
+    let drawn = stopped["stopped"]["done"].as_u64().expect("a number");
+    assert_eq!((code, &stopped["stopped"]["all"]), (Some(0), &120.into()));
+    let (code, _, error) = plotter.run(folder.path(), &["resume", "--at-origin"]);
+    assert_eq!((code, error.contains("--resume")), (Some(1), true), "{error}");
+    let go_on = |options: &[&str]| {
+        let output = plotter.rows(folder.path(), options).stderr(Stdio::piped()).output();
+        let output = output.expect("the program runs");
+        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+    };
+    let (code, error) = go_on(&["--resume"]);
+    assert_eq!((code, error.contains("--at-origin")), (Some(1), true), "{error}");
+    let (code, error) = go_on(&["--resume", "--at-origin", "--scale", "0.9"]);
+    assert_eq!((code, error.contains("another drawing")), (Some(1), true), "{error}");
+    let (code, error) = go_on(&["--resume", "--at-origin"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(error.contains(&format!("{drawn} of 120 strokes are drawn")), "{error}");
+    let (_, ended) = plotter.json(folder.path(), &["status"]);
+    let rest = 120 - drawn;
+    assert_eq!(ended["strokes"], serde_json::json!({ "done": rest, "all": rest }));
+    assert_eq!(ended["stopped"], serde_json::Value::Null);
+    let (code, error) = go_on(&["--resume"]);
+    assert_eq!((code, error.contains("no drawing has stopped")), (Some(1), true), "{error}");
+}
+
+#[test]
 fn a_job_goes_on_without_its_client_and_is_joined_again() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();

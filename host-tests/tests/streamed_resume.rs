@@ -1,0 +1,255 @@
+//! Drawings that a computer sends while they are drawn, and whose plotter loses its power: judged
+//! by the ink that the pins leave.
+
+#![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
+
+use penup::plotter::{Board as _, Unobserved};
+use penup::stage::{Aborted, Cancel};
+use penup_host_tests::cut_jobs::{
+    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_with,
+};
+use penup_host_tests::random::Random;
+use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_job::pins::PinChange;
+use penup_job::streamed::{Form, StreamedJob};
+use penup_readers::lines::Lines as _;
+
+/// A pen that takes little time, so that the tests do not either.
+const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];
+
+/// The working memory of the plotter in words: a target that has come takes one.
+const WORDS: usize = 1000;
+
+struct Never;
+
+impl Cancel for Never {
+    fn check(&mut self) -> Result<(), Aborted> {
+        Ok(())
+    }
+}
+
+/// A drawing that a computer has computed.
+struct Drawing {
+    /// The settings of the machine.
+    settings: Vec<String>,
+    /// The plotter in memory that has computed it.
+    bench: Bench,
+}
+
+impl Drawing {
+    /// Computes what these lines describe, whose last is `$plot`.
+    fn of(lines: &[String]) -> Self {
+        let (_, before) = lines.split_last().expect("lines");
+        let mut bench = Bench::new();
+        for line in before {
+            assert!(bench.say(&format!("{line}\n")).ends_with("ok\n"), "{line}");
+        }
+        bench.plotter.compute(&mut Never, &mut Unobserved).expect("a job");
+        let is_of_machine =
+            |line: &&String| line.starts_with('$') && line.as_bytes()[1].is_ascii_digit();
+        Self { settings: before.iter().filter(is_of_machine).cloned().collect(), bench }
+    }
+
+    /// Its lines without the first strokes.
+    fn from(&mut self, strokes: u32) -> StreamedJob {
+        let settings = *self.bench.plotter.machine().settings();
+        let mut path = self.bench.plotter.strokes();
+        assert!(strokes == 0 || path.begin_at(strokes), "so many strokes");
+        StreamedJob::new(&settings, &mut path, Form::Strokes).expect("lines of strokes")
+    }
+}
+
+/// The numbers of a `[STOPPED:id,drawn,all,lost]`, if that is answered to `$stream`.
+fn stopped(plotter: &mut Powered<'_, '_>) -> Option<[u32; 4]> {
+    plotter.heard();
+    let answer = plotter.say("$stream");
+    if answer.ends_with("error:181\n") {
+        return None;
+    }
+    let numbers = answer.trim_start_matches("[STOPPED:").trim_end_matches("]\nok\n");
+    let numbers: Vec<u32> =
+        numbers.split(',').map(|it| it.parse().unwrap_or_else(|_| panic!("{answer}"))).collect();
+    Some(numbers.try_into().expect("four numbers"))
+}
+
+/// Sends lines while they are drawn, with a line late now and then, for this many milliseconds at
+/// most. Returns whether the drawing has ended.
+fn send(
+    plotter: &mut Powered<'_, '_>,
+    job: &StreamedJob,
+    late_once_in: i32,
+    mut milliseconds: u64,
+    random: &mut Random,
+) -> bool {
+    let lines: Vec<String> = job.in_order().map(|line| line.sent).collect();
+    for line in lines {
+        if late_once_in > 0 && random.once_in(late_once_in) {
+            let passed = plotter.run(milliseconds.min(20_000));
+            milliseconds -= passed;
+        }
+        plotter.board.receive(format!("{line}\n").as_bytes());
+        while plotter.plotter.poll(plotter.board) {}
+        while !plotter.board.has_read_all() {
+            if milliseconds == 0 || plotter.is_cut() {
+                return false;
+            }
+            milliseconds -= 1;
+            plotter.board.wait();
+            while plotter.plotter.poll(plotter.board) {}
+        }
+        if milliseconds == 0 || plotter.is_cut() {
+            return false;
+        }
+        assert!(plotter.heard().ends_with("ok\n"), "{line}");
+    }
+    plotter.run(milliseconds) < milliseconds && !plotter.is_cut()
+}
+
+/// Sends a drawing to a plotter whose power fails at random instants, or while a random byte of its
+/// flash is written, and sends the rest as a client does. Returns the strokes of each run.
+fn draw_with_cuts(
+    drawing: &mut Drawing,
+    cuts: u32,
+    late_once_in: i32,
+    milliseconds: u64,
+    random: &mut Random,
+) -> Vec<Vec<Vec<Point>>> {
+    let mut flash = empty_flash();
+    let mut runs: Vec<Vec<Vec<Point>>> = Vec::new();
+    let whole = drawing.from(0);
+    let all = whole.size().strokes;
+    let mut is_over = false;
+    for number in 0..=cuts {
+        let is_last = number == cuts;
+        let after = if is_last { u64::MAX / 2 } else { random.below(milliseconds) };
+        let in_flash = !is_last && random.once_in(3);
+        let (left, changes) = switch_on_with::<WORDS>(flash.powered(), |plotter| {
+            let found = stopped(plotter);
+            if found.is_none() && runs.iter().any(|run| !run.is_empty()) {
+                is_over = true;
+                return;
+            }
+            let from = found.map_or(0, |[id, drawn, found_all, lost]| {
+                assert_eq!((whole.id(), all), (id, found_all), "it is known again");
+                assert_eq!(lost, 1, "nobody has said where the pen is");
+                drawn
+            });
+            if found.is_some() {
+                assert!(plotter.say("$resume").contains("error:163\n"), "it has no strokes");
+                assert!(plotter.say("$resume=origin").ends_with("ok\n"));
+                let [.., lost] = stopped(plotter).expect("still stopped");
+                assert_eq!(lost, 0);
+            } else {
+                plotter.order(&drawing.settings);
+            }
+            if plotter.is_cut() {
+                return;
+            }
+            let mut job = drawing.from(from);
+            job.set_id(whole.id());
+            if in_flash {
+                let budget = random.below(256 * u64::from(all - from + 2)) as usize;
+                plotter.board.flash().expect("flash").budget = budget;
+            }
+            is_over = send(plotter, &job, late_once_in, after, random);
+            if is_over {
+                assert_eq!(stopped(plotter), None, "nothing is left");
+                assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
+                assert!(plotter.say("$again").ends_with("error:161\n"), "it is not kept");
+            }
+        });
+        flash = left;
+        runs.push(strokes_of(changes.iter().map(PinChange::from)));
+        if is_over {
+            break;
+        }
+    }
+    assert!(is_over, "the last run has no cut");
+    runs
+}
+
+/// What a drawing is without a cut: its strokes, and the milliseconds that it takes.
+fn undisturbed(drawing: &mut Drawing) -> (Vec<Vec<Point>>, u64) {
+    let job = drawing.from(0);
+    let (_, changes) = switch_on_with::<WORDS>(empty_flash(), |plotter| {
+        plotter.order(&drawing.settings);
+        assert!(send(plotter, &job, 0, u64::MAX / 2, &mut Random::new(1)));
+    });
+    let milliseconds = job.size().milliseconds;
+    (strokes_of(changes.iter().map(PinChange::from)), milliseconds)
+}
+
+#[test]
+fn a_drawing_that_is_sent_arrives_whole_although_the_power_fails() {
+    let options = ["$page=60x60", "$margin=5", "$hidden=erased"];
+    let lines = job_lines("lattice2.obj", &[&QUICK_PEN[..], &options].concat());
+    let mut drawing = Drawing::of(&lines);
+    let (whole, milliseconds) = undisturbed(&mut drawing);
+    let mut twice = 0;
+    for seed in 0..8 {
+        let random = &mut Random::new(1971 + seed);
+        let runs = draw_with_cuts(&mut drawing, 8, 0, milliseconds / 4, random);
+        twice += assert_one_drawing(&whole, &runs);
+    }
+    assert!(twice > 5, "{twice}: a cut comes in the middle of a stroke more often than not");
+}
+
+/// A spiral in one stroke and a few short ones, whose lines come late: the pen rises within the
+/// stroke, which is not drawn by then.
+#[test]
+fn a_stroke_whose_rest_was_late_is_not_taken_for_drawn() {
+    let mut lines: Vec<String> = Vec::new();
+    let points = 4000;
+    for index in 0..points {
+        let (angle, radius) = (f64::from(index) * 0.2, 1.0 + f64::from(index) * 0.004);
+        lines.push(format!(
+            "v {:.3} {:.3} 0",
+            30.0 + radius * angle.cos(),
+            30.0 + radius * angle.sin()
+        ));
+    }
+    for first in (1..points).step_by(20) {
+        let last = points.min(first + 20);
+        let numbers: Vec<String> = (first..=last).map(|number| number.to_string()).collect();
+        lines.push(format!("l {}", numbers.join(" ")));
+    }
+    lines.extend(["v 0 0 0", "v 4 0 0", "v 0 60 0", "v 5 60 0"].map(str::to_owned));
+    lines.extend([
+        format!("l {} {}", points + 1, points + 2),
+        format!("l {} {}", points + 3, points + 4),
+    ]);
+    let options = ["$view=auto", "$page=70x70", "$margin=5", "$110=6000", "$111=6000", "$plot"];
+    lines.extend(QUICK_PEN.iter().chain(&options).map(|line| (*line).to_owned()));
+    let mut drawing = Drawing::of(&lines);
+    let (whole, milliseconds) = undisturbed(&mut drawing);
+    let mut cuts = 0;
+    for seed in 0..6 {
+        let random = &mut Random::new(1979 + seed);
+        let runs = draw_with_cuts(&mut drawing, 5, 6, milliseconds, random);
+        assert!(ink(runs.iter().flatten()) == ink(&whole), "seed {seed}: the ink differs");
+        cuts += runs.len() - 1;
+    }
+    assert!(cuts > 6, "{cuts}");
+}
+
+#[test]
+fn what_a_drawing_depends_on_must_be_as_it_was() {
+    let options = ["$page=20x20", "$margin=4"];
+    let lines = job_lines("cube.obj", &[&QUICK_PEN[..], &options].concat());
+    let mut drawing = Drawing::of(&lines);
+    let job = drawing.from(0);
+    let (flash, _) = switch_on_with::<WORDS>(empty_flash(), |plotter| {
+        plotter.order(&drawing.settings);
+        assert!(!send(plotter, &job, 0, 1000, &mut Random::new(3)));
+    });
+    switch_on_with::<WORDS>(flash.powered(), |plotter| {
+        let greeting = plotter.heard();
+        assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
+        assert!(plotter.status().contains("|Stopped:"));
+        plotter.order(&["$3=1".to_owned()]);
+        let answer = plotter.say("$stream");
+        assert!(answer.contains("error:1") && !answer.contains("STOPPED"), "{answer}");
+        plotter.order(&["$3=0".to_owned()]);
+        assert!(stopped(plotter).is_some());
+    });
+}
