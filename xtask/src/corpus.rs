@@ -102,7 +102,7 @@ enum Fate {
 ///
 /// # Errors
 /// A collection cannot be fetched, or a file made the client panic, took too long, or was drawn as
-/// an empty page in silence.
+/// an empty page in silence. The other collections and files are drawn first.
 pub fn draw_all(arguments: &Arguments) -> Result<()> {
     let mut build = cargo();
     build.current_dir(crate::root()).args(["build", "--quiet", "--package", "penup-client"]);
@@ -113,7 +113,14 @@ pub fn draw_all(arguments: &Arguments) -> Result<()> {
     let is_chosen =
         |corpus: &&Corpus| arguments.only.as_deref().is_none_or(|only| only == corpus.name);
     for corpus in CORPORA.iter().filter(is_chosen) {
-        let folder = fetch(corpus)?;
+        let folder = match fetch(corpus) {
+            Ok(folder) => folder,
+            Err(reason) => {
+                rows.push(format!("| {} | not fetched | | | | | |", corpus.name));
+                faults.push(format!("{} is not fetched: {reason:#}", corpus.name));
+                continue;
+            }
+        };
         let mut files = Vec::new();
         find(&folder, corpus.extensions, &mut files)?;
         ensure!(!files.is_empty(), "{} has no files to draw", corpus.name);
@@ -163,7 +170,7 @@ pub fn draw_all(arguments: &Arguments) -> Result<()> {
         say!("| {count} | {sentence} | {example} |")?;
     }
     if !faults.is_empty() {
-        bail!("these files went wrong:\n{}", faults.join("\n"));
+        bail!("this went wrong:\n{}", faults.join("\n"));
     }
     Ok(())
 }
