@@ -117,12 +117,6 @@ pub enum Error {
     /// The motion of a machine that is not Cartesian is not plotted.
     #[error("the motion is plotted for machines with setting 230=0 only: leave out --motion")]
     MotionOfOtherMachine,
-    /// `penup setup` is for machines whose motors move straight along the page.
-    #[error(
-        "`penup setup` leads through machines with setting 230=0 or 230=1, and this one hangs on \
-         belts\nSet it up by hand: see docs/first-plot.md"
-    )]
-    SetupOfPolargraph,
     /// There is no machine with these settings.
     #[error("{0}")]
     NoSuchMachine(#[from] NoSuchMachine),
@@ -386,7 +380,6 @@ impl Error {
             | Self::NothingToDo { .. }
             | Self::WithoutNumbers
             | Self::NotSet { .. }
-            | Self::SetupOfPolargraph
             | Self::Refused { .. } => REFUSED,
             Self::Silent { line: Some(_), .. }
             | Self::LostLine { .. }

@@ -100,6 +100,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         for change in board.pin_changes()? {
             ink.change(change);
         }
+        // The emulated Pico speaks only of what would be a fault on the board; QEMU also of itself.
+        let said = board.said();
+        if name != "lm3s6965" && !said.is_empty() {
+            return Err(format!("the emulator says: {said}").into());
+        }
         let order = match orders.try_recv() {
             Ok(order) => order,
             Err(TryRecvError::Empty) => continue,

@@ -95,9 +95,11 @@ try:
               callback=lambda *answer: opened.append(answer))
     checks.check("it opens the port", wait_for(lambda: opened and not any(opened[0]), 20), opened)
     checks.check("it is idle", wait_for(lambda: state() == "Idle"), state())
-    if not any(str(line).startswith("Grbl") for line in read):
-        command("reset")
     version = lambda: settings[-1].get("version")  # noqa: E731
+    # The greeting may have been read before the port was open. It asks for the settings behind it,
+    # which a reset would cut off.
+    if not wait_for(version, 5):
+        command("reset")
     checks.check("it recognises Grbl 1.1", wait_for(lambda: str(version()).startswith("1.1")),
                  version())
     found = lambda: settings[-1].get("settings", {})  # noqa: E731

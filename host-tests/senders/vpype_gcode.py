@@ -78,11 +78,15 @@ wait_for(lambda: port.readline().startswith(b"Grbl"), 20)
 
 
 def send(line):
-    """Sends a line, and returns its answer."""
+    """Sends a line, and returns its answer. Other lines may come before it: the greeting behind
+    `$RST=$` begins with an empty one."""
     port.write(line.encode() + b"\n")
     while True:
-        answer = port.readline().decode().strip()
-        if answer == "ok" or answer.startswith("error") or not answer and not port.in_waiting:
+        received = port.readline()
+        answer = received.decode().strip()
+        if not received:
+            sys.exit(f"there is no answer to {line}")
+        if answer == "ok" or answer.startswith("error"):
             return answer
 
 

@@ -98,8 +98,8 @@ fn a_host_that_is_gone_keeps_nobody_waiting() -> TestResult {
     while !uart.hear()?.starts_with("[VER") {}
     uart.emulator.let_usb_take(true)?;
     let mut usb = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    // The data that was in transit arrives first.
-    while usb.emulator.receive(&mut [0; 256], Duration::from_millis(500))? > 0 {}
+    // The data that was in transit arrives first; then the host is told that the rest is lost.
+    while usb.hear()? != "[MSG:replies were lost: they were not read]" {}
     usb.emulator.send(b"?")?;
     while !usb.hear()?.starts_with("<Idle") {}
     Ok(())
@@ -147,6 +147,26 @@ fn no_packet_becomes_available_late_in_a_frame() -> TestResult {
     for _ in 0..5 {
         line.emulator.send(b"$$\n")?;
         assert!(hear_all(&mut line)?.len() > 20);
+    }
+    Ok(())
+}
+
+/// While flash is erased or written, frames begin whose interrupts come late: they do not say how
+/// far the present frame has come.
+#[test]
+fn no_packet_behind_work_on_the_flash_is_late_in_a_frame() -> TestResult {
+    let mut line = plugged_in()?;
+    for turn in 0..30 {
+        for (text, lines) in [("$RST=$", 4), ("$X", 1), ("$120=500", 1), ("?$121=600", 2)] {
+            line.emulator.send(format!("{text}\n").as_bytes())?;
+            let (mut heard, mut buffer) = (0, [0; 256]);
+            while heard < lines {
+                let count = line.emulator.receive(&mut buffer, Duration::from_millis(100))?;
+                heard += buffer[..count].iter().filter(|byte| **byte == b'\n').count();
+                let said = line.emulator.said();
+                assert!(said.is_empty(), "in turn {turn}, behind {text}: {said}");
+            }
+        }
     }
     Ok(())
 }

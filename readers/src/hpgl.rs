@@ -1,402 +1,225 @@
-//! Reads HP-GL as a plan: 40 plotter units in a millimetre, each pen number a pen.
+//! Reads HP-GL as a plan: what a plotter would draw of it, by the plotter's own interpreter.
 //!
-//! Read are `PU PD PA PR SP IN DF`, arcs and circles (`AA AR CI`), rectangles and wedges as their
-//! outlines (`EA ER RA RR EW WG`), the scale (`IP SC RO`) and the encoded polylines of HP-GL/2
-//! (`PE`). Speeds, line types and the like have no effect on a plan. Labels and what else would
-//! ink are counted and said. The reader refuses numbers that it cannot read.
-
-mod encoded;
+//! Nothing is clipped at the limits of a machine, which the file does not know; its own window
+//! (`IW`) holds. What a plotter could only tell by a number that nobody asks for (`OE`) is told
+//! here: an instruction that is not known or changes only how something looks is counted and named,
+//! and one that would draw something else than it says is refused, with its line.
 
 use super::arrange::Arrangement;
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::Plan;
 use crate::lines::Origin;
+use penup::hpgl::{
+    Dialect, ErrorNumber, FARTHEST, Interpreter, Order, POLYGON_POINTS, Point, Rectangle, Token,
+    UNIT, UNITS_PER_MM,
+};
 use std::collections::BTreeMap;
 
 /// The format itself.
 #[derive(Debug)]
 pub(super) struct HpGl;
 
-/// The length of a plotter unit in mm.
-const UNIT: f64 = 0.025;
-
-/// The greatest distance between an arc and its chords, in plotter units: 0.005 mm.
-const CHORD_ERROR: f64 = 0.2;
-
-/// The corners P1 and P2 of an HP 7475A with a page of A4, in plotter units.
-const CORNERS: [[f64; 2]; 2] = [[603.0, 521.0], [10603.0, 7721.0]];
+/// No limits but those of coordinates.
+const LIMITS: Rectangle = Rectangle {
+    least: Point { x: -FARTHEST, y: -FARTHEST },
+    most: Point { x: FARTHEST, y: FARTHEST },
+};
 
 /// The most points of a file. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
 
-/// Instructions without effect on a plan.
-const SILENT: &[&str] = &[
-    "VS", "FS", "AS", "LT", "PT", "FT", "CP", "DT", "SI", "SR", "DI", "DR", "SL", "CS", "CA", "SS",
-    "SA", "SM", "TL", "OI", "OS", "OE", "OH", "OP", "OA", "IM", "IW", "DC", "DP", "WU", "PW", "CR",
-    "NP", "PC", "TR", "CO", "BP", "PS", "PG", "NR", "RP", "SV", "UL", "LA", "SD", "AD", "LO", "ES",
-    "FI", "FN", "SB", "TD", "AC", "MC", "QL", "RF", "EC",
+/// The byte that stands for lost ones at a plotter's port.
+const DAMAGED: u8 = 0xFF;
+
+/// Instructions that choose the pen, the speed, and how lines, letters and fills look. If their
+/// parameters are wrong they are counted, and the rest is drawn as before.
+const STYLES: [&str; 22] = [
+    "AP", "CA", "CS", "DI", "DR", "FS", "FT", "IM", "LA", "LT", "PT", "PW", "SA", "SI", "SL", "SP",
+    "SR", "SS", "TL", "VS", "WU", "AS",
 ];
 
 /// What a file has drawn so far.
 #[derive(Debug)]
-struct Plotter {
-    /// The position in plotter units.
-    at: [f64; 2],
-    is_down: bool,
-    is_relative: bool,
+struct Reader {
+    interpreter: Box<Interpreter>,
+    /// Where the pen has been, with or without ink.
+    at: Point,
+    /// The pen in the holder, from 1.
     pen: u32,
-    corners: [[f64; 2]; 2],
-    /// The user units at P1 and P2: least and greatest x, least and greatest y.
-    scale: Option<[f64; 4]>,
-    /// How many quarters of a turn the page is turned.
-    quarters: u8,
-    stroke: Vec<[f64; 2]>,
-    /// The pen and the points of each stroke, in plotter units, and where it begins in the file.
+    /// The points of the stroke that is being drawn, and the byte of the file where it begins.
+    stroke: Vec<Point>,
+    begin: usize,
+    /// The pen and the points in mm of each stroke, and the byte of the file where it begins.
     strokes: Vec<(u32, usize, Vec<[f64; 2]>)>,
     points: usize,
-    /// The byte at which the present instruction begins.
-    begin: usize,
     /// The instructions that were not obeyed, with their count.
     unknown: BTreeMap<String, usize>,
 }
 
-impl Plotter {
+impl Reader {
     fn new() -> Self {
+        let mut interpreter = Box::new(Interpreter::new());
+        interpreter.initialize(Point::default(), LIMITS);
         Self {
-            at: [0.0; 2],
-            is_down: false,
-            is_relative: false,
+            interpreter,
+            at: Point::default(),
             pen: 1,
-            corners: CORNERS,
-            scale: None,
-            quarters: 0,
             stroke: Vec::new(),
+            begin: 0,
             strokes: Vec::new(),
             points: 0,
-            begin: 0,
             unknown: BTreeMap::new(),
         }
     }
 
-    /// The point in plotter units that these coordinates mean.
-    fn point(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        match self.scale {
-            None => [x, y],
-            Some(_) => {
-                let ([ax, ay], [kx, ky]) = self.user();
-                [ax + x * kx, ay + y * ky]
-            }
-        }
-    }
-
-    /// Where user units begin, and how many plotter units one has.
-    fn user(&self) -> ([f64; 2], [f64; 2]) {
-        let Some([x1, x2, y1, y2]) = self.scale else { return ([0.0; 2], [1.0; 2]) };
-        let [[px1, py1], [px2, py2]] = self.corners;
-        let (kx, ky) = ((px2 - px1) / (x2 - x1), (py2 - py1) / (y2 - y1));
-        ([px1 - x1 * kx, py1 - y1 * ky], [kx, ky])
-    }
-
-    /// A distance in plotter units.
-    fn distance(&self, [dx, dy]: [f64; 2]) -> [f64; 2] {
-        let (_, [kx, ky]) = self.user();
-        [dx * kx, dy * ky]
-    }
-
     fn end_stroke(&mut self) {
-        if self.stroke.len() > 1 {
-            self.strokes.push((self.pen, self.begin, std::mem::take(&mut self.stroke)));
+        if !self.stroke.is_empty() {
+            let mm = |units: i64| units as f64 / (UNIT * UNITS_PER_MM) as f64;
+            let points = self.stroke.drain(..).map(|point| [mm(point.x), mm(point.y)]);
+            self.strokes.push((self.pen, self.begin, points.collect()));
         }
-        self.stroke.clear();
     }
 
-    fn go(&mut self, to: [f64; 2]) {
-        if self.is_down {
-            if self.stroke.is_empty() {
-                self.stroke.push(self.at);
-            }
-            self.stroke.push(to);
-            self.points += 1;
+    /// Begins a stroke at the byte `begin` of the file, unless the present one ends there on the
+    /// page.
+    fn begin_at(&mut self, at: Point, begin: usize) {
+        if self.stroke.last() != Some(&at) {
+            self.end_stroke();
+            self.stroke.push(at);
+            self.begin = begin;
         }
-        self.at = to;
+        self.at = at;
     }
 
-    /// Moves by pairs of coordinates.
-    fn plot(&mut self, numbers: &[f64]) -> Result<(), String> {
-        let (pairs, rest) = numbers.as_chunks();
-        for &pair in pairs {
-            let to = if self.is_relative {
-                let [dx, dy] = self.distance(pair);
-                [self.at[0] + dx, self.at[1] + dy]
-            } else {
-                self.point(pair)
-            };
-            self.go(to);
-        }
-        if rest.is_empty() { Ok(()) } else { Err("a coordinate has no partner".to_owned()) }
-    }
-
-    /// Goes along an arc about `centre` by `degrees`, counterclockwise.
-    fn arc(&mut self, centre: [f64; 2], degrees: f64) -> Result<(), String> {
-        let [x, y] = [self.at[0] - centre[0], self.at[1] - centre[1]];
-        let radius = x.hypot(y);
-        if radius <= 0.0 {
-            return Ok(());
-        }
-        let most = 2.0 * (1.0 - CHORD_ERROR / radius.max(2.0 * CHORD_ERROR)).acos();
-        let turn = degrees.to_radians();
-        let chords = (turn.abs() / most).ceil().max(1.0);
-        if chords > MOST_POINTS as f64 {
-            return Err("the arc is too long".to_owned());
-        }
-        for index in 1..=chords as usize {
-            let (sine, cosine) = (turn * index as f64 / chords).sin_cos();
-            self.go([centre[0] + x * cosine - y * sine, centre[1] + x * sine + y * cosine]);
-        }
-        Ok(())
-    }
-
-    /// Draws a closed outline through these points, and returns to where the pen was.
-    fn outline(&mut self, points: &[[f64; 2]]) {
-        let (at, was_down) = (self.at, self.is_down);
-        self.end_stroke();
-        self.is_down = false;
-        let closed = points.iter().chain(points.first());
-        closed.for_each(|point| {
-            self.go(*point);
-            self.is_down = true;
-        });
-        self.end_stroke();
-        (self.at, self.is_down) = (at, was_down);
-    }
-
-    fn rectangle(&mut self, [x, y]: [f64; 2]) {
-        let [ax, ay] = self.at;
-        self.outline(&[[ax, ay], [x, ay], [x, y], [ax, y]]);
-    }
-
-    /// Carries out an instruction with its numbers.
-    fn instruction(&mut self, name: &str, numbers: &[f64]) -> Result<(), String> {
-        let number = |index: usize| numbers.get(index).copied();
-        let two = || Some([number(0)?, number(1)?]);
-        let needs =
-            |what: Option<[f64; 2]>| what.ok_or_else(|| format!("{name} needs two numbers"));
-        match name {
-            "PU" | "PD" => {
-                let is_down = name == "PD";
-                if !is_down {
+    /// Takes a byte of the instruction that begins at the byte `begin` of the file, with all that
+    /// comes of it.
+    fn push(&mut self, byte: u8, begin: usize) -> Result<(), String> {
+        self.interpreter.push(byte);
+        while let Some(order) = self.interpreter.next_order() {
+            match order {
+                Order::Initialize => {
                     self.end_stroke();
+                    self.interpreter.initialize(self.at, LIMITS);
                 }
-                self.is_down = is_down;
-                self.plot(numbers)?;
-            }
-            "PA" | "PR" => {
-                self.is_relative = name == "PR";
-                self.plot(numbers)?;
-            }
-            "SP" => {
-                self.end_stroke();
-                // Pen 0 puts the pen away.
-                self.pen = number(0).filter(|pen| *pen >= 1.0).map_or(self.pen, |pen| pen as u32);
-            }
-            "IN" | "DF" => {
-                self.end_stroke();
-                let fresh = Self::new();
-                self.is_relative = false;
-                self.scale = None;
-                if name == "IN" {
-                    (self.at, self.is_down) = (fresh.at, false);
-                    (self.corners, self.quarters, self.pen) = (fresh.corners, 0, 1);
+                Order::Line([from, to]) => {
+                    self.begin_at(from, begin);
+                    self.stroke.push(to);
+                    self.at = to;
                 }
-            }
-            "IP" => {
-                self.corners = match *numbers {
-                    [] => CORNERS,
-                    [x, y] => {
-                        let [[ax, ay], [bx, by]] = self.corners;
-                        [[x, y], [x + bx - ax, y + by - ay]]
-                    }
-                    [x1, y1, x2, y2] => [[x1, y1], [x2, y2]],
-                    _ => return Err("IP needs two or four numbers".to_owned()),
-                };
-            }
-            "SC" => {
-                self.scale = match *numbers {
-                    [] => None,
-                    [x1, x2, y1, y2] if x1 != x2 && y1 != y2 => Some([x1, x2, y1, y2]),
-                    // The kinds of HP-GL/2: equal units, and units from P1 on.
-                    [x1, x2, y1, y2, kind, ..] if kind == 1.0 && x1 != x2 && y1 != y2 => {
-                        Some(self.isotropic([x1, x2, y1, y2]))
-                    }
-                    [x1, kx, y1, ky, 2.0] if kx != 0.0 && ky != 0.0 => {
-                        let [[px1, py1], [px2, py2]] = self.corners;
-                        Some([x1, x1 + (px2 - px1) / kx, y1, y1 + (py2 - py1) / ky])
-                    }
-                    _ => return Err("SC needs four numbers, two and two different".to_owned()),
-                };
-            }
-            "RO" => {
-                let turn = number(0).unwrap_or(0.0).rem_euclid(360.0);
-                if turn % 90.0 != 0.0 {
-                    return Err("RO turns by 0, 90, 180 or 270".to_owned());
+                Order::Dot(at) => self.begin_at(at, begin),
+                Order::Go(at) => {
+                    self.end_stroke();
+                    self.at = at;
                 }
-                self.quarters = (turn / 90.0) as u8;
+                Order::Pen(pen) => {
+                    self.end_stroke();
+                    // Pen 0 puts the pen away, and the interpreter draws nothing then.
+                    self.pen = if pen > 0 { pen.into() } else { self.pen };
+                }
+                // Nobody has asked.
+                Order::Answer(_) | Order::Nothing => continue,
             }
-            "AA" | "AR" => {
-                let pair = needs(two())?;
-                let degrees = number(2).ok_or("an arc needs an angle")?;
-                let centre = if name == "AA" {
-                    self.point(pair)
-                } else {
-                    let [dx, dy] = self.distance(pair);
-                    [self.at[0] + dx, self.at[1] + dy]
-                };
-                self.arc(centre, degrees)?;
+            self.points += 1;
+            if self.points > MOST_POINTS {
+                return Err("the file has too many points: leave a part of it out".to_owned());
             }
-            "CI" => {
-                let radius = number(0).ok_or("CI needs a radius")?;
-                let [radius, _] = self.distance([radius, 0.0]);
-                let (centre, was_down) = (self.at, self.is_down);
-                self.end_stroke();
-                self.is_down = false;
-                self.go([centre[0] + radius, centre[1]]);
-                self.is_down = true;
-                self.arc(centre, 360.0)?;
-                self.end_stroke();
-                (self.at, self.is_down) = (centre, was_down);
-            }
-            "EA" | "RA" => {
-                let corner = self.point(needs(two())?);
-                self.rectangle(corner);
-            }
-            "ER" | "RR" => {
-                let [dx, dy] = self.distance(needs(two())?);
-                self.rectangle([self.at[0] + dx, self.at[1] + dy]);
-            }
-            "EW" | "WG" => {
-                let (Some(radius), Some(start), Some(sweep)) = (number(0), number(1), number(2))
-                else {
-                    return Err(format!("{name} needs three numbers"));
-                };
-                let [radius, _] = self.distance([radius, 0.0]);
-                let (centre, was_down) = (self.at, self.is_down);
-                let (sine, cosine) = start.to_radians().sin_cos();
-                self.end_stroke();
-                self.is_down = true;
-                self.go([centre[0] + radius * cosine, centre[1] + radius * sine]);
-                self.arc(centre, sweep)?;
-                self.go(centre);
-                self.end_stroke();
-                (self.at, self.is_down) = (centre, was_down);
-            }
-            name if SILENT.contains(&name) => {}
-            name => *self.unknown.entry(name.to_owned()).or_default() += 1,
-        }
-        if self.points > MOST_POINTS {
-            return Err("the file has too many points: leave a part of it out".to_owned());
         }
         Ok(())
     }
 
-    /// The scale with equal units on both axes, in the middle of P1 and P2.
-    fn isotropic(&self, [x1, x2, y1, y2]: [f64; 4]) -> [f64; 4] {
-        let [[px1, py1], [px2, py2]] = self.corners;
-        let unit = ((px2 - px1) / (x2 - x1)).abs().min(((py2 - py1) / (y2 - y1)).abs());
-        let widened = |from: f64, to: f64, length: f64| {
-            let extra = (length.abs() / unit - (to - from).abs()) / 2.0 * (to - from).signum();
-            [from - extra, to + extra]
-        };
-        let ([x1, x2], [y1, y2]) = (widened(x1, x2, px2 - px1), widened(y1, y2, py2 - py1));
-        [x1, x2, y1, y2]
+    /// Refuses what went wrong with the instruction, or counts it.
+    fn judge(&mut self, error: ErrorNumber, name: &str) -> Result<(), String> {
+        let name = if name.is_empty() { "without a name" } else { name };
+        match error {
+            ErrorNumber::WrongCount if !STYLES.contains(&name) => {
+                Err(format!("error 2 of HP-GL: {name} has a wrong number of parameters"))
+            }
+            ErrorNumber::BadParameter if !STYLES.contains(&name) => Err(format!(
+                "error 3 of HP-GL: a parameter of {name} is no number, or out of its range"
+            )),
+            ErrorNumber::Overflow => Err(format!(
+                "error 6 of HP-GL: {name} leads beyond {} plotter units",
+                FARTHEST / UNIT
+            )),
+            ErrorNumber::BufferOverflow => Err(format!(
+                "error 7 of HP-GL: the polygon has more than {POLYGON_POINTS} points, with those \
+                 that close its parts: divide it"
+            )),
+            _ => {
+                *self.unknown.entry(name.to_owned()).or_default() += 1;
+                Ok(())
+            }
+        }
     }
+}
 
-    /// The place on the page in mm of a point in plotter units.
-    fn on_page(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [x, y] = match self.quarters {
-            1 => [-y, x],
-            2 => [-x, -y],
-            3 => [y, -x],
-            _ => [x, y],
-        };
-        [x * UNIT, y * UNIT]
+/// The instruction that the present byte belongs to.
+#[derive(Debug, Default)]
+struct Instruction {
+    /// The first letter of the next instruction, and its byte of the file, if the second letter has
+    /// not come yet.
+    letter: Option<(usize, u8)>,
+    /// The first byte of the instruction.
+    begin: usize,
+    name: String,
+}
+
+impl Instruction {
+    /// Follows a byte of an instruction.
+    fn follow(&mut self, at: usize, byte: u8) {
+        match self.letter.take() {
+            _ if !byte.is_ascii_alphabetic() => {}
+            None => self.letter = Some((at, byte)),
+            Some((begin, first)) => {
+                self.begin = begin;
+                self.name = [first, byte]
+                    .map(|byte| char::from(byte.to_ascii_uppercase()))
+                    .into_iter()
+                    .collect();
+            }
+        }
     }
 }
 
 /// Reads the whole file. Returns the reason for a refusal and the byte where it stands.
-fn read(bytes: &[u8]) -> Result<Plotter, (usize, String)> {
-    let mut plotter = Plotter::new();
-    let mut at = 0;
-    let mut terminator = 0x03;
-    while let Some(&byte) = bytes.get(at) {
-        if byte == 0x1B {
-            // ESC . letter numbers : is an order to the interface, ESC % 0 B begins HP-GL.
-            at += 2;
-            let end = match bytes.get(at - 1) {
-                Some(b'.') if matches!(bytes.get(at), Some(b'(' | b')' | b'Y' | b'Z' | b'K')) => 0,
-                Some(b'.') => {
-                    let rest = bytes.get(at..).unwrap_or_default();
-                    let is_part =
-                        |byte: &u8| byte.is_ascii_digit() || b";@HIMNPQRTA".contains(byte);
-                    rest.iter().position(|byte| !is_part(byte)).unwrap_or(rest.len())
-                }
-                _ => {
-                    let rest = bytes.get(at..).unwrap_or_default();
-                    rest.iter().position(u8::is_ascii_uppercase).unwrap_or(rest.len())
-                }
-            };
-            at += end + 1;
-            continue;
+fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
+    let (mut reader, mut dialect) = (Reader::new(), Dialect::new());
+    // A file need not begin as HP-GL by a serial line does.
+    for byte in *b"IN;" {
+        dialect.take(byte);
+    }
+    let mut instruction = Instruction::default();
+    for (at, &byte) in bytes.iter().chain(b";").enumerate() {
+        // What ends the file ends its last instruction, but is no letter of a label.
+        if at == bytes.len() && dialect.is_in_text() && !dialect.is_in_data() {
+            break;
         }
-        let Some(second) = bytes.get(at + 1).filter(|_| byte.is_ascii_alphabetic()) else {
-            at += 1;
-            continue;
-        };
-        let name = [byte, *second].map(|byte| char::from(byte.to_ascii_uppercase()));
-        let name: String = name.iter().collect();
-        plotter.begin = at;
-        let begin = at;
-        at += 2;
-        let rest = bytes.get(at..).unwrap_or_default();
-        let find = |is_end: &dyn Fn(u8) -> bool| {
-            rest.iter().position(|byte| is_end(*byte)).unwrap_or(rest.len())
-        };
+        let token = dialect.take(byte);
+        match token {
+            Token::Control => continue,
+            Token::Code if byte == DAMAGED => {
+                return Err((at, "the byte 0xFF is no HP-GL: is the file damaged?".to_owned()));
+            }
+            Token::Leaves | Token::Line | Token::Begins(_) => {
+                return Err((at, "a line that begins with $ ends HP-GL: remove it".to_owned()));
+            }
+            Token::Code | Token::Text => {}
+        }
+        if token == Token::Code {
+            // The first letter of the next instruction ends this one; the second begins it.
+            instruction.follow(at, byte);
+        }
+        let begin = instruction.begin;
         let refused = |reason| (begin, reason);
-        match name.as_str() {
-            "LB" | "BL" | "WD" => {
-                *plotter.unknown.entry("LB".to_owned()).or_default() += 1;
-                at += find(&|byte| byte == terminator) + 1;
-            }
-            "DT" => {
-                terminator = match rest.first() {
-                    None | Some(b';') => 0x03,
-                    Some(byte) => *byte,
-                };
-                at += find(&|byte| byte == b';') + 1;
-            }
-            "PE" => {
-                let end = find(&|byte| byte == b';');
-                plotter.polyline(&rest[..end]).map_err(refused)?;
-                at += end + 1;
-            }
-            _ => {
-                let end = find(&|byte| byte == b';' || byte.is_ascii_alphabetic() || byte == 0x1B);
-                let numbers = numbers(&rest[..end]).map_err(refused)?;
-                plotter.instruction(&name, &numbers).map_err(refused)?;
-                at += end;
-            }
+        reader.push(byte, begin).map_err(refused)?;
+        if let Some(error) = reader.interpreter.take_error() {
+            let name = instruction.name.clone();
+            reader.judge(error, &name).map_err(refused)?;
         }
     }
-    plotter.end_stroke();
-    Ok(plotter)
-}
-
-fn numbers(text: &[u8]) -> Result<Vec<f64>, String> {
-    let text = String::from_utf8_lossy(text);
-    let is_between = |letter: char| letter == ',' || letter.is_whitespace();
-    let words = text.split(is_between).filter(|word| !word.is_empty());
-    let number = |word: &str| word.parse().map_err(|_| format!("\"{word}\" is no number"));
-    words.map(number).collect()
+    reader.end_stroke();
+    Ok(reader)
 }
 
 impl Format for HpGl {
@@ -423,25 +246,23 @@ impl Format for HpGl {
             let end = end.map_or(text.len(), |end| end + 2);
             String::from_utf8_lossy(&text[..end]).into_owned()
         };
-        let plotter = read(&bytes).map_err(|(at, reason)| ReadError::Line {
+        let reader = read(&bytes).map_err(|(at, reason)| ReadError::Line {
             origin: Origin { file: file.clone(), line: line_of(at), text: text_at(at) },
             reason,
         })?;
         let mut plan = Plan::new(file.clone());
         let (mut line, mut counted_to) = (1, 0);
-        for (pen, begin, points) in &plotter.strokes {
-            line += bytes[counted_to..*begin].iter().filter(|byte| **byte == b'\n').count();
-            counted_to = *begin;
-            plan.begin(line, text_at(*begin));
-            plan.draw(points.iter().map(|point| plotter.on_page(*point)), None, *pen);
+        for (pen, begin, points) in reader.strokes {
+            line += bytes[counted_to..begin].iter().filter(|byte| **byte == b'\n').count();
+            counted_to = begin;
+            plan.begin(line, text_at(begin));
+            plan.draw(points, None, pen);
         }
         let mut notes: Vec<String> = Vec::new();
-        for (name, count) in &plotter.unknown {
-            notes.push(match (name.as_str(), count) {
-                ("LB", 1) => "1 label is not drawn: convert text to paths".to_owned(),
-                ("LB", count) => format!("{count} labels are not drawn: convert text to paths"),
-                (name, 1) => format!("1 instruction {name} is not obeyed"),
-                (name, count) => format!("{count} instructions {name} are not obeyed"),
+        for (name, count) in &reader.unknown {
+            notes.push(match count {
+                1 => format!("1 instruction {name} is not obeyed"),
+                count => format!("{count} instructions {name} are not obeyed"),
             });
         }
         if plan.is_empty() {

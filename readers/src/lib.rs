@@ -5,8 +5,8 @@
 //! file they come from. [`words`] says in the terms of the command line why one is refused.
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
-//! WebAssembly, the page. A large format is a feature: `dxf`, `ply`, `svg`; and `text`
-//! is that of fonts for the texts of SVG files.
+//! WebAssembly, the page. A large format is a feature: `dxf`, `hpgl`, `ply`, `svg`; and
+//! `text` is that of fonts for the texts of SVG files.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
@@ -19,6 +19,7 @@ mod error;
 pub mod fonts;
 mod format;
 mod gcode;
+#[cfg(feature = "hpgl")]
 mod hpgl;
 pub mod lines;
 mod mesh;
@@ -53,6 +54,7 @@ static FORMATS: &[&dyn Format] = &[
     #[cfg(feature = "ply")]
     &ply::Ply,
     &gcode::GCode,
+    #[cfg(feature = "hpgl")]
     &hpgl::HpGl,
     #[cfg(feature = "dxf")]
     &dxf::Dxf,

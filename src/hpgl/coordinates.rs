@@ -13,7 +13,7 @@ pub const UNIT: i64 = 1 << 16;
 pub const UNITS_PER_MM: i64 = 40;
 
 /// The greatest coordinate: 2^23 plotter units.
-const FARTHEST: i64 = 1 << 39;
+pub const FARTHEST: i64 = 1 << 39;
 
 /// The corners P1 and P2 of the HP 7475A with a sheet of A4.
 const CORNERS: [Point; 2] =
@@ -157,7 +157,7 @@ impl Frame {
         window: None,
     };
 
-    /// The state after `IN`, with these hard clip limits, which begin at 0.
+    /// The state after `IN`, with these hard clip limits.
     pub(super) fn new(limits: Rectangle) -> Self {
         Self { corners: CORNERS, limits, ..Self::default() }
     }
@@ -199,9 +199,10 @@ impl Frame {
     /// The position on the page of a point in plotter units.
     fn on_page(&self, point: Point) -> Point {
         let Point { x, y } = point.turned(self.quarters);
-        let most = self.limits.most;
+        let Rectangle { least, most } = self.limits;
+        let (width, height) = (least.x + most.x, least.y + most.y);
         let [right, up] = [matches!(self.quarters, 1 | 2), matches!(self.quarters, 2 | 3)];
-        Point { x: x + if right { most.x } else { 0 }, y: y + if up { most.y } else { 0 } }
+        Point { x: x + if right { width } else { 0 }, y: y + if up { height } else { 0 } }
     }
 
     /// A position on the page in plotter units.

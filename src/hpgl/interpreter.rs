@@ -64,7 +64,7 @@ pub(super) enum Step {
 
 /// The errors that `OE` tells by their number: those of the HP 7475A, and 7 of the HP 7550A.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ErrorNumber {
+pub enum ErrorNumber {
     /// The instruction is not known.
     Unknown = 1,
     /// The number of parameters is wrong.
@@ -79,6 +79,19 @@ pub(super) enum ErrorNumber {
     BufferOverflow = 7,
     /// Something was to be drawn while the machine was locked.
     Locked = 8,
+}
+
+impl ErrorNumber {
+    /// All errors.
+    const ALL: [Self; 7] = [
+        Self::Unknown,
+        Self::WrongCount,
+        Self::BadParameter,
+        Self::UnknownSet,
+        Self::Overflow,
+        Self::BufferOverflow,
+        Self::Locked,
+    ];
 }
 
 /// The interpreter. All its bits may be zero before [`Interpreter::initialize`].
@@ -171,8 +184,8 @@ impl Interpreter {
         }
     }
 
-    /// Makes the state that `IN` makes, with the pen at this position and these hard clip limits,
-    /// whose lower left corner is 0.
+    /// Makes the state that `IN` makes, with the pen at this position and these hard clip limits. A
+    /// plotter's begin at 0; `RO` turns the page within them.
     pub fn initialize(&mut self, at: Point, limits: Rectangle) {
         self.frame = Frame::new(limits);
         (self.at, self.is_lost, self.is_down) = (at, false, false);
@@ -220,6 +233,13 @@ impl Interpreter {
     /// Notes that something was to be drawn while the machine was locked.
     pub fn note_locked(&mut self) {
         self.fail(ErrorNumber::Locked);
+    }
+
+    /// Takes the first error since the last call or the last `OE`. A file's reader, which no one can
+    /// ask by `OE`, tells it.
+    pub fn take_error(&mut self) -> Option<ErrorNumber> {
+        let number = core::mem::take(&mut self.error);
+        ErrorNumber::ALL.into_iter().find(|error| *error as u8 == number)
     }
 
     /// Notes an error, unless one is noted that `OE` has not told yet.

@@ -27,9 +27,10 @@ mod session;
 #[cfg(test)]
 mod tests;
 
-pub use coordinates::{Point, Rectangle, UNIT, UNITS_PER_MM};
+pub use coordinates::{FARTHEST, Point, Rectangle, UNIT, UNITS_PER_MM};
 pub use dialect::{Beginning, Dialect, Token};
-pub use interpreter::{ANSWER_BYTES, Answer, Interpreter, Order};
+pub use interpreter::{ANSWER_BYTES, Answer, ErrorNumber, Interpreter, Order};
+pub use polygon::VERTICES as POLYGON_POINTS;
 pub use session::{RECEIVED_BYTES, Session};
 
 /// The byte that stands for lost or damaged bytes among received ones.

@@ -15,8 +15,8 @@ use super::interpreter::{ErrorNumber, Interpreter, Order, Step};
 use super::outline::{ArcStep, sine_and_cosine};
 use crate::fixed::{divide_rounding, product};
 
-/// The most points of a polygon. Each takes 8 bytes.
-pub(super) const VERTICES: usize = 256;
+/// The most points of a polygon, with those that close its parts. Each takes 8 bytes.
+pub const VERTICES: usize = 256;
 /// Coordinates of a vertex are kept without so many of their lowest bits: in 2^-6 plotter units.
 const DROPPED_BITS: u32 = 10;
 /// The angle of the chords of arcs in a polygon, if none is given: 5 degrees.

@@ -15,6 +15,7 @@ macro_rules! say {
 
 mod bench;
 mod command;
+mod corpus;
 mod dependencies;
 mod experiments;
 mod flash;
@@ -133,6 +134,9 @@ enum Task {
     /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs
     /// them into target/senders (some 30 minutes).
     Senders(senders::Arguments),
+    /// Draws every file of public collections by `penup preview`; it fetches them into
+    /// target/corpus (some 30 minutes).
+    Corpus(corpus::Arguments),
     /// Lists, by file, the calls of panic functions that are left in the boards' images.
     Panics,
     /// Checks the licences, sources and known holes of all crates; needs cargo-deny.
@@ -194,6 +198,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::Senders(arguments)) => senders::try_all(&arguments)?,
+        Some(Task::Corpus(arguments)) => corpus::draw_all(&arguments)?,
         Some(Task::Panics) => panics::list()?,
         Some(Task::Deny) => dependencies::deny()?,
         Some(Task::Fuzz { seconds, target }) => fuzz::fuzz(seconds, target.as_deref())?,

@@ -653,6 +653,33 @@ fn a_machine_is_set_up_by_questions() {
     assert_eq!(status["strokes"], serde_json::json!({ "done": 1, "all": 1 }));
 }
 
+/// The motors of a polargraph are 1000 mm apart; the left one runs the wrong way.
+#[test]
+fn a_polargraph_is_set_up_by_its_own_measures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let (code, _, error) = plotter.run(folder.path(), &["set", "230=2"]);
+    assert_eq!(code, Some(0), "{error}");
+    let measures = "1000\n1200\n250\n650\n500\n900\n600\n40\n3200\n";
+    let rest = "\nup\nright\nright\nup\n\n90\n\nyes\n";
+    let (code, said, noted) = set_up(&plotter, &format!("{measures}{rest}"));
+    assert_eq!(code, Some(0), "{noted}");
+    let expected = serde_json::json!({
+        "3": 1.0, "130": 500.0, "131": 600.0, "211": 90.0, "231": 1000.0, "232": 250.0,
+        "233": 650.0,
+    });
+    assert_eq!(said["settings"], expected, "80 steps in a mm are the default: {noted}");
+    assert!(noted.contains("Please type a number from 0 to 1000."), "{noted}");
+    assert!(noted.contains("Please type a number from 1 to 649."), "{noted}");
+    let parts: Vec<&str> = noted.lines().filter(|line| line.contains(" of 5: ")).collect();
+    assert_eq!(parts.len(), 5, "{noted}");
+    assert!(parts.iter().zip(1..).all(|(part, number)| part.starts_with(&format!("{number} of"))));
+    assert!(!noted.contains("steps in a mm.\n"), "the axes have no steps: {noted}");
+    assert!(noted.contains("both diagonals are the same"), "{noted}");
+    let (_, status) = plotter.json(folder.path(), &["status"]);
+    assert_eq!(status["strokes"], serde_json::json!({ "done": 1, "all": 1 }));
+}
+
 #[test]
 fn a_setup_that_is_broken_off_says_what_is_stored() {
     let all = "\nleft\nup\nright\nup\n\n98\n\n101\n\n90\n\n\n";

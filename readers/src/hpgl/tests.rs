@@ -59,19 +59,46 @@ fn encoded_polylines_are_drawn() {
 }
 
 #[test]
-fn labels_are_counted_and_bad_numbers_refused() {
+fn labels_and_fills_are_drawn_as_a_plotter_draws_them() {
+    let fill = lines("FT3,40;PU40,50;RA120,130;");
+    let expected = ["v 1 2 0", "v 3 2 0", "l 1 2", "v 3 3 0", "v 1 3 0", "l 3 4"];
+    assert_eq!(fill[1..], expected, "there are two lines, and no outline");
+    let triangle = lines("PU40,40;PM0;PD120,40,120,120;PM2;EP;");
+    assert_eq!(triangle[1..], ["v 1 1 0", "v 3 1 0", "v 3 3 0", "l 1 2 3 1"]);
+    assert!(lines("PU0,0;LBI\x03").len() > 3);
+    assert_eq!(lines("PU0,0;LBI;")[..3], lines("PU0,0;LBI;\x03")[..3]);
+    assert_eq!(notes("a.plt", b"PD40,0;SP0;PD80,0;PD;"), Vec::<String>::new());
+}
+
+#[test]
+fn what_is_not_drawn_is_counted_or_refused() {
     assert_eq!(
-        notes("a.plt", b"IN;PD40,0;LBPD9,9;\x03DT#;LBx#PU;"),
-        ["2 labels are not drawn: convert text to paths"]
+        notes("a.plt", b"IN;PD40,0;UC1,2;BLx\x03UC;FT9;"),
+        [
+            "1 instruction BL is not obeyed",
+            "1 instruction FT is not obeyed",
+            "2 instructions UC are not obeyed"
+        ]
     );
+    assert_eq!(
+        notes("a.plt", b"IN;PD40,0;PU80,0;PD;PU;"),
+        ["1 line is not drawn, because a dot has no length"]
+    );
+    let points = "0,40,40,0,".repeat(140);
+    let polygon = format!("PU0,0;PM0;\nPD{points}0,0;PM2;FP;");
     for (text, reason) in [
-        ("IN;\nPD1,x", "a.plt:2: a coordinate has no partner"),
-        ("IN;\nPD1,2.3.4;", "a.plt:2: \"2.3.4\" is no number"),
-        ("IN;PD1,2,3;", "a.plt:1: a coordinate has no partner"),
+        ("IN;\nPD1,x", "a.plt:2: error 2 of HP-GL: PD has a wrong number of parameters"),
+        ("IN;\nPD1,2.3.4;", "a.plt:2: error 2 of HP-GL: PD has a wrong number of parameters"),
+        ("IN;PD1,2,3;", "a.plt:1: error 2 of HP-GL: PD has"),
         ("IN;PU1,1;", "a.plt: there is nothing to draw"),
-        ("IN;PD;SC1,1,0,1;", "a.plt:1: SC needs four numbers"),
+        ("IN;PD;SC1,1,0,1;", "a.plt:1: error 3 of HP-GL: a parameter of SC"),
+        ("IN;PD;PR8000000,0,8000000,0;", "a.plt:1: error 6 of HP-GL: PR leads beyond 8388608"),
+        ("IN;PD1,9;\n$120=5\n", "a.plt:2: a line that begins with $ ends HP-GL"),
+        (&polygon, "a.plt:2: error 7 of HP-GL: the polygon has more than 256 points"),
     ] {
         let error = sent("a.plt", text.as_bytes()).expect_err("refused");
         assert!(error.starts_with(reason), "{error}");
     }
+    let error = sent("a.plt", b"IN;PD1,9;\n\xFFPD5,5;").expect_err("refused");
+    assert!(error.starts_with("a.plt:2: the byte 0xFF"), "{error}");
 }

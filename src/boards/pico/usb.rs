@@ -7,9 +7,10 @@
 //!
 //! Sent bytes wait in a queue. If the host takes nothing for [`HOST_TIMEOUT`] although the queue is
 //! full, it counts as gone. Then bytes to be sent are discarded until it takes something again,
-//! because nothing may delay the steps. The same holds after a program has closed the port (DTR has
+//! because nothing may delay the steps; lines are discarded as a whole, and when the host takes
+//! bytes again, it is told with the next packet: see [`MISSED`]. The same holds after a program has closed the port (DTR has
 //! fallen): replies that it has not taken are discarded, and so is the rest of a line that it has
-//! not ended. A program that opens the port (DTR rises) gets a greeting, which goes only to it: see
+//! not ended, but nobody is told. A program that opens the port (DTR rises) gets a greeting, which goes only to it: see
 //! [`take_opened`].
 //!
 //! Two of the chip's errata are worked around: see [`connection`] for E5, which takes GPIO 15 for a
@@ -36,6 +37,7 @@ use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 use self::connection::Connection;
 use self::frame::Frame;
+pub use self::frame::forget as forget_frame;
 use super::ports::{self, Inlets, Port};
 use super::registers::{Get, Put, USB, USB_MEMORY};
 use super::{clock, critical, divider};
@@ -57,6 +59,9 @@ const HOST_TIMEOUT: u32 = 20_000;
 
 /// The greatest number of received bytes that wait for room in the line's queue.
 const WAITING_SLOTS: usize = 512;
+/// What a program is told that was not there to take its replies. It fits into a packet.
+const MISSED: &[u8] = b"\r\n[MSG:replies were lost: they were not read]\r\n";
+const _: () = assert!(MISSED.len() <= SENT_PACKET);
 /// The baud rate of the touch: whoever opens the port at this rate and closes it asks for the drive
 /// for a new image, as with an Arduino.
 const TOUCH_RATE: u32 = 1200;
@@ -87,6 +92,9 @@ static DEVICE: Owned<Device> = Owned::empty();
 
 /// Whether the host takes nothing. The main loop sets it, and the handler clears it.
 static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
+/// Whether bytes to be sent were discarded since a program opened the port. The main loop sets it,
+/// and the handler clears it.
+static HAS_MISSED: AtomicBool = AtomicBool::new(false);
 /// Whether received bytes wait for room, or a bus reset has not ended yet. The handler writes it.
 static IS_WAITED: AtomicBool = AtomicBool::new(false);
 /// Whether a program has opened the port. The handler sets it, and the main loop clears it.
@@ -130,6 +138,8 @@ pub struct Sender {
     /// The time since which there has been no room, in microseconds, and the number of bytes that
     /// waited then.
     full: Option<(u32, usize)>,
+    /// Whether a byte of the present line was discarded, so that the rest of it is, too.
+    is_cut: bool,
 }
 
 /// Connects the device to the host, with this serial number. `ports` must be set up, and the pins
@@ -180,7 +190,7 @@ pub fn set_up(
         unsafe { DEVICE.fill(device) };
         critical::enable(nvic, Interrupt::USBCTRL_IRQ, critical::SERIAL_PRIORITY);
     }
-    Sender { bytes: sent, full: None }
+    Sender { bytes: sent, full: None, is_cut: false }
 }
 
 impl Sender {
@@ -207,17 +217,31 @@ impl Sender {
     /// Sends `bytes`. It waits while the queue is full, but not for a host that is gone.
     pub fn write(&mut self, bytes: &[u8]) {
         for &byte in bytes {
-            let began = clock::microseconds();
-            while !HOST_IS_GONE.load(Ordering::Relaxed) && self.bytes.enqueue(byte).is_err() {
-                critical_section::with(|_| serve());
-                if clock::microseconds().wrapping_sub(began) > HOST_TIMEOUT {
-                    HOST_IS_GONE.store(true, Ordering::Relaxed);
-                }
+            if !self.is_cut && self.enqueue(byte) {
+                continue;
             }
+            self.is_cut = byte != b'\n';
+            HAS_MISSED.store(true, Ordering::Relaxed);
         }
         if !HOST_IS_GONE.load(Ordering::Relaxed) {
             critical_section::with(|_| serve());
         }
+    }
+
+    /// Puts a byte into the queue, when there is room. Returns whether it was, because the host is
+    /// there.
+    fn enqueue(&mut self, byte: u8) -> bool {
+        let began = clock::microseconds();
+        while !HOST_IS_GONE.load(Ordering::Relaxed) {
+            if self.bytes.enqueue(byte).is_ok() {
+                return true;
+            }
+            critical_section::with(|_| serve());
+            if clock::microseconds().wrapping_sub(began) > HOST_TIMEOUT {
+                HOST_IS_GONE.store(true, Ordering::Relaxed);
+            }
+        }
+        false
     }
 }
 
@@ -308,6 +332,8 @@ impl Device {
         self.is_open = is_open;
         if is_open {
             HOST_IS_GONE.store(false, Ordering::Relaxed);
+            // The replies before were for nobody.
+            HAS_MISSED.store(false, Ordering::Relaxed);
             WAS_OPENED.store(true, Ordering::Relaxed);
             return;
         }
@@ -351,11 +377,15 @@ impl Device {
         }
     }
 
-    /// Notes that the host has taken a packet, so that it is there. If it counted as gone, what it
-    /// missed is discarded, because it would be incomplete.
+    /// Notes that the host has taken a packet, so that it is there. If bytes were discarded, those
+    /// before them that still wait are, too, because they would be incomplete, and it is told.
     fn resume_host(&mut self) {
-        if self.is_open && HOST_IS_GONE.load(Ordering::Relaxed) {
+        if self.is_open && HAS_MISSED.load(Ordering::Relaxed) {
             self.forget_sent();
+            let _ = self.packet.extend_from_slice(MISSED); // There is room.
+            HAS_MISSED.store(false, Ordering::Relaxed);
+        }
+        if self.is_open {
             HOST_IS_GONE.store(false, Ordering::Relaxed);
         }
     }

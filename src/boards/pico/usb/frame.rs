@@ -5,7 +5,10 @@
 //! is made available to the host at the end of a frame; TinyUSB does not do so in the last 200
 //! microseconds either. The beginning of a frame is known only from the controller's interrupt,
 //! which is on only while something waits to be sent. This delays a packet by at most some 0.5 ms
-//! when nothing was sent before, and later packets not at all.
+//! when nothing was sent before, and later packets not at all. Work on the flash masks that
+//! interrupt for longer than a frame lasts: see [`forget`].
+
+use core::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::clock;
 use super::super::registers::{Get, Put, USB};
@@ -19,6 +22,17 @@ const LENGTH: u32 = 1000;
 /// allow for the time between reading the clock and writing to the buffer, and for a late
 /// interrupt.
 const SAFE: u32 = 700;
+
+/// Whether a frame may have begun long before its interrupt could come. What masks interrupts for
+/// long sets it, and the handler clears it.
+static IS_UNKNOWN: AtomicBool = AtomicBool::new(false);
+
+/// Tells that interrupts were masked for so long that the one of a frame which waits now says
+/// nothing about when that frame began. Call it while they are still masked.
+#[inline(always)]
+pub fn forget() {
+    IS_UNKNOWN.store(true, Ordering::Relaxed);
+}
 
 /// Knows how far the present frame of the bus has come.
 pub struct Frame {
@@ -41,6 +55,11 @@ impl Frame {
             return;
         }
         clear_interrupt();
+        if IS_UNKNOWN.load(Ordering::Relaxed) {
+            IS_UNKNOWN.store(false, Ordering::Relaxed);
+            self.began = None;
+            return;
+        }
         let now = clock::microseconds();
         self.began = match self.began {
             // The interrupt may have come late, but not the frame: the chip's crystal is as exact
@@ -62,6 +81,7 @@ impl Frame {
             // An interrupt flag from before the interrupt was enabled says nothing about the time.
             self.began = None;
             clear_interrupt();
+            IS_UNKNOWN.store(false, Ordering::Relaxed);
             USB.inte().set(BEGAN);
         }
         self.began.is_some_and(|began| clock::microseconds().wrapping_sub(began) < SAFE)
