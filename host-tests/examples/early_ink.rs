@@ -11,7 +11,7 @@ use penup::order::{
 };
 use penup::plotter::EMPTY_LOOKAHEAD;
 use penup::stage::{NeverCancel, Scratch};
-use penup_host_tests::order_drawings::{Strokes, hatched, flow_field, random};
+use penup_host_tests::order_drawings::{Strokes, flow_field, hatched, random};
 use penup_host_tests::whole_jobs::{Bench, job_lines};
 
 /// The scenes and their cameras.
@@ -54,9 +54,15 @@ fn narrow(strokes: Strokes) -> Drawn {
 }
 
 struct Count(u64);
-impl penup::stage::Cancel for Count { fn check(&mut self) -> Result<(), penup::stage::Aborted> { self.0 += 1; Ok(()) } }
+impl penup::stage::Cancel for Count {
+    fn check(&mut self) -> Result<(), penup::stage::Aborted> {
+        self.0 += 1;
+        Ok(())
+    }
+}
 fn main() {
-    let scenes = SCENES.into_iter().map(|(scene, option)| (scene.to_owned(), drawing_of(scene, option)));
+    let scenes =
+        SCENES.into_iter().map(|(scene, option)| (scene.to_owned(), drawing_of(scene, option)));
     let random = (1..4).map(|seed| (format!("random {seed}"), narrow(random(1000, seed))));
     let hatched = (1..2).map(|seed| (format!("hatched {seed}"), narrow(hatched(1000, seed))));
     let flow = (1..2).map(|seed| (format!("flow {seed}"), narrow(flow_field(400, seed))));
@@ -66,24 +72,73 @@ fn main() {
         let mut memory = vec![0u64; PICO.memory.words.saturating_sub(used)];
         let mut tour = vec![Leg::<u16>::new(0, false); segments.len()];
         let mm = |length: u64| length as f64 / 256.0 / 80.0;
-        let show = |what: &str, r: Report| println!("{name} {what}: up {:.1} lifts {} odd {} parts {} down {:.1}", mm(r.pen_up), r.lifts, r.odd_points, r.components, mm(r.pen_down));
-        for effort in [Effort::Auto(Pace::default()), Effort::Auto(Pace { units_per_second: 4_000_000, ..Pace::default() }), Effort::Units(0)] {
+        let show = |what: &str, r: Report| {
+            println!(
+                "{name} {what}: up {:.1} lifts {} odd {} parts {} down {:.1}",
+                mm(r.pen_up),
+                r.lifts,
+                r.odd_points,
+                r.components,
+                mm(r.pen_down)
+            )
+        };
+        for effort in [
+            Effort::Auto(Pace::default()),
+            Effort::Auto(Pace { units_per_second: 4_000_000, ..Pace::default() }),
+            Effort::Units(0),
+        ] {
             let options = Options { effort, ..options };
             let drawing = Drawing { points: &points, segments: &segments };
             let mut c = Count(0);
-let Ok(report) = order(drawing, options, Scratch::new(&mut memory), &mut c, &mut tour) else { println!("{name}: refused"); continue };
-            show(&format!("today {:.2} s", c.0 as f64 * 256.0/250e3), report);
+            let Ok(report) = order(drawing, options, Scratch::new(&mut memory), &mut c, &mut tour)
+            else {
+                println!("{name}: refused");
+                continue;
+            };
+            show(&format!("today {:.2} s", c.0 as f64 * 256.0 / 250e3), report);
             let mut segments = segments.clone();
-            let first = choose_first(&points, &mut segments, options, &Time, Scratch::new(&mut memory), &mut NeverCancel).expect("strokes");
+            let first = choose_first(
+                &points,
+                &mut segments,
+                options,
+                &Time,
+                Scratch::new(&mut memory),
+                &mut NeverCancel,
+            )
+            .expect("strokes");
             let drawing = Drawing { points: &points, segments: &segments };
-            let (drawn, rest) = tour.split_at_mut(first.segments); penup::order::first_legs(drawn);
-let mut c = Count(0); let report = order_rest(drawing, first, drawn, options, Scratch::new(&mut memory), &mut c, rest).expect("an order");
-            let mut at: Option<PagePoint> = None; let (mut ups, mut n) = (vec![], 0);
-            for leg in &tour { let sg = segments[leg.segment()]; let (f, t) = if leg.reversed() { (sg.to(), sg.from()) } else { (sg.from(), sg.to()) };
+            let (drawn, rest) = tour.split_at_mut(first.segments);
+            penup::order::first_legs(drawn);
+            let mut c = Count(0);
+            let report =
+                order_rest(drawing, first, drawn, options, Scratch::new(&mut memory), &mut c, rest)
+                    .expect("an order");
+            let mut at: Option<PagePoint> = None;
+            let (mut ups, mut n) = (vec![], 0);
+            for leg in &tour {
+                let sg = segments[leg.segment()];
+                let (f, t) =
+                    if leg.reversed() { (sg.to(), sg.from()) } else { (sg.from(), sg.to()) };
                 let (f, t) = (points[f as usize], points[t as usize]);
-                if let Some(a) = at { if a != f { ups.push(mm(penup::order::length(a, f).into()).round()); } }
-                at = Some(t); n += 1; if n > first.segments + 8 { break } }
-            show(&format!("early {} strokes {ups:?} {:.2} s", first.parts, c.0 as f64 * 256.0/250e3), report);
+                if let Some(a) = at {
+                    if a != f {
+                        ups.push(mm(penup::order::length(a, f).into()).round());
+                    }
+                }
+                at = Some(t);
+                n += 1;
+                if n > first.segments + 8 {
+                    break;
+                }
+            }
+            show(
+                &format!(
+                    "early {} strokes {ups:?} {:.2} s",
+                    first.parts,
+                    c.0 as f64 * 256.0 / 250e3
+                ),
+                report,
+            );
         }
     }
     let _ = (First::default(), Settings::default());

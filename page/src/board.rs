@@ -53,7 +53,7 @@ impl Board {
         let pins = Box::leak(Box::new(PulserState::new()));
         let mut board = HostBoard::new(ring, pins);
         pins.set_queue(room.steps);
-        let plotter = Plotter::new(room.lend(), pins);
+        let plotter = Plotter::new(room.lend(), pins).with_early_ink(room.early_ink);
         plotter.greet(&mut board);
         let steps = plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>());
         let pen = PenWatch::new(1.0 / steps[0]);

@@ -53,6 +53,8 @@ pub struct First {
     pub odd_points: u32,
     /// The number of connected parts that they are.
     pub parts: u32,
+    /// About how many strokes are left besides them.
+    pub strokes_left: u32,
     /// The milliseconds for which the pen is busy with them beyond those that the order takes
     /// anyway.
     pub spare_milliseconds: u32,
@@ -150,19 +152,21 @@ fn mark_odd<I: Index>(drawing: Drawing<'_, I>, pen: u8, is_odd: &mut [u8]) -> u6
     is_odd.iter().map(|&is_odd| u64::from(is_odd)).sum()
 }
 
-/// Returns about how many milliseconds a board's core takes to order the strokes of all pens.
+/// Returns about how many milliseconds a board's core takes to order the strokes of all pens, and
+/// the number of odd points.
 fn milliseconds_to_order<I: Index>(
     drawing: Drawing<'_, I>,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-) -> Result<u64, OrderError> {
+) -> Result<(u64, u64), OrderError> {
     let is_odd: &mut [u8] = scratch.take(drawing.points.len())?;
     let pens = || drawing.segments.iter().map(|segment| segment.pen());
     let mut next = pens().min();
-    let mut milliseconds = 0;
+    let (mut milliseconds, mut all) = (0, 0);
     while let Some(pen) = next {
         cancel.check()?;
         let odd = mark_odd(drawing, pen, is_odd);
+        all += odd;
         let paired = if odd <= u64::from(EXACT_POINTS) {
             odd * odd / SQUARED_POINTS_A_MILLISECOND
         } else {
@@ -171,7 +175,7 @@ fn milliseconds_to_order<I: Index>(
         milliseconds += paired + odd * POINT_MICROSECONDS / 1000;
         next = pens().filter(|&other| other > pen).min();
     }
-    Ok(milliseconds)
+    Ok((milliseconds, all))
 }
 
 /// Chooses strokes that are drawn first, orders them, and puts their segments to the front of
@@ -208,7 +212,7 @@ fn choose<I: Index>(
     cancel: &mut dyn Cancel,
 ) -> Result<First, OrderError> {
     let drawing = Drawing { points, segments: &*segments };
-    let order_takes = milliseconds_to_order(drawing, scratch.reborrow(), cancel)?;
+    let (order_takes, all_odd) = milliseconds_to_order(drawing, scratch.reborrow(), cancel)?;
     let pen = segments.iter().map(|segment| segment.pen()).min();
     let Some(pen) = pen.filter(|_| order_takes >= LEAST_MILLISECONDS) else {
         return Ok(First::default());
@@ -237,7 +241,8 @@ fn choose<I: Index>(
             first.parts += 1;
         }
         for index in 0..segments.len() {
-            let is_chosen = |segment: &&Segment<I>| segment.pen() == pen && parts.has_chosen(segment);
+            let is_chosen =
+                |segment: &&Segment<I>| segment.pen() == pen && parts.has_chosen(segment);
             if segments.get(index).filter(is_chosen).is_some() {
                 segments.swap(first.segments, index);
                 first.segments += 1;
@@ -249,6 +254,8 @@ fn choose<I: Index>(
     let spare = milliseconds.saturating_sub(order_takes);
     first.spare_milliseconds = u32::try_from(spare).unwrap_or(u32::MAX);
     first.odd_points = odd;
+    let strokes_left = all_odd.saturating_sub(odd.into()) / 2;
+    first.strokes_left = u32::try_from(strokes_left).unwrap_or(u32::MAX).max(1);
     Ok(first)
 }
 

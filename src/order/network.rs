@@ -8,9 +8,9 @@
 //! point is a station. The pen may then leave a corner for something near it and come back. Fails
 //! if there is not enough memory.
 
-use super::{Leg, even_part};
 use super::metric::{least_length, length, square};
 use super::partition::Partition;
+use super::{Leg, even_part};
 use crate::array::MapEach;
 use crate::drawing::{Drawing, PagePoint, Segment};
 use crate::index::Index;

@@ -94,6 +94,46 @@ impl<F: MultiwriteNorFlash> Kept<F> {
         writer.finish().map_err(|_| NotStored)
     }
 
+    /// Carries out [`Board::save_with_room`](super::Board::save_with_room).
+    ///
+    /// # Errors
+    /// [`NotStored`]; the last state is still kept.
+    #[cfg(feature = "early-ink")]
+    pub fn save_with_room(
+        &mut self,
+        record: Record,
+        parts: &[&[u8]],
+        room: u32,
+    ) -> Result<(), NotStored> {
+        if record == Record::Job {
+            self.open = None;
+        }
+        let slots = self.layout.slots(record);
+        let mut writer = slots.write(&mut self.flash).map_err(|_| NotStored)?;
+        for part in parts {
+            writer.write(part).map_err(|_| NotStored)?;
+        }
+        writer.leave_room(room).map_err(|_| NotStored)?;
+        writer.finish().map_err(|_| NotStored)
+    }
+
+    /// Carries out [`Board::add`](super::Board::add).
+    ///
+    /// # Errors
+    /// [`NotStored`]; nothing is then added.
+    #[cfg(feature = "early-ink")]
+    pub fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        self.layout.slots(record).add(&mut self.flash, parts).map_err(|_| NotStored)
+    }
+
+    /// Carries out [`Board::load_added`](super::Board::load_added).
+    #[cfg(feature = "early-ink")]
+    pub fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        if let Some(mut added) = self.layout.slots(record).added(&mut self.flash) {
+            take(&mut added);
+        }
+    }
+
     /// Carries out [`Board::load`](super::Board::load).
     pub fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         if let Some(mut state) = self.layout.slots(record).latest(&mut self.flash) {

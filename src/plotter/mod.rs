@@ -8,6 +8,8 @@
 
 mod board;
 pub mod budget;
+#[cfg(feature = "early-ink")]
+mod early;
 mod editor;
 mod grbl;
 mod help;
@@ -162,6 +164,12 @@ struct Inner<'m, I> {
     /// Whether a computer computes for a plotter, so that more work on the order pays.
     #[cfg(any(test, feature = "host"))]
     is_thorough: bool,
+    /// Whether the pen begins before the order of the strokes is known.
+    #[cfg(all(feature = "early-ink", any(test, feature = "host")))]
+    has_early_ink: bool,
+    /// The job whose order is known, but not released yet.
+    #[cfg(feature = "early-ink")]
+    pending: Option<early::Pending<I>>,
     /// How far the strokes of a job have come that are sent while they are drawn.
     #[cfg(feature = "stream")]
     streamed: streamed::Streamed,
@@ -227,6 +235,10 @@ impl<'m, I: Index> Plotter<'m, I> {
                 can_undo: true,
                 #[cfg(any(test, feature = "host"))]
                 is_thorough: false,
+                #[cfg(all(feature = "early-ink", any(test, feature = "host")))]
+                has_early_ink: false,
+                #[cfg(feature = "early-ink")]
+                pending: None,
                 program: Program::default(),
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
@@ -280,6 +292,16 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.is_thorough = is_thorough;
     }
 
+    /// Sets whether the pen begins before the order of the strokes is known, as on the boards of
+    /// which [`BoardRow::early_ink`](crate::board_table::BoardRow) says so. The order may then
+    /// differ from what it is otherwise.
+    #[cfg(all(feature = "early-ink", any(test, feature = "host")))]
+    #[must_use]
+    pub fn with_early_ink(mut self, has_early_ink: bool) -> Self {
+        self.inner.has_early_ink = has_early_ink;
+        self
+    }
+
     /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
     pub fn greet<B: Board>(&self, board: &mut B) {
         report::greet(board);
@@ -296,6 +318,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.watch_drivers(board);
         self.inner.note_progress(board);
         let planned = self.inner.plan(board);
+        #[cfg(feature = "early-ink")]
+        let planned = self.inner.follow_order(board) || planned;
         #[cfg(feature = "hpgl")]
         let planned = self.carry_out_hpgl(board) || planned;
         if self.inner.task.is_some() {
@@ -645,7 +669,17 @@ impl<I: Index> Inner<'_, I> {
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
         let observer = &mut Unobserved;
         let pace = crate::order::Pace::default();
-        let pipeline = job::Pipeline { model, options, steps, pace, words, cancel, observer };
+        let pipeline = job::Pipeline {
+            model,
+            options,
+            steps,
+            pace,
+            #[cfg(feature = "early-ink")]
+            early: None,
+            words,
+            cancel,
+            observer,
+        };
         let stored = pipeline.draw()?;
         Ok(stored.drawing(self.words).unwrap_or(Drawing { points: &[], segments: &[] }))
     }

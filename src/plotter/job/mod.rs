@@ -10,15 +10,21 @@ mod lines;
 mod pipeline;
 mod scale;
 mod strokes;
+#[cfg(feature = "early-ink")]
+mod unordered;
 
 pub(super) use lines::{Collector, PageSink, move_to_front};
 pub(super) use pipeline::{Found, Pipeline};
 pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, union};
 pub use strokes::{Cursor, Strokes};
+#[cfg(feature = "early-ink")]
+pub(super) use unordered::{Begun, UNORDERED_WORDS};
 
 use crate::drawing::{Drawing, Stored};
 use crate::index::Index;
 use crate::machine::StrokeEnds;
+#[cfg(feature = "early-ink")]
+use crate::order::First;
 use crate::order::{self, Leg};
 use crate::stage::{Scratch, items};
 use crate::view::View;
@@ -50,6 +56,16 @@ impl<I: Index> Observer<I> for Unobserved {
 /// Number of the figures of a job.
 pub(super) const FIGURES: usize = 13;
 
+/// What the order of a job is computed from, besides its drawing.
+#[cfg(feature = "early-ink")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Unordered {
+    /// The strokes that are drawn first.
+    pub(super) first: First,
+    /// The options of the order.
+    pub(super) options: order::Options,
+}
+
 /// A drawing and the order of its strokes, both of which lie in the working memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Job<I = u16> {
@@ -59,6 +75,9 @@ pub struct Job<I = u16> {
     legs: usize,
     /// What the ordering has achieved: lengths and lifts.
     report: order::Report,
+    /// What the order will be computed from that is not known yet beyond the first strokes.
+    #[cfg(feature = "early-ink")]
+    unordered: Option<Unordered>,
     /// Number of faces that were left out because they have no area.
     degenerate_faces: u32,
     /// Number of edges of a convex solid that were left out because the faces beside them may be
@@ -72,6 +91,8 @@ impl<I: Index> Default for Job<I> {
             stored: Stored::default(),
             legs: 0,
             report: order::Report::default(),
+            #[cfg(feature = "early-ink")]
+            unordered: None,
             degenerate_faces: 0,
             joined_edges: 0,
         }
@@ -128,6 +149,8 @@ impl<I: Index> Job<I> {
                 pen_up: length(up, up_high),
                 bound: length(bound, bound_high),
             },
+            #[cfg(feature = "early-ink")]
+            unordered: None,
             degenerate_faces: 0,
             joined_edges: 0,
         })
@@ -166,12 +189,17 @@ impl<I: Index> Job<I> {
         let nothing = Drawing::<I> { points: &[], segments: &[] };
         let leg_words = self.stored.bytes() / size_of::<u64>();
         let words: &'a [u64] = words;
+        let legs = self.legs;
+        #[cfg(feature = "early-ink")]
+        let legs = self.unordered.map_or(legs, |unordered| unordered.first.segments);
         let tour =
-            words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, self.legs)).unwrap_or(&[]);
+            words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, legs)).unwrap_or(&[]);
         let drawing = self.stored.drawing(words).unwrap_or(nothing);
         Strokes {
             drawing,
             tour,
+            #[cfg(feature = "early-ink")]
+            has_more: self.unordered.is_some(),
             cursor,
             ends,
             #[cfg(feature = "stream")]
