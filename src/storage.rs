@@ -47,6 +47,9 @@ const HEADER_BYTES: usize = 16;
 pub enum StorageError<E> {
     /// The state is longer than a slot.
     TooLong,
+    /// Something else was added to the state before.
+    #[cfg(feature = "early-ink")]
+    Changed,
     /// The flash reported an error.
     Flash(E),
 }
@@ -162,8 +165,8 @@ impl Slots {
     /// added before may be added once more, so that a loss of power meanwhile does no harm.
     ///
     /// # Errors
-    /// [`StorageError::TooLong`] if there is no state or no room in the slot, or the error of the
-    /// flash. Nothing is then added.
+    /// [`StorageError::TooLong`] if there is no state or no room in the slot,
+    /// [`StorageError::Changed`], or the error of the flash. Nothing is then added.
     #[cfg(feature = "early-ink")]
     pub fn add<F: MultiwriteNorFlash>(
         self,
@@ -189,17 +192,20 @@ impl Slots {
             digest.update(&[byte]);
             if filled == PAGE_BYTES {
                 at += PAGE_BYTES as u32;
-                flash.write(at, &page)?;
+                complete(flash, at, page)?;
                 page.fill(0xFF);
                 filled = 0;
             }
         }
         if filled > 0 {
-            flash.write(at + PAGE_BYTES as u32, &page)?;
+            complete(flash, at + PAGE_BYTES as u32, page)?;
         }
         let sum = total_of(ADDED_MARK, digest, valid.sum, length);
-        flash.write(start, &header_page([ADDED_MARK, valid.sum, length, sum]))?;
-        Ok(())
+        page.fill(0xFF);
+        put_words(&mut page, [ADDED_MARK, valid.sum, length, sum]);
+        complete(flash, start, page)?;
+        // Where something else was written before, this is not what was to be added.
+        self.added(flash).map(drop).ok_or(StorageError::Changed)
     }
 
     /// Opens for reading what was added to the latest state; `None` if nothing was, or not all.
@@ -309,13 +315,26 @@ fn total_of(mark: u32, mut digest: Crc32, sequence: u32, length: u32) -> u32 {
     digest.finalize()
 }
 
-/// Returns the page that begins with the words of a header.
-fn header_page(words: [u32; HEADER_BYTES / 4]) -> [u8; PAGE_BYTES] {
-    let mut page = [0xFF; PAGE_BYTES];
+/// Writes a page, of which a part may have been written before. No bit is cleared twice.
+#[cfg(feature = "early-ink")]
+fn complete<F: MultiwriteNorFlash>(
+    flash: &mut F,
+    at: u32,
+    mut page: [u8; PAGE_BYTES],
+) -> Result<(), F::Error> {
+    let mut present = [0; PAGE_BYTES];
+    read_surely(flash, at, &mut present)?;
+    for (byte, present) in page.iter_mut().zip(present) {
+        *byte |= !present;
+    }
+    if page.iter().all(|&byte| byte == 0xFF) { Ok(()) } else { flash.write(at, &page) }
+}
+
+/// Writes the words of a header to the front of a page.
+fn put_words(page: &mut [u8; PAGE_BYTES], words: [u32; HEADER_BYTES / 4]) {
     for (slot, word) in page.chunks_exact_mut(4).zip(words) {
         slot.copy_from_slice(&word.to_le_bytes());
     }
-    page
 }
 
 /// Reads a kept state from its beginning to its end, in pieces of any size.
@@ -434,7 +453,8 @@ impl<F: NorFlash> Writer<'_, F> {
             self.put_page()?;
         }
         let sum = total(self.digest, self.sequence, self.length);
-        let header = header_page([MARK, self.sequence, self.length, sum]);
+        let mut header = [0xFF; PAGE_BYTES];
+        put_words(&mut header, [MARK, self.sequence, self.length, sum]);
         self.flash.write(self.start, &header).map_err(|error| {
             // Although the write failed, the header itself may be complete. Erasing the slot makes
             // sure that it is not valid. An error of that changes nothing any more.

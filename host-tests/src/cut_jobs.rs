@@ -100,6 +100,19 @@ pub fn switch_on(
     flash: CutFlash,
     work: impl FnOnce(&mut Powered<'_, '_>),
 ) -> (CutFlash, Vec<Stamped>) {
+    switch_on_early(flash, None, work)
+}
+
+/// Does the same with a board whose pen begins while the order is computed, if `work_ticks` are
+/// given: so many pass in a millisecond of computing.
+///
+/// # Panics
+/// As [`switch_on`].
+pub fn switch_on_early(
+    flash: CutFlash,
+    work_ticks: Option<u64>,
+    work: impl FnOnce(&mut Powered<'_, '_>),
+) -> (CutFlash, Vec<Stamped>) {
     let mut memory = Box::new(Memory::<1024, 4096, 16384, PORTS>::new());
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
@@ -109,7 +122,9 @@ pub fn switch_on(
     // A millisecond, which is more than a page takes typically.
     board.set_write_ticks(25_000);
     let memory = memory.lend(&mut blocks);
-    let mut plotter = start(&mut board, memory, &pins);
+    board.set_work_ticks(work_ticks.unwrap_or(0));
+    let plotter = start(&mut board, memory, &pins);
+    let mut plotter = plotter.with_early_ink(work_ticks.is_some());
     work(&mut Powered { board: &mut board, plotter: &mut plotter });
     let changes = board.trace().changes();
     (board.take_flash().expect("the board has flash"), changes)

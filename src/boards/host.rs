@@ -310,6 +310,9 @@ pub struct HostBoard<'q> {
     kept: Option<Kept<CutFlash>>,
     /// How long it takes to write to the flash while a job is drawn, in ticks.
     write_ticks: u64,
+    /// What is received while the plotter computes and steps run, and when, in ticks.
+    #[cfg(feature = "early-ink")]
+    meanwhile: Vec<(u64, Vec<u8>)>,
     /// The ticks that pass for each millisecond of computing while steps run.
     #[cfg(feature = "early-ink")]
     work_ticks: u64,
@@ -346,6 +349,8 @@ impl<'q> HostBoard<'q> {
             write_ticks: 0,
             #[cfg(feature = "early-ink")]
             work_ticks: 0,
+            #[cfg(feature = "early-ink")]
+            meanwhile: Vec::new(),
             inverted: (0, false),
         }
     }
@@ -364,6 +369,12 @@ impl<'q> HostBoard<'q> {
     /// Takes the flash out of the board, as it is.
     pub fn take_flash(&mut self) -> Option<CutFlash> {
         self.kept.take().map(|kept| kept.flash)
+    }
+
+    /// Receives `bytes` at this time in ticks or later, while the plotter computes and steps run.
+    #[cfg(feature = "early-ink")]
+    pub fn receive_meanwhile(&mut self, at: u64, bytes: &[u8]) {
+        self.meanwhile.push((at, bytes.to_vec()));
     }
 
     /// Sets the ticks that pass each time that the plotter, while it computes, sees to the steps
@@ -527,7 +538,19 @@ impl Board for HostBoard<'_> {
 
     #[cfg(feature = "early-ink")]
     fn begin_steps(&mut self) {
+        // Where the power has failed, nothing moves any more.
+        if self.flash().is_some_and(|flash| flash.is_cut) {
+            return;
+        }
         self.pass(self.work_ticks);
+        let now = self.trace().now();
+        let (due, later) =
+            core::mem::take(&mut self.meanwhile).into_iter().partition(|&(at, _)| at <= now);
+        self.meanwhile = later;
+        let due: Vec<(u64, Vec<u8>)> = due;
+        for (_, bytes) in due {
+            self.receive(&bytes);
+        }
     }
 
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {

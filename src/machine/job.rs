@@ -326,7 +326,8 @@ impl Machine<'_> {
     }
 
     /// Begins to measure a path that starts at the machine's present position.
-    #[inline(always)] // It has one caller without the feature `early-ink`; so have the next two.
+    #[cfg_attr(not(feature = "early-ink"), inline(always))] // It has one caller then, as the others.
+    #[cfg_attr(feature = "early-ink", inline(never))]
     pub fn begin_measuring(&self) -> Measured {
         Measured {
             size: JobSize::default(),
@@ -343,7 +344,8 @@ impl Machine<'_> {
     ///
     /// # Errors
     /// See [`MachineError`].
-    #[inline(always)]
+    #[cfg_attr(not(feature = "early-ink"), inline(always))]
+    #[cfg_attr(feature = "early-ink", inline(never))]
     pub fn measure_next(
         &self,
         path: &mut dyn Path,
@@ -374,7 +376,8 @@ impl Machine<'_> {
     }
 
     /// Returns the size of the path that was measured.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "early-ink"), inline(always))]
+    #[cfg_attr(feature = "early-ink", inline(never))]
     pub fn end_measuring(&self, Measured { mut size, estimate, .. }: Measured) -> JobSize {
         size.milliseconds = estimate.end(&self.settings);
         size

@@ -292,8 +292,10 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     /// anchor.
     pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
         let own = [I::NONE, station].into_iter().skip(usize::from(!by_gap));
-        let anchor = self.network.anchor().filter(|_| by_gap);
-        own.chain(self.neighbours.of(station)).chain(anchor)
+        let near = own.chain(self.neighbours.of(station));
+        #[cfg(feature = "early-ink")]
+        let near = near.chain(self.network.anchor().filter(|_| by_gap));
+        near
     }
 
     /// Returns the cost of a move from `station` to the nearer end of the path, or a very large
@@ -351,17 +353,17 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     /// Returns the legs that begin at a station; for [`Index::NONE`], the gap in both directions.
     /// With an anchor, each end of the gap is a station of its own.
     pub fn legs_from(&self, station: I) -> impl Iterator<Item = Leg<I>> + '_ {
-        let anchor = self.network.anchor();
         let first = if station == I::NONE {
             self.gap.map(|gap| Leg::new(gap, false))
-        } else if anchor == Some(station) {
+        } else if self.network.anchor().is_some_and(|anchor| anchor == station) {
             self.gap.map(|gap| Leg::new(gap, true))
         } else {
             self.incidence.first(station)
         };
-        core::iter::successors(first, move |&leg| {
+        core::iter::successors(first, |&leg| {
             if self.is_gap(leg) {
-                (anchor.is_none() && !leg.reversed()).then(|| leg.flipped())
+                let is_first = self.network.anchor().is_none() && !leg.reversed();
+                is_first.then(|| leg.flipped())
             } else {
                 self.incidence.next(leg)
             }

@@ -129,10 +129,10 @@ pub(super) fn improve<I: Index>(
         for mate in mate.iter_mut().filter(|mate| **mate != I::NONE) {
             *mate = even_part();
         }
-        let corners = if network.anchor().is_some() { 1 } else { CORNERS.len() };
-        for &corner in CORNERS.iter().take(corners) {
+        for corner in CORNERS {
             best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
-            if !best.work_on(cycle, first, scratch.reborrow(), work_budget)? {
+            let pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
+            if network.anchor().is_some() || !pays {
                 break;
             }
         }
@@ -289,8 +289,9 @@ impl<I: Index> Best<'_, '_, I> {
             if let Some(Window { units, least_gain }) = window
                 && window_begin - work_budget.left() >= units
             {
-                let spent = until.budget() - work_budget.left();
-                if window_gain < least_gain && spent >= self.network.free_units() {
+                let free_units = self.network.free_units();
+                let is_free = || until.budget() - work_budget.left() < free_units;
+                if window_gain < least_gain && (free_units == 0 || !is_free()) {
                     break;
                 }
                 (window_gain, window_begin) = (0, work_budget.left());
@@ -336,8 +337,7 @@ impl<I: Index> Best<'_, '_, I> {
             *slot = leg(start + index);
         }
         // The path begins at that side of the gap to which the anchor belongs.
-        let is_turned = gap.is_some_and(|gap| leg(gap).reversed());
-        if self.network.anchor().is_some() && is_turned {
+        if self.network.anchor().is_some() && gap.is_some_and(|gap| leg(gap).reversed()) {
             reverse(self.route);
         }
     }

@@ -259,7 +259,8 @@ pub fn order<I: Index>(
 
 /// Orders the segments of all pens, which must have been checked, and adds to `report` what is not
 /// measured in the end. The pen comes from `anchor`.
-#[inline(always)] // It has one caller without the feature `early-ink`.
+#[cfg_attr(feature = "early-ink", inline(never))] // Its three callers share one copy of the code.
+#[cfg_attr(not(feature = "early-ink"), inline(always))]
 fn order_pens<I: Index>(
     drawing: Drawing<'_, I>,
     options: Options,

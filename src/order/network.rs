@@ -155,8 +155,18 @@ impl<'a, I: Index> Network<'a, I> {
     /// Returns where on the page a station lies.
     #[cfg(feature = "early-ink")]
     pub fn position(&self, station: I) -> PagePoint {
-        let point = self.at.get(station.get()).and_then(|point| self.points.get(point.get()));
-        point.copied().or(self.anchor.place()).unwrap_or_default()
+        match self.at.get(station.get()) {
+            Some(point) => self.points[point.get()],
+            None => self.anchor_place(),
+        }
+    }
+
+    /// Returns where the anchor lies.
+    #[cfg(feature = "early-ink")]
+    #[cold]
+    #[inline(never)]
+    fn anchor_place(&self) -> PagePoint {
+        self.anchor.place().unwrap_or_default()
     }
 
     /// Returns where on the page a station lies.

@@ -13,7 +13,8 @@
 
 use super::job::{Begun, Unordered};
 use super::listener::{Listener, MeasuredStrokes};
-use super::{Board, Cursor, Inner, Job, REPLY_BYTES, Reply, Unobserved, records, report};
+use super::{Board, Cursor, Inner, Job, Observer, REPLY_BYTES, Reply, Unobserved, records, report};
+use crate::drawing::PagePoint;
 use crate::index::Index;
 use crate::machine::{JobSize, Measured, State, StrokeTime};
 use crate::order::{self, Effort, Method, Shape};
@@ -62,8 +63,7 @@ impl<B: Board, I: Index> Cancel for Meanwhile<'_, '_, B, I> {
         inner.act(requests);
         inner.watch(*board);
         inner.note_progress(*board);
-        let mut strokes = begun.strokes(&mut inner.cursor);
-        inner.machine.fill(&mut strokes, board.queue());
+        inner.plan(Some(*begun), *board);
         board.begin_steps();
         *status_due |= requests.has(RealTime::STATUS);
         if *status_due && board.has_room(REPLY_BYTES) {
@@ -116,7 +116,7 @@ impl<I: Index> Inner<'_, I> {
         &mut self,
         listener: &mut Listener<'_, B>,
     ) -> Result<(), CommandError> {
-        let job = self.begin_job(listener)?;
+        let job = self.begin_job(listener, &mut Unobserved)?;
         if !self.begins_early(job) {
             self.job = job.ordered(self.words, listener)?;
             let is_kept = self.save(listener.board);
@@ -143,9 +143,13 @@ impl<I: Index> Inner<'_, I> {
 
     /// Computes the drawing of `$plot`, in place of the last job.
     #[inline(never)] // Keeps its frame off the stack while the order is computed.
-    fn begin_job(&mut self, cancel: &mut dyn Cancel) -> Result<Job<I>, CommandError> {
+    pub(super) fn begin_job(
+        &mut self,
+        cancel: &mut dyn Cancel,
+        observer: &mut dyn Observer<I>,
+    ) -> Result<Job<I>, CommandError> {
         self.forget_job();
-        self.pipeline(cancel, &mut Unobserved).begin()
+        self.pipeline(cancel, observer).begin()
     }
 
     /// Begins to keep how far the job comes, which was computed from the model.
@@ -165,13 +169,13 @@ impl<I: Index> Inner<'_, I> {
             return false;
         }
         let Some(drawing) = job.drawing(self.words) else { return false };
-        let points = || drawing.points.iter();
-        let least = [points().map(|point| point.x).min(), points().map(|point| point.y).min()];
-        let most = [points().map(|point| point.x).max(), points().map(|point| point.y).max()];
-        let bounds = [least, most].map(|[x, y]| crate::drawing::PagePoint {
-            x: x.unwrap_or_default(),
-            y: y.unwrap_or_default(),
-        });
+        let Some(&begin) = drawing.points.first() else { return false };
+        let mut bounds = [begin, begin];
+        for point in drawing.points {
+            let [least, greatest] = &mut bounds;
+            *least = PagePoint { x: least.x.min(point.x), y: least.y.min(point.y) };
+            *greatest = PagePoint { x: greatest.x.max(point.x), y: greatest.y.max(point.y) };
+        }
         first.segments < drawing.segments.len() && self.machine.takes_any_path(bounds)
     }
 

@@ -83,15 +83,20 @@ impl<F: MultiwriteNorFlash> Kept<F> {
     /// # Errors
     /// [`NotStored`]; the last state is still kept.
     pub fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
-        if record == Record::Job {
-            self.open = None;
+        #[cfg(feature = "early-ink")]
+        return self.save_with_room(record, parts, 0);
+        #[cfg(not(feature = "early-ink"))]
+        {
+            if record == Record::Job {
+                self.open = None;
+            }
+            let slots = self.layout.slots(record);
+            let mut writer = slots.write(&mut self.flash).map_err(|_| NotStored)?;
+            for part in parts {
+                writer.write(part).map_err(|_| NotStored)?;
+            }
+            writer.finish().map_err(|_| NotStored)
         }
-        let slots = self.layout.slots(record);
-        let mut writer = slots.write(&mut self.flash).map_err(|_| NotStored)?;
-        for part in parts {
-            writer.write(part).map_err(|_| NotStored)?;
-        }
-        writer.finish().map_err(|_| NotStored)
     }
 
     /// Carries out [`Board::save_with_room`](super::Board::save_with_room).
@@ -99,6 +104,7 @@ impl<F: MultiwriteNorFlash> Kept<F> {
     /// # Errors
     /// [`NotStored`]; the last state is still kept.
     #[cfg(feature = "early-ink")]
+    #[inline(never)] // Its callers share one copy of the code.
     pub fn save_with_room(
         &mut self,
         record: Record,
@@ -113,7 +119,9 @@ impl<F: MultiwriteNorFlash> Kept<F> {
         for part in parts {
             writer.write(part).map_err(|_| NotStored)?;
         }
-        writer.leave_room(room).map_err(|_| NotStored)?;
+        if room > 0 {
+            writer.leave_room(room).map_err(|_| NotStored)?;
+        }
         writer.finish().map_err(|_| NotStored)
     }
 

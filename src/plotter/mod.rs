@@ -100,6 +100,13 @@ pub fn start<'m, B: Board, I: Index>(
     plotter
 }
 
+/// What is known of a job whose order is being computed, if one is.
+#[cfg(feature = "early-ink")]
+type BegunJob<'b, I> = Option<job::Begun<'b, I>>;
+/// Without the feature `early-ink`, the order is computed before anything moves.
+#[cfg(not(feature = "early-ink"))]
+type BegunJob<'b, I> = [&'b I; 0];
+
 /// The whole plotter except its pins, which the board pulses.
 #[derive(Debug)]
 pub struct Plotter<'m, I = u16> {
@@ -317,7 +324,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         #[cfg(feature = "driver-pins")]
         self.inner.watch_drivers(board);
         self.inner.note_progress(board);
-        let planned = self.inner.plan(board);
+        let planned = self.inner.plan(BegunJob::default(), board);
         #[cfg(feature = "early-ink")]
         let planned = self.inner.follow_order(board) || planned;
         #[cfg(feature = "hpgl")]
@@ -472,7 +479,7 @@ impl<'m, I: Index> Plotter<'m, I> {
             self.status_due = false;
             // Writing the report takes 10 ms, and so may what was done since the queue was last
             // filled.
-            self.inner.plan(board);
+            self.inner.plan(BegunJob::default(), board);
             #[cfg(feature = "hpgl")]
             if let Some(port) = self.hpgl.port() {
                 board.reply_to(Replies::OthersIfAny(port));
@@ -498,12 +505,22 @@ impl<'m, I: Index> Plotter<'m, I> {
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Keeps the step queue full. Returns whether the planned position has changed.
+    /// Keeps the step queue full. While the order of the job is computed, `begun` is what of it is
+    /// known. Returns whether the planned position has changed.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    fn plan<B: Board>(&mut self, board: &mut B) -> bool {
+    fn plan<B: Board>(&mut self, begun: BegunJob<'_, I>, board: &mut B) -> bool {
         let before = self.machine.planned_position();
         let ends = self.machine.stroke_ends();
-        let mut strokes = self.job.strokes(self.words, &mut self.cursor, ends);
+        #[cfg(feature = "early-ink")]
+        let mut strokes = match begun {
+            Some(begun) => begun.strokes(&mut self.cursor),
+            None => self.job.strokes(self.words, &mut self.cursor, ends),
+        };
+        #[cfg(not(feature = "early-ink"))]
+        let mut strokes = {
+            let _ = begun;
+            self.job.strokes(self.words, &mut self.cursor, ends)
+        };
         #[cfg(feature = "stream")]
         {
             strokes.streamed = Some(&self.streamed);

@@ -149,8 +149,15 @@ impl<I: Index> Inner<'_, I> {
         cancel: &mut dyn Cancel,
         observer: &mut dyn Observer<I>,
     ) -> Result<(), CommandError> {
-        self.forget_job();
-        self.job = self.pipeline(cancel, observer).run()?;
+        #[cfg(not(feature = "early-ink"))]
+        {
+            self.forget_job();
+            self.job = self.pipeline(cancel, observer).run()?;
+        }
+        #[cfg(feature = "early-ink")]
+        {
+            self.job = self.begin_job(cancel, observer)?.ordered(self.words, cancel)?;
+        }
         Ok(())
     }
 

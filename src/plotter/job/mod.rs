@@ -189,11 +189,14 @@ impl<I: Index> Job<I> {
         let nothing = Drawing::<I> { points: &[], segments: &[] };
         let leg_words = self.stored.bytes() / size_of::<u64>();
         let words: &'a [u64] = words;
-        let legs = self.legs;
         #[cfg(feature = "early-ink")]
-        let legs = self.unordered.map_or(legs, |unordered| unordered.first.segments);
+        let legs = self.unordered.map_or(self.legs, |unordered| unordered.first.segments);
+        #[cfg(feature = "early-ink")]
         let tour =
             words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, legs)).unwrap_or(&[]);
+        #[cfg(not(feature = "early-ink"))]
+        let tour =
+            words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, self.legs)).unwrap_or(&[]);
         let drawing = self.stored.drawing(words).unwrap_or(nothing);
         Strokes {
             drawing,

@@ -64,6 +64,7 @@ impl<I: Index> Pipeline<'_, I> {
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. The working memory then holds no job.
+    #[cfg(not(feature = "early-ink"))]
     pub fn run(mut self) -> Result<Job<I>, CommandError> {
         let found = self.find()?;
         self.order(&found)
@@ -73,7 +74,7 @@ impl<I: Index> Pipeline<'_, I> {
     /// is known. The job, which the working memory then holds, has no order yet.
     ///
     /// # Errors
-    /// As [`Pipeline::run`].
+    /// The [`CommandError`] to reply with. The working memory then holds no job.
     #[cfg(feature = "early-ink")]
     pub fn begin(&mut self) -> Result<Job<I>, CommandError> {
         let found = self.find()?;
@@ -110,7 +111,7 @@ impl<I: Index> Pipeline<'_, I> {
     /// memory.
     ///
     /// # Errors
-    /// As [`Pipeline::run`].
+    /// The [`CommandError`] to reply with.
     #[cfg(any(test, feature = "host"))]
     pub fn draw(mut self) -> Result<Stored<I>, CommandError> {
         let found = self.find()?;
@@ -145,14 +146,6 @@ impl<I: Index> Pipeline<'_, I> {
             return Err(CommandError::NothingToPlot);
         }
         title::check(self.options, self.steps)
-    }
-
-    /// Makes one drawing of the lines and orders its strokes.
-    #[cfg(feature = "early-ink")]
-    #[inline(always)] // Adds no frame to the stack.
-    fn order(mut self, found: &Found) -> Result<Job<I>, CommandError> {
-        let job = self.graph(found)?;
-        job.ordered(self.words, self.cancel)
     }
 
     /// Makes one drawing of the lines and orders its strokes.
