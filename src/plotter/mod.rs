@@ -512,10 +512,7 @@ impl<I: Index> Inner<'_, I> {
         let before = self.machine.planned_position();
         let ends = self.machine.stroke_ends();
         #[cfg(feature = "early-ink")]
-        let mut strokes = match begun {
-            Some(begun) => begun.strokes(&mut self.cursor),
-            None => self.job.strokes(self.words, &mut self.cursor, ends),
-        };
+        let mut strokes = self.job.strokes_of(begun, self.words, &mut self.cursor, ends);
         #[cfg(not(feature = "early-ink"))]
         let mut strokes = {
             let _ = begun;

@@ -20,13 +20,17 @@ pub use strokes::{Cursor, Strokes};
 #[cfg(feature = "early-ink")]
 pub(super) use unordered::{Begun, UNORDERED_WORDS};
 
-use crate::drawing::{Drawing, Stored};
+#[cfg(not(feature = "early-ink"))]
+use crate::drawing::Drawing;
+use crate::drawing::Stored;
 use crate::index::Index;
 use crate::machine::StrokeEnds;
 #[cfg(feature = "early-ink")]
 use crate::order::First;
 use crate::order::{self, Leg};
-use crate::stage::{Scratch, items};
+use crate::stage::Scratch;
+#[cfg(not(feature = "early-ink"))]
+use crate::stage::items;
 use crate::view::View;
 use crate::visibility::Stretch;
 
@@ -179,6 +183,44 @@ impl<I: Index> Job<I> {
 
     /// Returns the strokes of the job from `cursor` on. `words` is the working memory that holds
     /// the job. `ends` says by how much strokes are made longer.
+    #[cfg(feature = "early-ink")]
+    pub fn strokes<'a>(
+        &self,
+        words: &'a mut [u64],
+        cursor: &'a mut Cursor<I>,
+        ends: Option<StrokeEnds>,
+    ) -> Strokes<'a, I> {
+        self.strokes_of(None, words, cursor, ends)
+    }
+
+    /// The same, but if `begun` is given, the strokes of that.
+    #[cfg(feature = "early-ink")]
+    #[inline(always)] // Where steps are planned.
+    pub(super) fn strokes_of<'a>(
+        &self,
+        begun: Option<Begun<'a, I>>,
+        words: &'a mut [u64],
+        cursor: &'a mut Cursor<I>,
+        ends: Option<StrokeEnds>,
+    ) -> Strokes<'a, I> {
+        let words: &'a [u64] = words;
+        let (Begun { drawing, drawn: tour }, has_more) = self.readable(words, begun);
+        Strokes {
+            drawing,
+            tour,
+            has_more,
+            cursor,
+            ends,
+            #[cfg(feature = "stream")]
+            streamed: None,
+            #[cfg(feature = "stream")]
+            ring: words,
+        }
+    }
+
+    /// Returns the strokes of the job from `cursor` on. `words` is the working memory that holds
+    /// the job. `ends` says by how much strokes are made longer.
+    #[cfg(not(feature = "early-ink"))]
     pub fn strokes<'a>(
         &self,
         words: &'a mut [u64],
@@ -189,20 +231,12 @@ impl<I: Index> Job<I> {
         let nothing = Drawing::<I> { points: &[], segments: &[] };
         let leg_words = self.stored.bytes() / size_of::<u64>();
         let words: &'a [u64] = words;
-        #[cfg(feature = "early-ink")]
-        let legs = self.unordered.map_or(self.legs, |unordered| unordered.first.segments);
-        #[cfg(feature = "early-ink")]
-        let tour =
-            words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, legs)).unwrap_or(&[]);
-        #[cfg(not(feature = "early-ink"))]
         let tour =
             words.get(leg_words..).and_then(|rest| items::<Leg<I>>(rest, self.legs)).unwrap_or(&[]);
         let drawing = self.stored.drawing(words).unwrap_or(nothing);
         Strokes {
             drawing,
             tour,
-            #[cfg(feature = "early-ink")]
-            has_more: self.unordered.is_some(),
             cursor,
             ends,
             #[cfg(feature = "stream")]

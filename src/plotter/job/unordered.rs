@@ -1,11 +1,11 @@
 //! Orders a job whose first strokes may be drawn already.
 
-use super::{Cursor, Job, Strokes, Unordered};
+use super::{Job, Unordered};
 use crate::drawing::Drawing;
 use crate::index::Index;
 use crate::order::{self, Effort, First, Leg, Method, Options, Pace, Shape};
 use crate::protocol::CommandError;
-use crate::stage::{Cancel, Scratch};
+use crate::stage::{Cancel, Scratch, items};
 
 /// What of a job the machine may read while its order is being computed.
 #[derive(Debug, Clone, Copy)]
@@ -75,27 +75,26 @@ impl Unordered {
     }
 }
 
-impl<'d, I: Index> Begun<'d, I> {
-    /// The first strokes from `cursor` on.
-    pub(in crate::plotter) fn strokes<'a>(&self, cursor: &'a mut Cursor<I>) -> Strokes<'a, I>
-    where
-        'd: 'a,
-    {
-        Strokes {
-            drawing: self.drawing,
-            tour: self.drawn,
-            has_more: true,
-            cursor,
-            ends: None,
-            #[cfg(feature = "stream")]
-            streamed: None,
-            #[cfg(feature = "stream")]
-            ring: &[],
-        }
-    }
-}
-
 impl<I: Index> Job<I> {
+    /// What the machine may read of the job: the drawing, the legs whose order is known, and
+    /// whether more follow. That is `begun`, if it is given, and otherwise what `words` hold.
+    #[inline(never)] // Inlined, it would take room where steps are planned.
+    pub(in crate::plotter) fn readable<'a>(
+        &self,
+        words: &'a [u64],
+        begun: Option<Begun<'a, I>>,
+    ) -> (Begun<'a, I>, bool) {
+        if let Some(begun) = begun {
+            return (begun, true);
+        }
+        let legs = self.unordered.map_or(self.legs, |unordered| unordered.first.segments);
+        let behind = words.get(self.drawing_words()..);
+        let drawn = behind.and_then(|rest| items::<Leg<I>>(rest, legs)).unwrap_or(&[]);
+        // The job's memory was filled, so the drawing is there. Otherwise there are no strokes.
+        let drawing = self.stored.drawing(words).unwrap_or(Drawing { points: &[], segments: &[] });
+        (Begun { drawing, drawn }, self.unordered.is_some())
+    }
+
     /// The strokes that are drawn first, and what the order of the others is computed from; `None`
     /// if it is known.
     pub(in crate::plotter) fn unordered(&self) -> Option<Unordered> {
