@@ -109,7 +109,7 @@ fn a_job_that_is_only_computed_has_the_same_order() {
 fn other_jobs_are_drawn_as_always() {
     let few = job_lines("lattice2.obj", &["$page=60x60"]);
     let mut jobs = vec![few];
-    for option in ["$effort=0", "$cycle=closed", "$order=exact", "$224=40", "$221=1"] {
+    for option in ["$effort=0", "$cycle=on", "$order=exact", "$224=40", "$221=1"] {
         let mut lines = lattice();
         lines.insert(lines.len() - 1, option.to_owned());
         jobs.push(lines);
