@@ -50,6 +50,9 @@ pub struct BoardRow {
     pub emulator: Emulator,
     /// How an image gets onto a real board; `None` if the board is emulated only.
     pub flashing: Option<Flashing>,
+    /// Whether the pen begins while the order of the strokes is being computed: the cargo feature
+    /// `early-ink`.
+    pub early_ink: bool,
 }
 
 /// A range of memory addresses.
@@ -207,6 +210,8 @@ pub const LM3S6965: BoardRow = BoardRow {
     scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
     emulator: Emulator::Qemu { machine: "lm3s6965evb" },
     flashing: None,
+    // There is no flash left for it.
+    early_ink: false,
 };
 
 /// Raspberry Pi Pico. The log is that of the real board, because the same image is flashed. The
@@ -257,6 +262,7 @@ pub const PICO: BoardRow = BoardRow {
         uf2_family: 0xE48B_FF56,
         port: "penup_pen_plotter",
     }),
+    early_ink: true,
 };
 
 /// All boards. The first one is the default of command lines.

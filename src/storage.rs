@@ -16,6 +16,10 @@
 //! While the voltage falls or rises, flash may return garbage. So whatever is read is read again
 //! until it is the same twice.
 //!
+//! What becomes known of a state only later can be [added](Slots::add) behind it, without erasing
+//! anything, if [room was left](Writer::leave_room). It begins with a page of its own, with a header
+//! as that of a slot, in whose second word stands the checksum of the state.
+//!
 //! How far the work that a state describes has come can be kept beside it, in a [`Log`].
 
 mod log;
@@ -23,6 +27,8 @@ mod log;
 pub use log::{Log, NOTE_BYTES, Noted};
 
 use crate::checksum::Crc32;
+#[cfg(feature = "early-ink")]
+use embedded_storage::nor_flash::MultiwriteNorFlash;
 use embedded_storage::nor_flash::{NorFlash, ReadNorFlash};
 
 /// The unit in which flash is written, in bytes.
@@ -30,6 +36,9 @@ pub const PAGE_BYTES: usize = 256;
 
 /// The number at the beginning of a header, by which a slot that was written is known.
 const MARK: u32 = u32::from_le_bytes(*b"pen1");
+/// The number at the beginning of what was added to a state.
+#[cfg(feature = "early-ink")]
+const ADDED_MARK: u32 = u32::from_le_bytes(*b"add1");
 /// The size of a header in bytes. The rest of its page is empty.
 const HEADER_BYTES: usize = 16;
 
@@ -38,6 +47,9 @@ const HEADER_BYTES: usize = 16;
 pub enum StorageError<E> {
     /// The state is longer than a slot.
     TooLong,
+    /// Something else was added to the state before.
+    #[cfg(feature = "early-ink")]
+    Changed,
     /// The flash reported an error.
     Flash(E),
 }
@@ -148,6 +160,82 @@ impl Slots {
         })
     }
 
+    /// Adds the concatenation of `parts` to the latest state, behind which there is
+    /// [room](Writer::leave_room). Nothing is erased, and the state itself stays as it is. What was
+    /// added before may be added once more, so that a loss of power meanwhile does no harm.
+    ///
+    /// # Errors
+    /// [`StorageError::TooLong`] if there is no state or no room in the slot,
+    /// [`StorageError::Changed`], or the error of the flash. Nothing is then added.
+    #[cfg(feature = "early-ink")]
+    pub fn add<F: MultiwriteNorFlash>(
+        self,
+        flash: &mut F,
+        parts: &[&[u8]],
+    ) -> Result<(), StorageError<F::Error>> {
+        let valid = self.find(flash).ok_or(StorageError::TooLong)?;
+        let length: usize = parts.iter().map(|part| part.len()).sum();
+        let length = u32::try_from(length).map_err(|_| StorageError::TooLong)?;
+        let start = self.begin_of_added(valid);
+        let end = u64::from(start) + PAGE_BYTES as u64 + u64::from(length);
+        if end > u64::from(self.begin(valid.slot) + self.bytes) {
+            return Err(StorageError::TooLong);
+        }
+        let mut digest = Crc32::new();
+        let mut page = [0xFF; PAGE_BYTES];
+        let (mut at, mut filled) = (start, 0);
+        for &byte in parts.iter().copied().flatten() {
+            if let Some(slot) = page.get_mut(filled) {
+                *slot = byte;
+            }
+            filled += 1;
+            digest.update(&[byte]);
+            if filled == PAGE_BYTES {
+                at += PAGE_BYTES as u32;
+                complete(flash, at, page)?;
+                page.fill(0xFF);
+                filled = 0;
+            }
+        }
+        if filled > 0 {
+            complete(flash, at + PAGE_BYTES as u32, page)?;
+        }
+        let sum = total_of(ADDED_MARK, digest, valid.sum, length);
+        page.fill(0xFF);
+        put_words(&mut page, [ADDED_MARK, valid.sum, length, sum]);
+        complete(flash, start, page)?;
+        // Where something else was written before, this is not what was to be added.
+        self.added(flash).map(drop).ok_or(StorageError::Changed)
+    }
+
+    /// Opens for reading what was added to the latest state; `None` if nothing was, or not all.
+    #[cfg(feature = "early-ink")]
+    pub fn added<F: ReadNorFlash>(self, flash: &mut F) -> Option<Reader<'_, F>> {
+        let valid = self.find(flash)?;
+        let start = self.begin_of_added(valid);
+        let mut header = [0; HEADER_BYTES];
+        read_surely(flash, start, &mut header).ok()?;
+        let [mark, of, length, sum] = words(header);
+        let room = (self.begin(valid.slot) + self.bytes).checked_sub(start + PAGE_BYTES as u32)?;
+        if mark != ADDED_MARK || of != valid.sum || length > room {
+            return None;
+        }
+        let at = start + PAGE_BYTES as u32;
+        let digest = Reader { flash: &mut *flash, at, left: length }.digest()?;
+        (sum == total_of(ADDED_MARK, digest, of, length)).then_some(Reader {
+            flash,
+            at,
+            left: length,
+        })
+    }
+
+    /// Returns the offset in flash of what is added to a state: the first page behind it.
+    #[cfg(feature = "early-ink")]
+    fn begin_of_added(self, valid: Valid) -> u32 {
+        let pages = 1 + valid.length.div_ceil(PAGE_BYTES as u32);
+        self.begin(valid.slot) + pages * PAGE_BYTES as u32
+    }
+
     /// The offset in flash at which the second slot ends, in bytes.
     pub const fn end(self) -> u32 {
         self.start + 2 * self.bytes
@@ -179,21 +267,8 @@ impl Slots {
             return None;
         }
         let at = self.begin(slot) + PAGE_BYTES as u32;
-        let mut payload = Reader { flash, at, left: length };
-        let mut digest = Crc32::new();
-        let mut piece = [0; 64];
-        loop {
-            match payload.read(&mut piece) {
-                0 => break,
-                count => digest.update(&piece[..count]),
-            }
-        }
-        (payload.left == 0 && sum == total(digest, sequence, length)).then_some(Valid {
-            slot,
-            sequence,
-            length,
-            sum,
-        })
+        let digest = Reader { flash, at, left: length }.digest()?;
+        (sum == total(digest, sequence, length)).then_some(Valid { slot, sequence, length, sum })
     }
 }
 
@@ -228,11 +303,38 @@ fn words(header: [u8; HEADER_BYTES]) -> [u32; 4] {
 }
 
 /// Returns the checksum of a payload and its header. `digest` has processed the payload.
-fn total(mut digest: Crc32, sequence: u32, length: u32) -> u32 {
-    for word in [MARK, sequence, length] {
+fn total(digest: Crc32, sequence: u32, length: u32) -> u32 {
+    total_of(MARK, digest, sequence, length)
+}
+
+/// The same for a header with this mark.
+fn total_of(mark: u32, mut digest: Crc32, sequence: u32, length: u32) -> u32 {
+    for word in [mark, sequence, length] {
         digest.update(&word.to_le_bytes());
     }
     digest.finalize()
+}
+
+/// Writes a page, of which a part may have been written before. No bit is cleared twice.
+#[cfg(feature = "early-ink")]
+fn complete<F: MultiwriteNorFlash>(
+    flash: &mut F,
+    at: u32,
+    mut page: [u8; PAGE_BYTES],
+) -> Result<(), F::Error> {
+    let mut present = [0; PAGE_BYTES];
+    read_surely(flash, at, &mut present)?;
+    for (byte, present) in page.iter_mut().zip(present) {
+        *byte |= !present;
+    }
+    if page.iter().all(|&byte| byte == 0xFF) { Ok(()) } else { flash.write(at, &page) }
+}
+
+/// Writes the words of a header to the front of a page.
+fn put_words(page: &mut [u8; PAGE_BYTES], words: [u32; HEADER_BYTES / 4]) {
+    for (slot, word) in page.chunks_exact_mut(4).zip(words) {
+        slot.copy_from_slice(&word.to_le_bytes());
+    }
 }
 
 /// Reads a kept state from its beginning to its end, in pieces of any size.
@@ -259,6 +361,19 @@ impl<F: ReadNorFlash> Reader<'_, F> {
             }
             Err(_) => 0,
         }
+    }
+
+    /// Reads all that is left. Returns its checksum so far, or `None` if the flash fails.
+    fn digest(&mut self) -> Option<Crc32> {
+        let mut digest = Crc32::new();
+        let mut piece = [0; 64];
+        loop {
+            match self.read(&mut piece) {
+                0 => break,
+                count => digest.update(&piece[..count]),
+            }
+        }
+        (self.left == 0).then_some(digest)
     }
 
     /// Returns the number of bytes of the state that have not been read yet.
@@ -313,6 +428,22 @@ impl<F: NorFlash> Writer<'_, F> {
         Ok(())
     }
 
+    /// Leaves room behind the state for so many bytes that will be [added](Slots::add) to it: erases
+    /// it. Call it when all of the state is written, before [`Writer::finish`].
+    ///
+    /// # Errors
+    /// See [`StorageError`]; the latest state is still the previous one.
+    #[cfg(feature = "early-ink")]
+    pub fn leave_room(&mut self, bytes: u32) -> Result<(), StorageError<F::Error>> {
+        const PAGE: u32 = PAGE_BYTES as u32;
+        // The pages of both headers come before each payload.
+        let pages = 2 + self.length.div_ceil(PAGE) + bytes.div_ceil(PAGE);
+        if pages * PAGE > self.slots.bytes {
+            return Err(StorageError::TooLong);
+        }
+        self.erase_up_to(pages * PAGE)
+    }
+
     /// Completes the new state and makes it the latest one.
     ///
     /// # Errors
@@ -323,10 +454,7 @@ impl<F: NorFlash> Writer<'_, F> {
         }
         let sum = total(self.digest, self.sequence, self.length);
         let mut header = [0xFF; PAGE_BYTES];
-        let words = [MARK, self.sequence, self.length, sum];
-        for (slot, word) in header.chunks_exact_mut(4).zip(words) {
-            slot.copy_from_slice(&word.to_le_bytes());
-        }
+        put_words(&mut header, [MARK, self.sequence, self.length, sum]);
         self.flash.write(self.start, &header).map_err(|error| {
             // Although the write failed, the header itself may be complete. Erasing the slot makes
             // sure that it is not valid. An error of that changes nothing any more.
@@ -343,13 +471,19 @@ impl<F: NorFlash> Writer<'_, F> {
         if to > self.slots.bytes {
             return Err(StorageError::TooLong);
         }
-        if to > self.erased {
+        self.erase_up_to(to)?;
+        self.flash.write(self.start + from, &self.page)?;
+        self.page.fill(0xFF);
+        Ok(())
+    }
+
+    /// Erases the slot up to this offset in it, as far as it is not erased.
+    fn erase_up_to(&mut self, to: u32) -> Result<(), StorageError<F::Error>> {
+        while to > self.erased {
             let start = self.start + self.erased;
             self.flash.erase(start, start + F::ERASE_SIZE as u32)?;
             self.erased += F::ERASE_SIZE as u32;
         }
-        self.flash.write(self.start + from, &self.page)?;
-        self.page.fill(0xFF);
         Ok(())
     }
 }

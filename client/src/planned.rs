@@ -102,6 +102,23 @@ impl Board for PlannedBoard {
         self.board.save(record, parts)
     }
 
+    fn save_with_room(
+        &mut self,
+        record: Record,
+        parts: &[&[u8]],
+        room: u32,
+    ) -> Result<(), NotStored> {
+        self.board.save_with_room(record, parts, room)
+    }
+
+    fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        self.board.add(record, parts)
+    }
+
+    fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        self.board.load_added(record, take);
+    }
+
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         self.board.load(record, take);
     }

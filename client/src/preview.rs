@@ -74,7 +74,9 @@ impl<I: Index> InMemory<I> {
     /// conversation, and goes on while a sender listens.
     pub fn new(room: Room, settings: Settings) -> Self {
         let mut board = PlannedBoard::new(50 * MILLISECOND, room.steps);
-        let plotter = Plotter::with_settings(room.lend(), board.pins, settings).without_undo();
+        let plotter = Plotter::with_settings(room.lend(), board.pins, settings)
+            .without_undo()
+            .with_early_ink(room.early_ink);
         plotter.greet(&mut board);
         Self { board, plotter, began: Some(Instant::now()) }
     }
@@ -87,6 +89,7 @@ impl<I: Index> InMemory<I> {
         board.set_flash(flash);
         let pins = board.pins;
         let plotter = penup::plotter::start(&mut board, room.lend(), pins);
+        let plotter = plotter.with_early_ink(room.early_ink);
         Self { board, plotter, began: None }
     }
 

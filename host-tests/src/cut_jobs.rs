@@ -100,15 +100,17 @@ pub fn switch_on(
     flash: CutFlash,
     work: impl FnOnce(&mut Powered<'_, '_>),
 ) -> (CutFlash, Vec<Stamped>) {
-    switch_on_with::<16384>(flash, work)
+    switch_on_early::<16384>(flash, None, work)
 }
 
-/// Does what [`switch_on`] does with a board that has so many `WORDS` of working memory.
+/// Does the same with a board that has so many `WORDS` of working memory, and whose pen begins while
+/// the order is computed, if `work_ticks` are given: so many pass in a millisecond of computing.
 ///
 /// # Panics
 /// As [`switch_on`].
-pub fn switch_on_with<const WORDS: usize>(
+pub fn switch_on_early<const WORDS: usize>(
     flash: CutFlash,
+    work_ticks: Option<u64>,
     work: impl FnOnce(&mut Powered<'_, '_>),
 ) -> (CutFlash, Vec<Stamped>) {
     let mut memory = Box::new(Memory::<1024, 4096, WORDS, PORTS>::new());
@@ -120,7 +122,9 @@ pub fn switch_on_with<const WORDS: usize>(
     // A millisecond, which is more than a page takes typically.
     board.set_write_ticks(25_000);
     let memory = memory.lend(&mut blocks);
-    let mut plotter = start(&mut board, memory, &pins);
+    board.set_work_ticks(work_ticks.unwrap_or(0));
+    let plotter = start(&mut board, memory, &pins);
+    let mut plotter = plotter.with_early_ink(work_ticks.is_some());
     work(&mut Powered { board: &mut board, plotter: &mut plotter });
     let changes = board.trace().changes();
     (board.take_flash().expect("the board has flash"), changes)

@@ -30,7 +30,7 @@ pub fn bench_like(board: &'static BoardRow) -> Bench {
     let memory: MemorySlices = if board == &PICO { memory_of!(PICO) } else { memory_of!(LM3S6965) };
     let mut bench = Bench::with_queue(memory, board.memory.steps);
     bench.heard();
-    bench
+    Bench { plotter: bench.plotter.with_early_ink(board.early_ink), ..bench }
 }
 
 /// The machine events of a job on the host.

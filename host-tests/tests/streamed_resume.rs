@@ -6,7 +6,7 @@
 use penup::plotter::{Board as _, Unobserved};
 use penup::stage::{Aborted, Cancel};
 use penup_host_tests::cut_jobs::{
-    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_with,
+    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_early,
 };
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
@@ -123,7 +123,7 @@ fn draw_with_cuts(
         let is_last = number == cuts;
         let after = if is_last { u64::MAX / 2 } else { random.below(milliseconds) };
         let in_flash = !is_last && random.once_in(3);
-        let (left, changes) = switch_on_with::<WORDS>(flash.powered(), |plotter| {
+        let (left, changes) = switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
             let found = stopped(plotter);
             if found.is_none() && runs.iter().any(|run| !run.is_empty()) {
                 is_over = true;
@@ -171,7 +171,7 @@ fn draw_with_cuts(
 /// What a drawing is without a cut: its strokes, and the milliseconds that it takes.
 fn undisturbed(drawing: &mut Drawing) -> (Vec<Vec<Point>>, u64) {
     let job = drawing.from(0);
-    let (_, changes) = switch_on_with::<WORDS>(empty_flash(), |plotter| {
+    let (_, changes) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
         plotter.order(&drawing.settings);
         assert!(send(plotter, &job, 0, u64::MAX / 2, &mut Random::new(1)));
     });
@@ -238,11 +238,11 @@ fn what_a_drawing_depends_on_must_be_as_it_was() {
     let lines = job_lines("cube.obj", &[&QUICK_PEN[..], &options].concat());
     let mut drawing = Drawing::of(&lines);
     let job = drawing.from(0);
-    let (flash, _) = switch_on_with::<WORDS>(empty_flash(), |plotter| {
+    let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
         plotter.order(&drawing.settings);
         assert!(!send(plotter, &job, 0, 1000, &mut Random::new(3)));
     });
-    switch_on_with::<WORDS>(flash.powered(), |plotter| {
+    switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
         let greeting = plotter.heard();
         assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
         assert!(plotter.status().contains("|Stopped:"));

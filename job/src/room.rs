@@ -23,6 +23,9 @@ pub struct Room {
     /// The number of steps that wait. The machine is never faster than it could stop within 13/16
     /// of them.
     pub steps: u32,
+    /// Whether the pen begins while the order is computed. Where no board is named it does not.
+    #[serde(default)]
+    pub early_ink: bool,
 }
 
 impl Room {
@@ -41,7 +44,14 @@ impl Room {
     /// Returns what is enough for any model that a board holds in its working memory.
     pub fn usual() -> Self {
         let blocks = EMPTY_LOOKAHEAD.len();
-        Self { vertices: 1 << 15, corners: 1 << 16, words: 1 << 19, blocks, steps: Self::STEPS }
+        Self {
+            vertices: 1 << 15,
+            corners: 1 << 16,
+            words: 1 << 19,
+            blocks,
+            steps: Self::STEPS,
+            early_ink: false,
+        }
     }
 
     /// Returns what is enough for the model that `lines` send.
@@ -66,7 +76,7 @@ impl Room {
             + Self::BYTES_A_VERTEX * (vertices + chords)
             + Self::BYTES_A_CORNER * (corners + 2 * chords);
         let blocks = EMPTY_LOOKAHEAD.len();
-        Self { vertices, corners, words: bytes / 8, blocks, steps: Self::STEPS }
+        Self { vertices, corners, words: bytes / 8, blocks, steps: Self::STEPS, early_ink: false }
     }
 
     /// The same with so many times the memory to work in, for numbers that are so much wider.
@@ -92,6 +102,7 @@ impl Room {
             words: memory.words,
             blocks: memory.blocks,
             steps: memory.steps,
+            early_ink: board.early_ink,
         }
     }
 

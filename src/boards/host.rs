@@ -310,6 +310,12 @@ pub struct HostBoard<'q> {
     kept: Option<Kept<CutFlash>>,
     /// How long it takes to write to the flash while a job is drawn, in ticks.
     write_ticks: u64,
+    /// What is received while the plotter computes and steps run, and when, in ticks.
+    #[cfg(feature = "early-ink")]
+    meanwhile: Vec<(u64, Vec<u8>)>,
+    /// The ticks that pass for each millisecond of computing while steps run.
+    #[cfg(feature = "early-ink")]
+    work_ticks: u64,
     /// Which step pins are inverted, as a mask, and whether the enable pin is.
     inverted: (u8, bool),
 }
@@ -341,6 +347,10 @@ impl<'q> HostBoard<'q> {
             byte_ticks: 0,
             kept: None,
             write_ticks: 0,
+            #[cfg(feature = "early-ink")]
+            work_ticks: 0,
+            #[cfg(feature = "early-ink")]
+            meanwhile: Vec::new(),
             inverted: (0, false),
         }
     }
@@ -359,6 +369,19 @@ impl<'q> HostBoard<'q> {
     /// Takes the flash out of the board, as it is.
     pub fn take_flash(&mut self) -> Option<CutFlash> {
         self.kept.take().map(|kept| kept.flash)
+    }
+
+    /// Receives `bytes` at this time in ticks or later, while the plotter computes and steps run.
+    #[cfg(feature = "early-ink")]
+    pub fn receive_meanwhile(&mut self, at: u64, bytes: &[u8]) {
+        self.meanwhile.push((at, bytes.to_vec()));
+    }
+
+    /// Sets the ticks that pass each time that the plotter, while it computes, sees to the steps
+    /// that run: about once in a millisecond of computing.
+    #[cfg(feature = "early-ink")]
+    pub fn set_work_ticks(&mut self, ticks: u64) {
+        self.work_ticks = ticks;
     }
 
     /// Sets how long it takes, in ticks, to write to the flash while a job is drawn. Without it,
@@ -481,6 +504,53 @@ impl Board for HostBoard<'_> {
     fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
         assert!(self.state.is_drained(), "flash is erased while something moves");
         self.kept.as_mut().map_or(Ok(()), |kept| kept.save(record, parts))
+    }
+
+    /// # Panics
+    /// As [`HostBoard::save`].
+    #[cfg(feature = "early-ink")]
+    fn save_with_room(
+        &mut self,
+        record: Record,
+        parts: &[&[u8]],
+        room: u32,
+    ) -> Result<(), NotStored> {
+        assert!(self.state.is_drained(), "flash is erased while something moves");
+        self.kept.as_mut().map_or(Ok(()), |kept| kept.save_with_room(record, parts, room))
+    }
+
+    /// # Panics
+    /// When a step is due meanwhile, because a board that writes to its flash delays it.
+    #[cfg(feature = "early-ink")]
+    fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        let before = self.state.steps();
+        self.pass(self.write_ticks);
+        assert_eq!(self.state.steps(), before, "a step is due while the flash is written");
+        self.kept.as_mut().map_or(Ok(()), |kept| kept.add(record, parts))
+    }
+
+    #[cfg(feature = "early-ink")]
+    fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        if let Some(kept) = &mut self.kept {
+            kept.load_added(record, take);
+        }
+    }
+
+    #[cfg(feature = "early-ink")]
+    fn begin_steps(&mut self) {
+        // Where the power has failed, nothing moves any more.
+        if self.flash().is_some_and(|flash| flash.is_cut) {
+            return;
+        }
+        self.pass(self.work_ticks);
+        let now = self.trace().now();
+        let (due, later) =
+            core::mem::take(&mut self.meanwhile).into_iter().partition(|&(at, _)| at <= now);
+        self.meanwhile = later;
+        let due: Vec<(u64, Vec<u8>)> = due;
+        for (_, bytes) in due {
+            self.receive(&bytes);
+        }
     }
 
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {

@@ -151,6 +151,26 @@ impl<I: Index> Stored<I> {
         })
     }
 
+    /// Returns the points and the segments of the drawing stored in `words`, which may change
+    /// places, and the memory after it.
+    ///
+    /// # Errors
+    /// As [`Stored::split`].
+    #[cfg(feature = "early-ink")]
+    pub fn split_mut<'a>(
+        &self,
+        words: &'a mut [u64],
+    ) -> Result<(&'a [PagePoint], &'a mut [Segment<I>], Scratch<'a>), OutOfScratch> {
+        let missing = OutOfScratch { needed: self.bytes(), available: size_of_val(words) };
+        let (segments, rest) =
+            words.split_at_mut_checked(self.segment_bytes() / 8).ok_or(missing)?;
+        let point_words = Scratch::bytes_for::<PagePoint>(self.points) / 8;
+        let (points, rest) = rest.split_at_mut_checked(point_words).ok_or(missing)?;
+        let points = items(points, self.points).ok_or(missing)?;
+        let segments = items_mut(segments, self.segments).ok_or(missing)?;
+        Ok((points, segments, Scratch::new(rest)))
+    }
+
     /// Returns the drawing stored in `words`, and the memory after it.
     ///
     /// # Errors

@@ -1,7 +1,11 @@
 //! Runs a job: measures the path, reads its targets, fills the event queue, and stops where the
 //! path or the user demands it.
 
+#[cfg(feature = "early-ink")]
+use super::Tool;
 use super::estimate::Estimate;
+#[cfg(feature = "early-ink")]
+use super::estimate::even_milliseconds;
 use super::homing::Homing;
 use super::progress::Progress;
 use super::state::{Activity, Source};
@@ -13,6 +17,23 @@ use crate::motion::{EventQueue, Progress as RunnerProgress, Runner};
 /// The longest time that one turn of the main loop may take: 20 ms, while it writes to the serial
 /// line.
 const LATE_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 50;
+
+/// How much of a path has been measured.
+#[derive(Debug)]
+pub struct Measured {
+    /// The size of that part, without the time.
+    size: JobSize,
+    /// Where it ends.
+    at: PagePoint,
+    /// Whether it ends with the pen down.
+    inked: bool,
+    /// The number of the pen, from 0.
+    pen: u8,
+    /// The time that it takes.
+    estimate: Estimate,
+    /// The number of targets.
+    targets: u32,
+}
 
 impl Machine<'_> {
     /// Measures the path from the machine's present position. If all of it can be drawn, the
@@ -82,7 +103,7 @@ impl Machine<'_> {
 
     /// Whether the machine, which has drawn all targets that have come, has to wait for others. It
     /// stands with the pen raised then.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn stands_for_late_path(&mut self, path: &dyn Path, progress: RunnerProgress) -> bool {
         let Some(late) = path.late().filter(|_| self.activity.reads_path()) else { return false };
@@ -98,7 +119,7 @@ impl Machine<'_> {
     }
 
     /// Whether the machine still waits for a path that is late.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(always)] // It is called in every turn of the main loop.
     fn waits_for_path(&mut self, path: &mut dyn Path) -> bool {
         let Activity::Run(Source::Late(late)) = self.activity else { return false };
@@ -106,7 +127,7 @@ impl Machine<'_> {
     }
 
     /// Goes on if the next targets have come. Returns whether they have not.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn waits_for_late(&mut self, path: &mut dyn Path, late: super::Late) -> bool {
         if path.late().is_some() {
@@ -155,7 +176,7 @@ impl Machine<'_> {
         {
             self.alarm(Alarm::Queue);
         }
-        #[cfg(feature = "stream")]
+        #[cfg(any(feature = "stream", feature = "early-ink"))]
         if self.waits_for_path(path) {
             return;
         }
@@ -175,7 +196,7 @@ impl Machine<'_> {
             match self.runner.produce(queue) {
                 Ok(RunnerProgress::More) => {}
                 Ok(progress) => {
-                    #[cfg(feature = "stream")]
+                    #[cfg(any(feature = "stream", feature = "early-ink"))]
                     if self.stands_for_late_path(path, progress) {
                         return;
                     }
@@ -286,7 +307,7 @@ impl Machine<'_> {
                         Err(_) => self.abort(),
                     }
                 }
-                #[cfg(feature = "stream")]
+                #[cfg(any(feature = "stream", feature = "early-ink"))]
                 None if path.late().is_some() => return,
                 None => self.end_targets(Source::PathEnd),
             }
@@ -303,35 +324,110 @@ impl Machine<'_> {
     /// Computes the size of the job and checks every target against the travel.
     fn measure(&self, path: &mut dyn Path) -> Result<JobSize, MachineError> {
         path.rewind();
-        let mut size = JobSize::default();
-        let mut at = self.runner.page_end();
-        // A change of the pen begins a new stroke, even at the point where the last stroke ended.
-        let (mut inked, mut pen) = (false, self.pen);
-        let mut estimate = Estimate::default();
-        let mut number = 0u32;
-        while let Some(Target { point, ink }) = path.next_target() {
-            self.check_travel(number, point)?;
-            let (dx, dy) = (point.x - at.x, point.y - at.y);
-            let length = self
-                .runner
-                .limits()
-                .length(dx, dy)
-                .ok_or(MachineError::MoveTooLong { target: number })?;
-            let length = u64::from(length.to_bits());
-            estimate.add(&self.settings, (dx, dy), ink.is_some(), length);
-            if ink.is_some() {
-                size.drawn += length;
-                size.strokes += u32::from(!inked || path.pen() != pen);
-            } else {
-                size.travelled += length;
-            }
-            (inked, pen) = (ink.is_some(), path.pen());
-            at = point;
-            number = number.saturating_add(1);
-        }
+        let mut measured = self.begin_measuring();
+        while self.measure_next(path, &mut measured)? {}
         path.rewind();
+        Ok(self.end_measuring(measured))
+    }
+
+    /// Begins to measure a path that starts at the machine's present position.
+    #[cfg_attr(not(feature = "early-ink"), inline(always))] // It has one caller then, as the others.
+    #[cfg_attr(feature = "early-ink", inline(never))]
+    pub fn begin_measuring(&self) -> Measured {
+        Measured {
+            size: JobSize::default(),
+            at: self.runner.page_end(),
+            inked: false,
+            pen: self.pen,
+            estimate: Estimate::default(),
+            targets: 0,
+        }
+    }
+
+    /// Reads the next target of a path, checks it against the travel and measures the move to it.
+    /// Returns whether there was one.
+    ///
+    /// # Errors
+    /// See [`MachineError`].
+    #[cfg_attr(not(feature = "early-ink"), inline(always))]
+    #[cfg_attr(feature = "early-ink", inline(never))]
+    pub fn measure_next(
+        &self,
+        path: &mut dyn Path,
+        measured: &mut Measured,
+    ) -> Result<bool, MachineError> {
+        let Some(Target { point, ink }) = path.next_target() else { return Ok(false) };
+        let Measured { size, at, inked, pen, estimate, targets } = measured;
+        self.check_travel(*targets, point)?;
+        let (dx, dy) = (point.x - at.x, point.y - at.y);
+        let length = self
+            .runner
+            .limits()
+            .length(dx, dy)
+            .ok_or(MachineError::MoveTooLong { target: *targets })?;
+        let length = u64::from(length.to_bits());
+        estimate.add(&self.settings, (dx, dy), ink.is_some(), length);
+        if ink.is_some() {
+            size.drawn += length;
+            // A change of the pen begins a new stroke, even where the last stroke ended.
+            size.strokes += u32::from(!*inked || path.pen() != *pen);
+        } else {
+            size.travelled += length;
+        }
+        (*inked, *pen) = (ink.is_some(), path.pen());
+        *at = point;
+        *targets = targets.saturating_add(1);
+        Ok(true)
+    }
+
+    /// Returns the size of the path that was measured.
+    #[cfg_attr(not(feature = "early-ink"), inline(always))]
+    #[cfg_attr(feature = "early-ink", inline(never))]
+    pub fn end_measuring(&self, Measured { mut size, estimate, .. }: Measured) -> JobSize {
         size.milliseconds = estimate.end(&self.settings);
-        Ok(size)
+        size
+    }
+
+    /// Gives the job that has begun its size, which was not known before.
+    #[cfg(feature = "early-ink")]
+    pub fn set_job_size(&mut self, size: JobSize) {
+        self.progress.set_size(size);
+    }
+
+    /// Lets the job that has begun be longer than what was measured of it, by so many strokes of
+    /// this length together in 2^-18 mm, until [`Machine::set_job_size`] tells its true size. They
+    /// are assumed to lie and to take as long as those before.
+    #[cfg(feature = "early-ink")]
+    pub fn expect_more(&mut self, strokes: u32, drawn: u64) {
+        let size = self.progress.size();
+        let travelled = (size.travelled * u64::from(strokes)).checked_div(size.strokes.into());
+        let rest = JobSize { strokes, drawn, travelled: travelled.unwrap_or(0), milliseconds: 0 };
+        let [before, more] = [size, rest].map(|size| even_milliseconds(&self.settings, size));
+        let milliseconds = size.milliseconds.saturating_mul(more).checked_div(before);
+        self.progress.set_size(JobSize {
+            strokes: size.strokes.saturating_add(strokes),
+            drawn: size.drawn + drawn,
+            travelled: size.travelled + rest.travelled,
+            milliseconds: size.milliseconds + milliseconds.unwrap_or(0),
+        });
+    }
+
+    /// Whether the machine could go from anywhere to anywhere between these least and greatest
+    /// coordinates, and from where it is, so that it refuses no order of strokes there.
+    #[cfg(feature = "early-ink")]
+    pub fn takes_any_path(&self, [least, greatest]: [PagePoint; 2]) -> bool {
+        let at = self.runner.page_end();
+        let (dx, dy) =
+            (greatest.x.max(at.x) - least.x.min(at.x), greatest.y.max(at.y) - least.y.min(at.y));
+        [least, greatest].into_iter().all(|point| self.check_travel(0, point).is_ok())
+            && self.runner.limits().length(dx, dy).is_some()
+    }
+
+    /// Whether pen and motors move one after the other, so that what the machine does before a
+    /// stop does not depend on what comes behind it.
+    #[cfg(feature = "early-ink")]
+    pub fn moves_apart(&self) -> bool {
+        Tool::moves_apart(&self.settings)
     }
 
     /// Checks whether the pen may move to `point`. `target` is the index of the target, for the

@@ -34,11 +34,15 @@ mod tool;
 mod travel;
 
 pub use homing::{Axis, Contacts, Switches};
+#[cfg(feature = "early-ink")]
+pub use job::Measured;
 pub use kinematics::{Anchors, CutPositions, Kinematics, SegmentEnd};
-#[cfg(feature = "stream")]
+#[cfg(any(feature = "stream", feature = "early-ink"))]
 pub use path::Late;
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue, Tick};
+#[cfg(feature = "early-ink")]
+pub use settings::StrokeTime;
 pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 pub use state::{Alarm, MachineError, State};
 pub use status::Status;

@@ -14,7 +14,7 @@ pub struct Target {
 }
 
 /// A path whose next target has not come yet.
-#[cfg(feature = "stream")]
+#[cfg(any(feature = "stream", feature = "early-ink"))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Late {
     /// Whether the pen was down before.
@@ -34,7 +34,7 @@ pub trait Path {
     }
     /// Whether the next target has not come yet, so that the machine waits for it with the pen
     /// raised. It is asked when there is no next target.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     fn late(&self) -> Option<Late> {
         None
     }

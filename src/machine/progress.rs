@@ -35,7 +35,7 @@ impl Progress {
     }
 
     /// The pen was raised within a stroke and goes on with it, which counts as no other stroke.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     pub(super) const fn go_on_with_stroke(&mut self) {
         self.begun_at.strokes = self.begun_at.strokes.wrapping_add(1);
     }
@@ -54,6 +54,12 @@ impl Progress {
     pub(super) fn add_stroke(&mut self, inked: bool) {
         self.size.strokes += u32::from(inked && !self.is_inked);
         self.is_inked = inked;
+    }
+
+    /// Changes the size of the job.
+    #[cfg(feature = "early-ink")]
+    pub(super) const fn set_size(&mut self, size: JobSize) {
+        self.size = size;
     }
 
     /// Returns the size of the job: its strokes and lengths.

@@ -117,7 +117,7 @@ pub(super) enum Source {
         first: Target,
     },
     /// From a path whose next targets have not come yet. The machine stands with the pen raised.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     Late(super::Late),
     /// The moves come from a path that was read to its end.
     PathEnd,

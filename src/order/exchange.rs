@@ -158,9 +158,16 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         self.gap.is_some()
     }
 
-    /// Returns the station where a leg ends; [`Index::NONE`] for the gap.
+    /// Returns the station where a leg ends; [`Index::NONE`] for the gap, whose end is the
+    /// [anchor](Network::anchor) if there is one.
     pub fn end(&self, leg: Leg<I>) -> I {
-        if self.is_gap(leg) { I::NONE } else { self.network.end(leg) }
+        if !self.is_gap(leg) {
+            return self.network.end(leg);
+        }
+        match self.network.anchor() {
+            Some(anchor) if !leg.reversed() => anchor,
+            _ => I::NONE,
+        }
     }
 
     /// Whether `leg` is the gap between the end and the start of an open path.
@@ -281,10 +288,14 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     }
 
     /// Returns the stations to which a new move from `station` may lead: [`Index::NONE`] for the
-    /// gap, if `by_gap`, then `station` itself, then its neighbours.
+    /// gap, if `by_gap`, then `station` itself, then its neighbours, and last, if `by_gap`, the
+    /// anchor.
     pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
         let own = [I::NONE, station].into_iter().skip(usize::from(!by_gap));
-        own.chain(self.neighbours.of(station))
+        let near = own.chain(self.neighbours.of(station));
+        #[cfg(feature = "early-ink")]
+        let near = near.chain(self.network.anchor().filter(|_| by_gap));
+        near
     }
 
     /// Returns the cost of a move from `station` to the nearer end of the path, or a very large
@@ -340,15 +351,19 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     }
 
     /// Returns the legs that begin at a station; for [`Index::NONE`], the gap in both directions.
+    /// With an anchor, each end of the gap is a station of its own.
     pub fn legs_from(&self, station: I) -> impl Iterator<Item = Leg<I>> + '_ {
         let first = if station == I::NONE {
             self.gap.map(|gap| Leg::new(gap, false))
+        } else if self.network.anchor().is_some_and(|anchor| anchor == station) {
+            self.gap.map(|gap| Leg::new(gap, true))
         } else {
             self.incidence.first(station)
         };
         core::iter::successors(first, |&leg| {
             if self.is_gap(leg) {
-                (!leg.reversed()).then(|| leg.flipped())
+                let is_first = self.network.anchor().is_none() && !leg.reversed();
+                is_first.then(|| leg.flipped())
             } else {
                 self.incidence.next(leg)
             }

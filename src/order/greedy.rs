@@ -447,7 +447,7 @@ mod tests {
         let mut memory = vec![0; 1 << 14];
         let mut scratch = Scratch::new(&mut memory);
         let drawing = Drawing { points: &points, segments: &segments };
-        let network = Network::new(drawing, 0, &mut scratch).unwrap();
+        let network = Network::new(drawing, 0, Default::default(), &mut scratch).unwrap();
         let mut stations: Vec<u16> = (0..network.stations()).collect();
         stations.sort_by_key(|&station| (network.position(station).x, station));
         let odd = OddPoints::new(network, &stations, true);

@@ -19,13 +19,13 @@
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
-use super::metric::root;
+use super::metric::{length, root};
 use super::neighbours::Neighbours;
 use super::network::Network;
 use super::orient::orient;
 use super::patch_cycles::patch_cycles;
 use super::work_budget::WorkBudget;
-use super::{Effort, Leg, OrderError, Pace, even_part, mark_parts};
+use super::{Effort, Leg, OrderError, Pace, even_part, mark_parts, reverse};
 use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::index::Index;
@@ -131,7 +131,8 @@ pub(super) fn improve<I: Index>(
         }
         for corner in CORNERS {
             best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
-            if !best.work_on(cycle, first, scratch.reborrow(), work_budget)? {
+            let pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
+            if network.anchor().is_some() || !pays {
                 break;
             }
         }
@@ -197,7 +198,8 @@ struct Best<'b, 'a, I> {
 
 impl<I: Index> Best<'_, '_, I> {
     /// Makes a tour of the pen-up moves `mate`, part by part, the nearest part next. It starts at
-    /// the entrance nearest to `corner`, if one is given, and otherwise at `start`.
+    /// the entrance nearest to `corner`, if one is given (or to the anchor, if there is one), and
+    /// otherwise at `start`.
     fn follow(
         &self,
         mate: &[I],
@@ -212,7 +214,11 @@ impl<I: Index> Best<'_, '_, I> {
         let mut unused = Unused::new(self.network, moves, &mut scratch)?;
         let start = match corner {
             Some(corner) => {
-                unused.entrance(|position| from_corner(position, corner), work_budget)?
+                let far = |position| match self.network.anchor() {
+                    Some(anchor) => length(self.network.position(anchor), position),
+                    None => from_corner(position, corner),
+                };
+                unused.entrance(far, work_budget)?
             }
             None => start,
         };
@@ -283,7 +289,9 @@ impl<I: Index> Best<'_, '_, I> {
             if let Some(Window { units, least_gain }) = window
                 && window_begin - work_budget.left() >= units
             {
-                if window_gain < least_gain {
+                let free_units = self.network.free_units();
+                let is_free = || until.budget() - work_budget.left() < free_units;
+                if window_gain < least_gain && (free_units == 0 || !is_free()) {
                     break;
                 }
                 (window_gain, window_begin) = (0, work_budget.left());
@@ -327,6 +335,10 @@ impl<I: Index> Best<'_, '_, I> {
         let start = gap.map_or(0, |gap| gap + 1);
         for (index, slot) in self.route.iter_mut().enumerate() {
             *slot = leg(start + index);
+        }
+        // The path begins at that side of the gap to which the anchor belongs.
+        if self.network.anchor().is_some() && gap.is_some_and(|gap| leg(gap).reversed()) {
+            reverse(self.route);
         }
     }
 }

@@ -15,6 +15,8 @@
 //!    they join the parts, `exchange` exchanges moves while that helps (`search` finds the
 //!    exchanges), and `orient` chooses the direction of each stroke.
 //!
+//! Where the pen begins while this is done, `first` chooses the strokes that it draws meanwhile.
+//!
 //! Call [`order`] with a [`Drawing`], [`Options`] and working memory. It refuses a drawing whose
 //! segments name points that do not exist, too many segments, and too little memory. On an error
 //! the contents of the tour are unspecified.
@@ -24,6 +26,8 @@ mod cycle;
 mod distances;
 mod euler;
 mod exchange;
+#[cfg(feature = "early-ink")]
+mod first;
 mod greedy;
 mod improve;
 mod incidence;
@@ -39,6 +43,8 @@ mod partition;
 mod remaining;
 mod search;
 
+#[cfg(feature = "early-ink")]
+pub use first::{First, Meanwhile, choose_first, first_legs, order_rest};
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
@@ -49,7 +55,7 @@ use crate::stage::{Cancel, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
 use euler::Unused;
 use improve::{Tour, improve};
-use network::{Network, start_point};
+use network::{Anchor, Network, start_point};
 use odd::OddPoints;
 use work_budget::WorkBudget;
 
@@ -236,7 +242,7 @@ pub enum OrderError {
 pub fn order<I: Index>(
     drawing: Drawing<'_, I>,
     options: Options,
-    mut scratch: Scratch<'_>,
+    scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
     tour: &mut [Leg<I>],
 ) -> Result<Report, OrderError> {
@@ -245,20 +251,41 @@ pub fn order<I: Index>(
         ..drawing
     };
     check(drawing, tour.len())?;
-    let mut work_budget = WorkBudget::new(cancel);
     let mut report = Report::default();
+    order_pens(drawing, options, Anchor::default(), scratch, cancel, tour, &mut report)?;
+    measure(drawing, tour, options.shape, &mut report);
+    Ok(report)
+}
+
+/// Orders the segments of all pens, which must have been checked, and adds to `report` what is not
+/// measured in the end. The pen comes from `anchor`.
+#[cfg_attr(feature = "early-ink", inline(never))] // Its three callers share one copy of the code.
+#[cfg_attr(not(feature = "early-ink"), inline(always))]
+fn order_pens<I: Index>(
+    drawing: Drawing<'_, I>,
+    options: Options,
+    anchor: Anchor,
+    mut scratch: Scratch<'_>,
+    cancel: &mut dyn Cancel,
+    tour: &mut [Leg<I>],
+    report: &mut Report,
+) -> Result<(), OrderError> {
+    let mut work_budget = WorkBudget::new(cancel);
     let mut rest = &mut *tour;
     let pens = || drawing.segments.iter().map(|segment| segment.pen());
     // With several pens, none returns to its own start.
     let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
     let mut next_pen = pens().min();
-    let mut pen_at = None;
+    let mut pen_at = anchor.place();
+    let mut anchor = anchor;
     while let Some(pen) = next_pen {
         let count = pens().filter(|&other| other == pen).count();
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
         let options = Options { shape, ..options };
-        order_pen(drawing, pen, options, scratch.reborrow(), &mut work_budget, legs, &mut report)?;
+        let scratch = scratch.reborrow();
+        let from = core::mem::take(&mut anchor);
+        order_pen(drawing, pen, options, from, scratch, &mut work_budget, legs, report)?;
         let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
         if let (Some(at), Some(&first), Some(&last)) = (pen_at, legs.first(), legs.last())
             && length(at, position(last.flipped())) < length(at, position(first))
@@ -268,8 +295,7 @@ pub fn order<I: Index>(
         pen_at = legs.last().map(|last| position(last.flipped()));
         next_pen = pens().filter(|&other| other > pen).min();
     }
-    measure(drawing, tour, options.shape, &mut report);
-    Ok(report)
+    Ok(())
 }
 
 /// Checks that the tour has the right length and that every segment joins two different points of
@@ -302,13 +328,14 @@ fn order_pen<'a, I: Index>(
     drawing: Drawing<'a, I>,
     pen: u8,
     options: Options,
+    anchor: Anchor,
     mut scratch: Scratch<'a>,
     work_budget: &mut WorkBudget<'_>,
     tour: &mut [Leg<I>],
     report: &mut Report,
 ) -> Result<(), OrderError> {
     work_budget.answer()?;
-    let network = Network::new(drawing, pen, &mut scratch)?;
+    let network = Network::new(drawing, pen, anchor, &mut scratch)?;
     work_budget.answer()?;
     let route: &mut [Leg<I>] = scratch.take(network.chains().get())?;
     let bound = report.bound;
@@ -348,7 +375,9 @@ fn order_pen<'a, I: Index>(
             improve(network, tour, scratch, work_budget)?;
         }
     }
-    turn(network, options.shape, route);
+    if anchor.place().is_none() {
+        turn(network, options.shape, route);
+    }
     network.expand(route, tour, pen, &mut scratch)?;
     Ok(())
 }
@@ -426,9 +455,47 @@ fn pair_odd<I: Index>(
     if !odd.has_free_ends() {
         return Ok(None);
     }
+    if let Some(anchor) = network.anchor() {
+        return Ok(free_for_anchor(network, anchor, stations, mate));
+    }
     let ends = odd.free_ends().map_each(|end| partners[end.get()]);
     let ends = ends.into_iter().filter_map(|end| odd.station(end));
     Ok(ends.min_by_key(|&station| (network.position(station).x, station)))
+}
+
+/// Pairs the two ends of the path with each other, and frees that move in their place whose loss
+/// saves most if the path begins at one end of it and the pen comes from `anchor`. Returns that
+/// end. The ends of the path are the stations among `odd` whose mate is [`Index::NONE`].
+#[inline(always)] // Without the feature `early-ink`, this is left out.
+fn free_for_anchor<I: Index>(
+    network: Network<'_, I>,
+    anchor: I,
+    odd: &[I],
+    mate: &mut [I],
+) -> Option<I> {
+    let is_free = |station: &&I| mate.get(station.get()) == Some(&I::NONE);
+    let mut free = odd.iter().filter(is_free);
+    let (&start, &end) = (free.next()?, free.next()?);
+    let mut set = |station: I, to: I| {
+        if let Some(mate) = mate.get_mut(station.get()) {
+            *mate = to;
+        }
+    };
+    set(start, end);
+    set(end, start);
+    let saved = |&from: &I| {
+        let to = mate.get(from.get()).copied().unwrap_or(from);
+        let [lost, added] = [to, anchor].map(|to| i64::from(network.distance(from, to)));
+        lost - added
+    };
+    let start = odd.iter().copied().max_by_key(saved)?;
+    let end = mate.get(start.get()).copied()?;
+    for station in [start, end] {
+        if let Some(mate) = mate.get_mut(station.get()) {
+            *mate = I::NONE;
+        }
+    }
+    Some(start)
 }
 
 /// Pairs the odd points. Returns a lower bound of the total length of their moves in 1/256 steps,

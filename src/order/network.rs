@@ -8,9 +8,9 @@
 //! point is a station. The pen may then leave a corner for something near it and come back. Fails
 //! if there is not enough memory.
 
-use super::Leg;
 use super::metric::{least_length, length, square};
 use super::partition::Partition;
+use super::{Leg, even_part};
 use crate::array::MapEach;
 use crate::drawing::{Drawing, PagePoint, Segment};
 use crate::index::Index;
@@ -54,13 +54,58 @@ pub(super) struct Network<'a, I> {
     /// The first and the last segment of each chain, each with the direction in which the chain
     /// draws it.
     outer: &'a [[Leg<I>; 2]],
+    /// Where the pen is when it begins, if that matters.
+    anchor: Anchor,
+}
+
+/// Where the pen is when a path begins that follows strokes drawn before. The way from there
+/// counts, and so the path begins where that is short. Without the feature `early-ink` there are no
+/// such strokes, and this takes no memory.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Anchor {
+    /// The place; `None` if the pen may begin anywhere.
+    #[cfg(feature = "early-ink")]
+    place: Option<PagePoint>,
+    /// The units of work that are done while the strokes before are drawn, so that the pen waits
+    /// for none of them.
+    #[cfg(feature = "early-ink")]
+    free_units: u64,
+}
+
+impl Anchor {
+    /// The path begins at `place`, and so many units of work are done while the strokes before are
+    /// drawn.
+    #[cfg(feature = "early-ink")]
+    pub const fn new(place: PagePoint, free_units: u64) -> Self {
+        Self { place: Some(place), free_units }
+    }
+
+    /// The units of work for which the pen does not wait.
+    #[inline(always)] // As below.
+    pub const fn free_units(self) -> u64 {
+        #[cfg(feature = "early-ink")]
+        return self.free_units;
+        #[cfg(not(feature = "early-ink"))]
+        0
+    }
+
+    /// The place; `None` if the pen may begin anywhere.
+    #[inline(always)] // Without the feature, what depends on it is left out.
+    pub const fn place(self) -> Option<PagePoint> {
+        #[cfg(feature = "early-ink")]
+        return self.place;
+        #[cfg(not(feature = "early-ink"))]
+        None
+    }
 }
 
 impl<'a, I: Index> Network<'a, I> {
-    /// Makes the network of the segments that `pen` draws, with as many stations as is useful.
+    /// Makes the network of the segments that `pen` draws, with as many stations as is useful. The
+    /// pen comes from `anchor`.
     pub fn new(
         drawing: Drawing<'a, I>,
         pen: u8,
+        anchor: Anchor,
         scratch: &mut Scratch<'a>,
     ) -> Result<Self, OutOfScratch> {
         let (mut stations, mut chains, mut stops) = (0, 0, Stops::Few);
@@ -81,7 +126,7 @@ impl<'a, I: Index> Network<'a, I> {
         let outer = scratch.take(chains)?;
         let mut lent = scratch.reborrow();
         Survey::new(drawing, pen, stops, &mut lent)?.lay_chains(&mut lent, at, ends, outer)?;
-        Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer })
+        Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer, anchor })
     }
 
     /// Returns the number of stations, the points where the pen may stop or turn.
@@ -94,7 +139,38 @@ impl<'a, I: Index> Network<'a, I> {
         I::new(self.ends.len())
     }
 
+    /// The number by which the place is known from which the pen comes to the path, as a station
+    /// that has no chains and is not counted; `None` if the path may begin anywhere.
+    #[inline(always)] // Without the feature `early-ink`, what depends on it is left out.
+    pub fn anchor(&self) -> Option<I> {
+        self.anchor.place().map(|_| even_part())
+    }
+
+    /// The units of work for which the pen does not wait, because it draws meanwhile.
+    #[inline(always)] // As above.
+    pub fn free_units(&self) -> u64 {
+        self.anchor.free_units()
+    }
+
     /// Returns where on the page a station lies.
+    #[cfg(feature = "early-ink")]
+    pub fn position(&self, station: I) -> PagePoint {
+        match self.at.get(station.get()) {
+            Some(point) => self.points[point.get()],
+            None => self.anchor_place(),
+        }
+    }
+
+    /// Returns where the anchor lies.
+    #[cfg(feature = "early-ink")]
+    #[cold]
+    #[inline(never)]
+    fn anchor_place(&self) -> PagePoint {
+        self.anchor.place().unwrap_or_default()
+    }
+
+    /// Returns where on the page a station lies.
+    #[cfg(not(feature = "early-ink"))]
     pub fn position(&self, station: I) -> PagePoint {
         self.points[self.at[station.get()].get()]
     }

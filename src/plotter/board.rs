@@ -81,6 +81,42 @@ pub trait Board {
         let _ = (record, parts);
         Ok(())
     }
+    /// Saves a new state of `record` as [`Board::save`] does, and leaves room behind it for so many
+    /// bytes that are [added](Board::add) later.
+    ///
+    /// # Errors
+    /// [`NotStored`] if the flash does not take it; the last state is still kept.
+    #[cfg(feature = "early-ink")]
+    fn save_with_room(
+        &mut self,
+        record: Record,
+        parts: &[&[u8]],
+        room: u32,
+    ) -> Result<(), NotStored> {
+        let _ = room;
+        self.save(record, parts)
+    }
+    /// Adds the concatenation of `parts` to the state of `record` that was saved last, for which
+    /// there is [room](Board::save_with_room). The call may block for some milliseconds, so it is
+    /// only made while the machine stands with the pen raised and no step waits.
+    ///
+    /// # Errors
+    /// [`NotStored`] if the flash does not take it; nothing is then added.
+    #[cfg(feature = "early-ink")]
+    fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        let _ = (record, parts);
+        Ok(())
+    }
+    /// Begins to execute the events in the queue, if it is less than half full, and goes on. It is
+    /// called in place of [`Board::wait`] where the plotter computes while steps run.
+    #[cfg(feature = "early-ink")]
+    fn begin_steps(&mut self) {}
+    /// Passes to `take` what was added to the state of `record` that was saved last, if all of it
+    /// is there.
+    #[cfg(feature = "early-ink")]
+    fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        let _ = (record, take);
+    }
     /// Passes the state of `record` that was saved last to `take`, if there is one.
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);

@@ -83,6 +83,34 @@ impl<F: MultiwriteNorFlash> Kept<F> {
     /// # Errors
     /// [`NotStored`]; the last state is still kept.
     pub fn save(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        #[cfg(feature = "early-ink")]
+        return self.save_with_room(record, parts, 0);
+        #[cfg(not(feature = "early-ink"))]
+        {
+            if record == Record::Job {
+                self.open = None;
+            }
+            let slots = self.layout.slots(record);
+            let mut writer = slots.write(&mut self.flash).map_err(|_| NotStored)?;
+            for part in parts {
+                writer.write(part).map_err(|_| NotStored)?;
+            }
+            writer.finish().map_err(|_| NotStored)
+        }
+    }
+
+    /// Carries out [`Board::save_with_room`](super::Board::save_with_room).
+    ///
+    /// # Errors
+    /// [`NotStored`]; the last state is still kept.
+    #[cfg(feature = "early-ink")]
+    #[inline(never)] // Its callers share one copy of the code.
+    pub fn save_with_room(
+        &mut self,
+        record: Record,
+        parts: &[&[u8]],
+        room: u32,
+    ) -> Result<(), NotStored> {
         if record == Record::Job {
             self.open = None;
         }
@@ -91,7 +119,27 @@ impl<F: MultiwriteNorFlash> Kept<F> {
         for part in parts {
             writer.write(part).map_err(|_| NotStored)?;
         }
+        if room > 0 {
+            writer.leave_room(room).map_err(|_| NotStored)?;
+        }
         writer.finish().map_err(|_| NotStored)
+    }
+
+    /// Carries out [`Board::add`](super::Board::add).
+    ///
+    /// # Errors
+    /// [`NotStored`]; nothing is then added.
+    #[cfg(feature = "early-ink")]
+    pub fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        self.layout.slots(record).add(&mut self.flash, parts).map_err(|_| NotStored)
+    }
+
+    /// Carries out [`Board::load_added`](super::Board::load_added).
+    #[cfg(feature = "early-ink")]
+    pub fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        if let Some(mut added) = self.layout.slots(record).added(&mut self.flash) {
+            take(&mut added);
+        }
     }
 
     /// Carries out [`Board::load`](super::Board::load).

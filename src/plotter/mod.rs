@@ -8,6 +8,8 @@
 
 mod board;
 pub mod budget;
+#[cfg(feature = "early-ink")]
+mod early;
 mod editor;
 mod grbl;
 mod help;
@@ -98,6 +100,13 @@ pub fn start<'m, B: Board, I: Index>(
     plotter
 }
 
+/// What is known of a job whose order is being computed, if one is.
+#[cfg(feature = "early-ink")]
+type BegunJob<'b, I> = Option<job::Begun<'b, I>>;
+/// Without the feature `early-ink`, the order is computed before anything moves.
+#[cfg(not(feature = "early-ink"))]
+type BegunJob<'b, I> = [&'b I; 0];
+
 /// The whole plotter except its pins, which the board pulses.
 #[derive(Debug)]
 pub struct Plotter<'m, I = u16> {
@@ -162,6 +171,12 @@ struct Inner<'m, I> {
     /// Whether a computer computes for a plotter, so that more work on the order pays.
     #[cfg(any(test, feature = "host"))]
     is_thorough: bool,
+    /// Whether the pen begins before the order of the strokes is known.
+    #[cfg(all(feature = "early-ink", any(test, feature = "host")))]
+    has_early_ink: bool,
+    /// The job whose order is known, but not released yet.
+    #[cfg(feature = "early-ink")]
+    pending: Option<early::Pending<I>>,
     /// How far the strokes of a job have come that are sent while they are drawn.
     #[cfg(feature = "stream")]
     streamed: streamed::Streamed,
@@ -227,6 +242,10 @@ impl<'m, I: Index> Plotter<'m, I> {
                 can_undo: true,
                 #[cfg(any(test, feature = "host"))]
                 is_thorough: false,
+                #[cfg(all(feature = "early-ink", any(test, feature = "host")))]
+                has_early_ink: false,
+                #[cfg(feature = "early-ink")]
+                pending: None,
                 program: Program::default(),
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
@@ -280,6 +299,16 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.is_thorough = is_thorough;
     }
 
+    /// Sets whether the pen begins before the order of the strokes is known, as on the boards of
+    /// which [`BoardRow::early_ink`](crate::board_table::BoardRow) says so. The order may then
+    /// differ from what it is otherwise.
+    #[cfg(all(feature = "early-ink", any(test, feature = "host")))]
+    #[must_use]
+    pub fn with_early_ink(mut self, has_early_ink: bool) -> Self {
+        self.inner.has_early_ink = has_early_ink;
+        self
+    }
+
     /// Writes the greeting: the first line that a sender sees. It is also the reply to ctrl-X.
     pub fn greet<B: Board>(&self, board: &mut B) {
         report::greet(board);
@@ -295,7 +324,9 @@ impl<'m, I: Index> Plotter<'m, I> {
         #[cfg(feature = "driver-pins")]
         self.inner.watch_drivers(board);
         self.inner.note_progress(board);
-        let planned = self.inner.plan(board);
+        let planned = self.inner.plan(BegunJob::default(), board);
+        #[cfg(feature = "early-ink")]
+        let planned = self.inner.follow_order(board) || planned;
         #[cfg(feature = "hpgl")]
         let planned = self.carry_out_hpgl(board) || planned;
         if self.inner.task.is_some() {
@@ -448,7 +479,7 @@ impl<'m, I: Index> Plotter<'m, I> {
             self.status_due = false;
             // Writing the report takes 10 ms, and so may what was done since the queue was last
             // filled.
-            self.inner.plan(board);
+            self.inner.plan(BegunJob::default(), board);
             #[cfg(feature = "hpgl")]
             if let Some(port) = self.hpgl.port() {
                 board.reply_to(Replies::OthersIfAny(port));
@@ -474,12 +505,19 @@ impl<'m, I: Index> Plotter<'m, I> {
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Keeps the step queue full. Returns whether the planned position has changed.
+    /// Keeps the step queue full. While the order of the job is computed, `begun` is what of it is
+    /// known. Returns whether the planned position has changed.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    fn plan<B: Board>(&mut self, board: &mut B) -> bool {
+    fn plan<B: Board>(&mut self, begun: BegunJob<'_, I>, board: &mut B) -> bool {
         let before = self.machine.planned_position();
         let ends = self.machine.stroke_ends();
-        let mut strokes = self.job.strokes(self.words, &mut self.cursor, ends);
+        #[cfg(feature = "early-ink")]
+        let mut strokes = self.job.strokes_of(begun, self.words, &mut self.cursor, ends);
+        #[cfg(not(feature = "early-ink"))]
+        let mut strokes = {
+            let _ = begun;
+            self.job.strokes(self.words, &mut self.cursor, ends)
+        };
         #[cfg(feature = "stream")]
         {
             strokes.streamed = Some(&self.streamed);
@@ -645,7 +683,17 @@ impl<I: Index> Inner<'_, I> {
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
         let observer = &mut Unobserved;
         let pace = crate::order::Pace::default();
-        let pipeline = job::Pipeline { model, options, steps, pace, words, cancel, observer };
+        let pipeline = job::Pipeline {
+            model,
+            options,
+            steps,
+            pace,
+            #[cfg(feature = "early-ink")]
+            early: None,
+            words,
+            cancel,
+            observer,
+        };
         let stored = pipeline.draw()?;
         Ok(stored.drawing(self.words).unwrap_or(Drawing { points: &[], segments: &[] }))
     }

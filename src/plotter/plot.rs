@@ -1,10 +1,12 @@
 //! `$plot`, `$again` and `$resume`: computes a job, or loads the kept one, and hands it to the
 //! machine.
 
+#[cfg(not(feature = "early-ink"))]
+use super::Unobserved;
 use super::job::Pipeline;
 use super::listener::{Listener, MeasuredStrokes};
 use super::reply::Reply;
-use super::{Board, Cursor, Inner, Job, Observer, Unobserved, records};
+use super::{Board, Cursor, Inner, Job, Observer, records};
 use crate::index::Index;
 use crate::machine::State;
 use crate::order::Pace;
@@ -54,6 +56,9 @@ impl<I: Index> Inner<'_, I> {
         let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
         let begun = match drawing {
             _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
+            #[cfg(feature = "early-ink")]
+            Drawing::Model => self.plot_model(&mut listener),
+            #[cfg(not(feature = "early-ink"))]
             Drawing::Model => self.compute(&mut listener, &mut Unobserved).and_then(|()| {
                 let is_kept = self.save(listener.board);
                 self.begin(&mut listener)?;
@@ -64,14 +69,21 @@ impl<I: Index> Inner<'_, I> {
                 Ok(())
             }),
             Drawing::Kept => self.load(listener.board).and_then(|()| {
+                #[cfg(feature = "early-ink")]
+                self.complete_order(&mut listener)?;
                 self.begin(&mut listener)?;
                 self.keep_progress(None, listener.board);
                 Ok(())
             }),
             #[cfg(feature = "resume")]
-            Drawing::Stopped { at_origin } => self
-                .load_stopped(at_origin, listener.board)
-                .and_then(|drawn| drawn.map_or(Ok(()), |it| self.begin_rest(it, &mut listener))),
+            Drawing::Stopped { at_origin } => {
+                self.load_stopped(at_origin, listener.board).and_then(|drawn| {
+                    let Some(drawn) = drawn else { return Ok(()) };
+                    #[cfg(feature = "early-ink")]
+                    self.complete_order(&mut listener)?;
+                    self.begin_rest(drawn, &mut listener)
+                })
+            }
         };
         let requests = listener.requests;
         if requests.has(RealTime::EMERGENCY) {
@@ -114,7 +126,7 @@ impl<I: Index> Inner<'_, I> {
     /// Writes the job to flash before anything moves, because flash cannot be read during the
     /// write. Returns whether the flash keeps it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn save<B: Board>(&self, board: &mut B) -> bool {
+    pub(super) fn save<B: Board>(&self, board: &mut B) -> bool {
         let saved = records::save_job(&self.job, self.machine.settings(), self.words, board);
         if saved.is_err() {
             Reply(board)
@@ -135,7 +147,7 @@ impl<I: Index> Inner<'_, I> {
 
     /// Hands the job to the machine, which first measures its strokes.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
+    pub(super) fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
         let ends = self.machine.stroke_ends();
         let strokes = self.job.strokes(self.words, &mut self.cursor, ends);
         let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
@@ -155,15 +167,49 @@ impl<I: Index> Inner<'_, I> {
         cancel: &mut dyn Cancel,
         observer: &mut dyn Observer<I>,
     ) -> Result<(), CommandError> {
-        // This overwrites the memory of the last job, so that job ends here even if this one fails.
+        #[cfg(not(feature = "early-ink"))]
+        {
+            self.forget_job();
+            self.job = self.pipeline(cancel, observer).run()?;
+        }
+        #[cfg(feature = "early-ink")]
+        {
+            self.job = self.begin_job(cancel, observer)?.ordered(self.words, cancel)?;
+        }
+        Ok(())
+    }
+
+    /// Ends the last job, whose memory is overwritten, even if the next one fails.
+    #[inline(always)] // Adds no frame to the stack.
+    pub(super) fn forget_job(&mut self) {
         self.copy_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
+    }
+
+    /// What computes the job of `$plot`.
+    #[inline(always)] // Adds no frame to the stack.
+    pub(super) fn pipeline<'p>(
+        &'p mut self,
+        cancel: &'p mut dyn Cancel,
+        observer: &'p mut dyn Observer<I>,
+    ) -> Pipeline<'p, I> {
         let steps = self.machine.settings().page_steps();
         let pace = self.machine.settings().pace(self.units_per_second());
+        #[cfg(feature = "early-ink")]
+        let early = self.early();
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
-        self.job = Pipeline { model, options, steps, pace, words, cancel, observer }.run()?;
-        Ok(())
+        Pipeline {
+            model,
+            options,
+            steps,
+            pace,
+            #[cfg(feature = "early-ink")]
+            early,
+            words,
+            cancel,
+            observer,
+        }
     }
 
     /// The units of work that count as one second when the order is improved.

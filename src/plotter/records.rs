@@ -2,6 +2,8 @@
 //! formats, and how they are saved and loaded.
 
 use super::job::FIGURES;
+#[cfg(feature = "early-ink")]
+use super::job::{UNORDERED_WORDS, Unordered};
 use super::program::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
 use super::{Board, Job, NotStored, Record, Stored};
 use crate::array::MapEach;
@@ -149,6 +151,10 @@ pub(super) fn save_job<B: Board, I: Index>(
     words: &[u64],
     board: &mut B,
 ) -> Result<(), NotStored> {
+    #[cfg(feature = "early-ink")]
+    if let Some(unordered) = job.unordered() {
+        return save_begun(job, unordered, settings, words, board);
+    }
     let [x, y] = steps(settings);
     let numbers = [JOB_LAYOUT, x, y].into_iter().chain(job.figures());
     let mut header = [[0; 4]; JOB_HEADER];
@@ -169,11 +175,155 @@ pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotS
     board.save(Record::Job, &[&STREAMED_LAYOUT.to_le_bytes(), &id.to_le_bytes()])
 }
 
+/// A mark at the beginning of a kept job of which only the drawing and the first strokes are known.
+/// Behind its figures stands what the order of the others is computed from, and then the drawing
+/// alone. When the order is known, it is added: the number of strokes, the figures, and the legs.
+#[cfg(feature = "early-ink")]
+const BEGUN_LAYOUT: u32 = u32::from_le_bytes(*b"job2");
+/// Number of words before the drawing of such a job.
+#[cfg(feature = "early-ink")]
+const BEGUN_HEADER: usize = JOB_HEADER + UNORDERED_WORDS;
+/// Number of words before the legs of an order.
+#[cfg(feature = "early-ink")]
+const ORDER_HEADER: usize = 1 + FIGURES;
+
+/// Keeps a job of which only the drawing and the first strokes are known, and leaves room for its
+/// order.
+///
+/// # Errors
+/// [`NotStored`]: the previous job is still kept.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+fn save_begun<B: Board, I: Index>(
+    job: &Job<I>,
+    unordered: Unordered,
+    settings: &Settings,
+    words: &[u64],
+    board: &mut B,
+) -> Result<(), NotStored> {
+    let [x, y] = steps(settings);
+    let numbers = [BEGUN_LAYOUT, x, y].into_iter().chain(job.figures()).chain(unordered.words());
+    let mut header = [[0; 4]; BEGUN_HEADER];
+    for (word, number) in header.iter_mut().zip(numbers) {
+        *word = number.to_le_bytes();
+    }
+    let memory = words.get(..job.drawing_words()).ok_or(NotStored)?;
+    let room = size_of::<[[u8; 4]; ORDER_HEADER]>() + 8 * (job.words() - job.drawing_words());
+    let room = u32::try_from(room).map_err(|_| NotStored)?;
+    let parts = [header.as_flattened(), bytemuck::cast_slice(memory)];
+    board.save_with_room(Record::Job, &parts, room)
+}
+
+/// Adds the order of a job, and its number of strokes, to the job that was kept last.
+///
+/// # Errors
+/// [`NotStored`]: the order has to be computed again.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+pub(super) fn add_order<B: Board, I: Index>(
+    job: &Job<I>,
+    strokes: u32,
+    words: &[u64],
+    board: &mut B,
+) -> Result<(), NotStored> {
+    let mut header = [[0; 4]; ORDER_HEADER];
+    for (word, number) in header.iter_mut().zip([strokes].into_iter().chain(job.figures())) {
+        *word = number.to_le_bytes();
+    }
+    let legs = words.get(job.drawing_words()..job.words()).ok_or(NotStored)?;
+    board.add(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(legs)])
+}
+
+/// The number of strokes of the order that was added to the job that was kept last; `None` if none
+/// was.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+pub(super) fn strokes_of_added_order<B: Board>(board: &mut B) -> Option<u32> {
+    let mut strokes = None;
+    board.load_added(Record::Job, &mut |added| {
+        let mut word = [0; 4];
+        if added.read(&mut word) == word.len() {
+            strokes = Some(u32::from_le_bytes(word));
+        }
+    });
+    strokes
+}
+
+/// Loads the order that was added to a kept job, whose drawing is in `words`. Returns the job as it
+/// was if none was added.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+fn load_order<B: Board, I: Index>(begun: Job<I>, words: &mut [u64], board: &mut B) -> Job<I> {
+    let mut loaded = begun;
+    board.load_added(Record::Job, &mut |added| {
+        let mut header = [[0; 4]; ORDER_HEADER];
+        if added.read(header.as_flattened_mut()) != size_of_val(&header) {
+            return;
+        }
+        let [_, figures @ ..] = header.map(u32::from_le_bytes);
+        let job = Job::<I>::from_figures(figures);
+        let Some(job) = job.filter(|job| job.drawing_words() == begun.drawing_words()) else {
+            return;
+        };
+        let Some(legs) = words.get_mut(job.drawing_words()..job.words()) else { return };
+        if added.read(bytemuck::cast_slice_mut(legs)) == size_of_val(legs) {
+            loaded = job;
+        }
+    });
+    loaded
+}
+
+/// Loads the job that was kept last. Its memory is then in `words`. If its order is not known, only
+/// its drawing is.
+///
+/// # Errors
+/// As those of the job with an order.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+pub(super) fn load_job<B: Board, I: Index>(
+    settings: &Settings,
+    words: &mut [u64],
+    board: &mut B,
+) -> Result<Job<I>, CommandError> {
+    let mut found = Err(CommandError::NoJobKept);
+    board.load(Record::Job, &mut |record| {
+        let mut header = [[0; 4]; JOB_HEADER];
+        if record.read(header.as_flattened_mut()) != size_of_val(&header) {
+            return;
+        }
+        let [layout, x, y, figures @ ..] = header.map(u32::from_le_bytes);
+        let Some(mut job) = Job::<I>::from_figures(figures) else { return };
+        let mut words_of_job = job.words();
+        if layout == BEGUN_LAYOUT {
+            let mut rest = [[0; 4]; UNORDERED_WORDS];
+            if record.read(rest.as_flattened_mut()) != size_of_val(&rest) {
+                return;
+            }
+            let Some(unordered) = Unordered::from_words(rest.map(u32::from_le_bytes)) else {
+                return;
+            };
+            words_of_job = job.drawing_words();
+            job = job.without_order(unordered);
+        } else if layout != JOB_LAYOUT {
+            return;
+        }
+        let Some(memory) = words.get_mut(..words_of_job) else { return };
+        if [x, y] != steps(settings) {
+            found = Err(CommandError::OtherSteps);
+        } else if record.read(bytemuck::cast_slice_mut(memory)) == size_of_val(memory) {
+            found = Ok(job);
+        }
+    });
+    let job = found?;
+    Ok(if job.unordered().is_some() { load_order(job, words, board) } else { job })
+}
+
 /// Loads the job that was kept last. Its memory is then in `words`.
 ///
 /// # Errors
 /// [`CommandError::NoJobKept`] if there is none, [`CommandError::OtherSteps`] if the steps per
 /// millimetre have changed since. `words` then hold no job.
+#[cfg(not(feature = "early-ink"))]
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn load_job<B: Board, I: Index>(
     settings: &Settings,

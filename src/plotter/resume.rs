@@ -40,6 +40,8 @@ pub(super) struct Resumption {
 
 #[cfg(feature = "resume")]
 mod with_feature {
+    #[cfg(feature = "early-ink")]
+    use super::super::NotStored;
     use super::{Board, Index, Inner, Reply, Resumption};
     use crate::checksum::Crc32;
     use crate::machine::{Path, Setting, Settings, State, Value};
@@ -122,6 +124,12 @@ mod with_feature {
             self.progress.filter(|[done, all]| is_over && done < all)
         }
 
+        /// Whether the board keeps how far the job comes.
+        #[cfg(feature = "early-ink")]
+        pub(in crate::plotter) fn keeps(&self) -> bool {
+            self.progress.is_some()
+        }
+
         /// Whether the position of the pen is not known since the job stopped.
         pub(in crate::plotter) fn lose_position(&mut self) {
             self.is_lost = true;
@@ -143,12 +151,32 @@ mod with_feature {
     }
 
     impl<I: Index> Inner<'_, I> {
+        /// The order of the job has become known, and with it the number of strokes. `kept` says
+        /// whether the flash has taken it.
+        #[cfg(feature = "early-ink")]
+        #[inline(never)] // Keeps its frame off the stack while the stages run.
+        pub(in crate::plotter) fn order_kept<B: Board>(
+            &mut self,
+            strokes: u32,
+            kept: Result<(), NotStored>,
+            board: &mut B,
+        ) {
+            if kept.is_err() {
+                self.machine.end_log();
+                self.resumption.progress = None;
+                return refuse(board);
+            }
+            if let Some([_, all]) = &mut self.resumption.progress {
+                *all = strokes;
+            }
+        }
+
         /// Looks for a job that the last run of the firmware did not finish.
         #[inline(never)] // Keeps its frame off the stack while the stages run.
         pub(in crate::plotter) fn find_stopped<B: Board>(&mut self, board: &mut B) {
             let found = read(board);
             self.resumption.progress =
-                found.map(|(notes, noted)| [done(&notes, noted), strokes(&notes)]);
+                found.map(|(notes, noted)| [done(&notes, noted), all_strokes(&notes, board)]);
             self.resumption.is_lost = true;
         }
 
@@ -233,7 +261,8 @@ mod with_feature {
             board: &mut B,
         ) -> Result<Option<Noted>, CommandError> {
             let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
-            if done(&notes, noted) >= strokes(&notes) {
+            let all = all_strokes(&notes, board);
+            if done(&notes, noted) >= all {
                 return Err(CommandError::NothingToResume);
             }
             self.check_notes(&notes)?;
@@ -258,7 +287,7 @@ mod with_feature {
             if at_origin {
                 self.machine.declare_origin()?;
             }
-            let progress = Some([noted.parts, strokes(&notes)]);
+            let progress = Some([noted.parts, all]);
             self.resumption = Resumption { progress, ..Resumption::default() };
             Ok(Some(noted))
         }
@@ -429,7 +458,20 @@ mod with_feature {
         (length == size_of::<Notes>() && is_known).then_some((notes, noted))
     }
 
-    /// The number of strokes of a job.
+    /// The number of strokes of the kept job. Of a job that began before its order was known, the
+    /// notes have an estimate, and the order the number.
+    fn all_strokes<B: Board>(notes: &Notes, board: &mut B) -> u32 {
+        #[cfg(feature = "early-ink")]
+        if !is_streamed(notes)
+            && let Some(strokes) = records::strokes_of_added_order(board)
+        {
+            return strokes;
+        }
+        let _ = board;
+        strokes(notes)
+    }
+
+    /// The number of strokes of a job, as its notes have it.
     fn strokes(notes: &Notes) -> u32 {
         let [_, _, strokes, ..] = notes.map(u32::from_le_bytes);
         strokes

@@ -229,6 +229,31 @@ impl Board for Pico {
         self.kept.save(record, parts)
     }
 
+    #[cfg(feature = "early-ink")]
+    fn save_with_room(
+        &mut self,
+        record: Record,
+        parts: &[&[u8]],
+        room: u32,
+    ) -> Result<(), NotStored> {
+        self.kept.save_with_room(record, parts, room)
+    }
+
+    #[cfg(feature = "early-ink")]
+    fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
+        self.kept.add(record, parts)
+    }
+
+    #[cfg(feature = "early-ink")]
+    fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
+        self.kept.load_added(record, take);
+    }
+
+    #[cfg(feature = "early-ink")]
+    fn begin_steps(&mut self) {
+        self.steps.start();
+    }
+
     fn load(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         self.kept.load(record, take);
     }

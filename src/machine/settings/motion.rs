@@ -57,6 +57,19 @@ impl Settings {
         (limits.brake(longest_step, queue), is_less.then_some(held))
     }
 
+    /// Returns how long strokes take.
+    #[cfg(feature = "early-ink")]
+    pub fn stroke_time(&self) -> StrokeTime {
+        let MotionSettings { steps_per_mm, draw_mm_per_min, .. } = self.motion_settings();
+        let [speed, per_mm] = [draw_mm_per_min, steps_per_mm[0]]
+            .map_each(|value| u64::from(value.to_bits().unsigned_abs()));
+        let per_minute = (speed * per_mm) >> (2 * Value::FRAC_NBITS);
+        StrokeTime {
+            steps_per_second: (per_minute / 60).max(1),
+            stroke_milliseconds: Tool::stroke_milliseconds(self),
+        }
+    }
+
     /// Returns how fast the pen travels on the page, for an order that is improved by so many units
     /// of work in a second. It does not depend on the board.
     pub fn pace(&self, units_per_second: u32) -> Pace {
@@ -103,5 +116,23 @@ impl Settings {
             direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),
             queue_steps: u32::MAX,
         }
+    }
+}
+
+/// How long strokes take.
+#[cfg(feature = "early-ink")]
+#[derive(Debug, Clone, Copy)]
+pub struct StrokeTime {
+    /// The speed with the pen down, at least 1.
+    steps_per_second: u64,
+    /// The milliseconds that lowering and raising the pen take.
+    stroke_milliseconds: u64,
+}
+
+#[cfg(feature = "early-ink")]
+impl crate::order::Meanwhile for StrokeTime {
+    fn milliseconds(&self, strokes: u32, length: u64) -> u64 {
+        let drawn = ((length >> 8) * 1000).checked_div(self.steps_per_second);
+        u64::from(strokes) * self.stroke_milliseconds + drawn.unwrap_or(0)
     }
 }

@@ -78,6 +78,17 @@ impl Tool {
         }
     }
 
+    /// Whether the pen moves only while the motors stand.
+    #[cfg(feature = "early-ink")]
+    pub(super) fn moves_apart(settings: &Settings) -> bool {
+        #[cfg(feature = "pen-overlap")]
+        if Self::overlap(settings) != PenOverlap::default() {
+            return false;
+        }
+        let _ = settings;
+        true
+    }
+
     /// For how long the pen moves while the machine does: no longer than it moves at all.
     #[cfg(feature = "pen-overlap")]
     fn overlap(settings: &Settings) -> PenOverlap {

@@ -10,17 +10,27 @@ mod lines;
 mod pipeline;
 mod scale;
 mod strokes;
+#[cfg(feature = "early-ink")]
+mod unordered;
 
 pub(super) use lines::{Collector, PageSink, move_to_front};
 pub(super) use pipeline::{Found, Pipeline};
 pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, union};
 pub use strokes::{Cursor, Strokes};
+#[cfg(feature = "early-ink")]
+pub(super) use unordered::{Begun, UNORDERED_WORDS};
 
-use crate::drawing::{Drawing, Stored};
+#[cfg(not(feature = "early-ink"))]
+use crate::drawing::Drawing;
+use crate::drawing::Stored;
 use crate::index::Index;
 use crate::machine::StrokeEnds;
+#[cfg(feature = "early-ink")]
+use crate::order::First;
 use crate::order::{self, Leg};
-use crate::stage::{Scratch, items};
+use crate::stage::Scratch;
+#[cfg(not(feature = "early-ink"))]
+use crate::stage::items;
 use crate::view::View;
 use crate::visibility::Stretch;
 
@@ -50,6 +60,16 @@ impl<I: Index> Observer<I> for Unobserved {
 /// Number of the figures of a job.
 pub(super) const FIGURES: usize = 13;
 
+/// What the order of a job is computed from, besides its drawing.
+#[cfg(feature = "early-ink")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Unordered {
+    /// The strokes that are drawn first.
+    pub(super) first: First,
+    /// The options of the order.
+    pub(super) options: order::Options,
+}
+
 /// A drawing and the order of its strokes, both of which lie in the working memory.
 #[derive(Debug, Clone, Copy)]
 pub struct Job<I = u16> {
@@ -59,6 +79,9 @@ pub struct Job<I = u16> {
     legs: usize,
     /// What the ordering has achieved: lengths and lifts.
     report: order::Report,
+    /// What the order will be computed from that is not known yet beyond the first strokes.
+    #[cfg(feature = "early-ink")]
+    unordered: Option<Unordered>,
     /// Number of faces that were left out because they have no area.
     degenerate_faces: u32,
     /// Number of edges of a convex solid that were left out because the faces beside them may be
@@ -72,6 +95,8 @@ impl<I: Index> Default for Job<I> {
             stored: Stored::default(),
             legs: 0,
             report: order::Report::default(),
+            #[cfg(feature = "early-ink")]
+            unordered: None,
             degenerate_faces: 0,
             joined_edges: 0,
         }
@@ -128,6 +153,8 @@ impl<I: Index> Job<I> {
                 pen_up: length(up, up_high),
                 bound: length(bound, bound_high),
             },
+            #[cfg(feature = "early-ink")]
+            unordered: None,
             degenerate_faces: 0,
             joined_edges: 0,
         })
@@ -156,6 +183,44 @@ impl<I: Index> Job<I> {
 
     /// Returns the strokes of the job from `cursor` on. `words` is the working memory that holds
     /// the job. `ends` says by how much strokes are made longer.
+    #[cfg(feature = "early-ink")]
+    pub fn strokes<'a>(
+        &self,
+        words: &'a mut [u64],
+        cursor: &'a mut Cursor<I>,
+        ends: Option<StrokeEnds>,
+    ) -> Strokes<'a, I> {
+        self.strokes_of(None, words, cursor, ends)
+    }
+
+    /// The same, but if `begun` is given, the strokes of that.
+    #[cfg(feature = "early-ink")]
+    #[inline(always)] // Where steps are planned.
+    pub(super) fn strokes_of<'a>(
+        &self,
+        begun: Option<Begun<'a, I>>,
+        words: &'a mut [u64],
+        cursor: &'a mut Cursor<I>,
+        ends: Option<StrokeEnds>,
+    ) -> Strokes<'a, I> {
+        let words: &'a [u64] = words;
+        let (Begun { drawing, drawn: tour }, has_more) = self.readable(words, begun);
+        Strokes {
+            drawing,
+            tour,
+            has_more,
+            cursor,
+            ends,
+            #[cfg(feature = "stream")]
+            streamed: None,
+            #[cfg(feature = "stream")]
+            ring: words,
+        }
+    }
+
+    /// Returns the strokes of the job from `cursor` on. `words` is the working memory that holds
+    /// the job. `ends` says by how much strokes are made longer.
+    #[cfg(not(feature = "early-ink"))]
     pub fn strokes<'a>(
         &self,
         words: &'a mut [u64],

@@ -3,13 +3,21 @@
 #[cfg(feature = "convex")]
 use super::super::solid;
 use super::super::{PlotOptions, plan, title};
+#[cfg(feature = "early-ink")]
+use super::Unordered;
 use super::{Job, Observer};
 #[cfg(any(test, feature = "host"))]
 use crate::drawing::Stored;
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::index::Index;
+#[cfg(feature = "early-ink")]
+use crate::machine::StrokeTime;
 use crate::model::Model;
-use crate::order::{self, Leg, Pace};
+#[cfg(feature = "early-ink")]
+use crate::order::First;
+#[cfg(not(feature = "early-ink"))]
+use crate::order::Leg;
+use crate::order::{self, Pace};
 use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
 use crate::stage::{Cancel, Stage};
@@ -26,6 +34,10 @@ pub(in crate::plotter) struct Pipeline<'p, I> {
     pub steps: StepsPerMillimetre,
     /// How fast the machine travels and the order is improved, by which its default effort ends.
     pub pace: Pace,
+    /// How long strokes take, if some are chosen that are drawn before the order of the others is
+    /// known.
+    #[cfg(feature = "early-ink")]
+    pub early: Option<StrokeTime>,
     /// The working memory. Each stage (each part of the computation) leaves its result at the
     /// front.
     pub words: &'p mut [u64],
@@ -52,16 +64,54 @@ impl<I: Index> Pipeline<'_, I> {
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. The working memory then holds no job.
+    #[cfg(not(feature = "early-ink"))]
     pub fn run(mut self) -> Result<Job<I>, CommandError> {
         let found = self.find()?;
         self.order(&found)
+    }
+
+    /// Computes the drawing, and chooses the strokes that are drawn before the order of the others
+    /// is known. The job, which the working memory then holds, has no order yet.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with. The working memory then holds no job.
+    #[cfg(feature = "early-ink")]
+    pub fn begin(&mut self) -> Result<Job<I>, CommandError> {
+        let found = self.find()?;
+        self.graph(&found)
+    }
+
+    /// Makes one drawing of the lines, and chooses the strokes that are drawn first.
+    #[cfg(feature = "early-ink")]
+    #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
+    fn graph(&mut self, found: &Found) -> Result<Job<I>, CommandError> {
+        let Self { options, steps, pace, words, cancel, early, .. } = self;
+        cancel.enter(Stage::Order);
+        let stored = build_graph::<I>(words, found.lines, *cancel)?;
+        let [legs, _] = stored.counts();
+        if legs == 0 {
+            return Err(CommandError::NothingToPlot);
+        }
+        let order = options.order(*steps, *pace);
+        let first = match early {
+            Some(time) => {
+                let (points, segments, scratch) =
+                    stored.split_mut(words).map_err(CommandError::DrawingTooLarge)?;
+                order::choose_first(points, segments, order, time, scratch, *cancel)?
+            }
+            None => First::default(),
+        };
+        let Found { degenerate_faces, joined_edges, .. } = *found;
+        let report = order::Report::default();
+        let unordered = Some(Unordered { first, options: order });
+        Ok(Job { stored, legs, report, unordered, degenerate_faces, joined_edges })
     }
 
     /// Computes the drawing without ordering its strokes. It then lies at the front of the working
     /// memory.
     ///
     /// # Errors
-    /// As [`Pipeline::run`].
+    /// The [`CommandError`] to reply with.
     #[cfg(any(test, feature = "host"))]
     pub fn draw(mut self) -> Result<Stored<I>, CommandError> {
         let found = self.find()?;
@@ -99,6 +149,7 @@ impl<I: Index> Pipeline<'_, I> {
     }
 
     /// Makes one drawing of the lines and orders its strokes.
+    #[cfg(not(feature = "early-ink"))]
     #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     fn order(self, found: &Found) -> Result<Job<I>, CommandError> {
         let Self { options, steps, pace, words, cancel, .. } = self;

@@ -2,7 +2,7 @@
 
 use crate::drawing::{Drawing, LineType, PagePoint, Segment};
 use crate::index::Index;
-#[cfg(feature = "stream")]
+#[cfg(any(feature = "stream", feature = "early-ink"))]
 use crate::machine::Late;
 #[cfg(feature = "resume")]
 use crate::machine::StrokePoints;
@@ -59,6 +59,9 @@ pub struct Strokes<'a, I = u16> {
     pub(super) drawing: Drawing<'a, I>,
     /// The segments in the order in which they are drawn, each with its direction.
     pub(super) tour: &'a [Leg<I>],
+    /// Whether more strokes follow, of which the order is not known yet.
+    #[cfg(feature = "early-ink")]
+    pub(in crate::plotter) has_more: bool,
     /// How far the strokes have been handed over.
     pub(in crate::plotter) cursor: &'a mut Cursor<I>,
     /// By how much the strokes are made longer, if they are.
@@ -198,9 +201,16 @@ impl<I: Index> Path for Strokes<'_, I> {
         };
     }
 
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     fn late(&self) -> Option<Late> {
-        self.lateness()
+        #[cfg(feature = "early-ink")]
+        if self.has_more {
+            return (self.cursor.leg >= self.tour.len()).then_some(Late { within_stroke: false });
+        }
+        #[cfg(feature = "stream")]
+        return self.lateness();
+        #[cfg(not(feature = "stream"))]
+        None
     }
 
     fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {

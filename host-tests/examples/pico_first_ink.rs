@@ -1,0 +1,84 @@
+//! How long the emulated Raspberry Pi Pico takes from `$plot` to the first ink at its pins, by the
+//! very image that is flashed: `pico_first_ink [SCENE]...`. The image is built by `cargo xtask
+//! build --board pico`; `PENUP_IMAGE` names another one.
+//!
+//! A short jog comes before the job, which begins when that has ended. So both times are those of
+//! pins.
+
+use penup_client::emulator::{
+    EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
+};
+use penup_host_tests::emulated_jobs::Line;
+use penup_host_tests::whole_jobs::job_lines;
+use std::error::Error;
+use std::time::Duration;
+
+const SCENES: [(&str, &str); 4] = [
+    ("text300", "$view=auto"),
+    ("lattice5", "$eye=-15.37,-20.71,25.13"),
+    ("lattice6", "$eye=-18.37,-24.71,30.13"),
+    ("lattice7", "$eye=-21.37,-28.71,35.13"),
+];
+
+fn main() -> Result<(), Box<dyn Error>> {
+    println!("| scene | first ink, s | pen-up distance, mm |");
+    println!("|---|---|---|");
+    let wanted: Vec<String> = std::env::args().skip(1).collect();
+    for (scene, eye) in SCENES {
+        if wanted.is_empty() || wanted.iter().any(|name| name == scene) {
+            let (first_ink, up) = measure(scene, eye)?;
+            println!("| {scene} | {:.2} | {up} |", first_ink.as_secs_f64());
+        }
+    }
+    Ok(())
+}
+
+/// The time from `$plot` to the first ink, and the distance that the pen travels raised.
+fn measure(scene: &str, eye: &str) -> Result<(Duration, String), Box<dyn Error>> {
+    let image = std::env::var_os("PENUP_IMAGE").map_or_else(|| image_path("pico"), Into::into);
+    let mut uart = Line::to(Box::new(Pico::start(&image)?))?;
+    uart.emulator.plug_usb_in()?;
+    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
+    line.hear_greeting()?;
+    let lines = job_lines(&format!("{scene}.obj"), &[eye]);
+    let (_, model) = lines.split_last().ok_or("an empty scene")?;
+    let text: String = model.iter().map(|text| format!("{text}\n")).collect();
+    line.emulator.send(text.as_bytes())?;
+    for text in model {
+        let answer = line.hear()?;
+        if answer != "ok" {
+            return Err(format!("{text}: {answer}").into());
+        }
+    }
+    line.emulator.send(b"$J=G91 X0.1 F600\n$plot\n")?;
+    let (mut machine, mut begun, mut first_ink) = (Machine::default(), None, None);
+    while first_ink.is_none() {
+        line.status()?;
+        let mut is_jog = true;
+        for change in line.emulator.pin_changes()? {
+            let at = change.at;
+            match machine.change(change).map(|event| event.kind) {
+                // The jog takes a tenth of a second at most.
+                Some(MachineEventKind::Step { .. })
+                    if is_jog
+                        && begun.is_none_or(|begun| at < begun + Duration::from_millis(300)) =>
+                {
+                    begun = Some(at);
+                }
+                Some(MachineEventKind::Step { .. }) => is_jog = false,
+                Some(MachineEventKind::Pen { down: true }) => first_ink = first_ink.or(Some(at)),
+                _ => {}
+            }
+        }
+    }
+    while !line.status()?.contains("|Strokes:") {}
+    line.emulator.send(b"$model\n")?;
+    let up = loop {
+        let heard = line.hear()?;
+        if let Some((_, rest)) = heard.split_once(" mm, up ") {
+            break rest.split(' ').next().unwrap_or_default().to_owned();
+        }
+    };
+    let took = first_ink.zip(begun).map(|(ink, begun)| ink.saturating_sub(begun));
+    Ok((took.ok_or("no ink")?, up))
+}

@@ -1,0 +1,294 @@
+//! Tests jobs whose pen begins while the order of the other strokes is computed: what is drawn does
+//! not depend on how fast the plotter computes, and it can be held, given up, and go on after a
+//! loss of power at any time.
+
+#![allow(clippy::expect_used, reason = "a test fails by panicking")]
+
+use penup::board_table::PICO;
+use penup::boards::host::{CutFlash, Stamped};
+use penup::machine::{JobSize, State};
+use penup::plotter::Unobserved;
+use penup::stage::NeverCancel;
+use penup_host_tests::cut_jobs::{
+    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_early,
+};
+use penup_host_tests::emulated_jobs::bench_like;
+use penup_host_tests::whole_jobs::{Bench, job_lines, machine_events};
+use penup_job::pins::PinChange;
+
+/// What the pins have drawn: each time that the pen was down is a list of points.
+type Run = Vec<Vec<Point>>;
+
+/// So many ticks pass in a millisecond of computing.
+const MILLISECOND: u64 = 25_000;
+
+/// The lines of a job of 210 strokes, whose order takes a board two seconds.
+fn lattice() -> Vec<String> {
+    let options = ["$212=20", "$213=20", "$page=60x60", "$margin=5"];
+    job_lines("lattice4.obj", &options)
+}
+
+/// A plotter like that of the Pico that has received all lines of a job but the last one.
+fn loaded(lines: &[String], early_ink: bool) -> Bench {
+    let bench = bench_like(&PICO);
+    let mut bench = Bench { plotter: bench.plotter.with_early_ink(early_ink), ..bench };
+    let (plot, model) = lines.split_last().expect("a job");
+    assert_eq!(plot, "$plot");
+    for line in model {
+        assert!(bench.say(&format!("{line}\n")).ends_with("ok\n"), "{line}");
+    }
+    bench
+}
+
+fn drawn(changes: &[Stamped]) -> Run {
+    strokes_of(changes.iter().map(PinChange::from))
+}
+
+/// Draws the job with a plotter for which so many ticks pass in a millisecond of computing. Returns
+/// the plotter, and how many strokes were drawn when the job was answered.
+fn draw(lines: &[String], early_ink: bool, work_ticks: u64) -> (Bench, usize) {
+    let mut bench = loaded(lines, early_ink);
+    bench.board.set_work_ticks(work_ticks);
+    bench.board.receive(b"$plot\n");
+    while !bench.board.has_read_all() || !bench.heard().ends_with("ok\n") {
+        bench.plotter.poll(&mut bench.board);
+    }
+    let strokes = drawn(&bench.board.trace().changes()).len();
+    bench.finish();
+    (bench, strokes)
+}
+
+#[test]
+fn the_speed_of_computing_changes_nothing() {
+    let lines = lattice();
+    let (first, none) = draw(&lines, true, 0);
+    assert_eq!(none, 0, "no time has passed");
+    let events = machine_events(&first.board.trace().changes());
+    for (work_ticks, fewest) in [(MILLISECOND / 2, 2), (5 * MILLISECOND, 10)] {
+        let (bench, strokes) = draw(&lines, true, work_ticks);
+        assert!(strokes >= fewest, "{strokes} strokes were drawn while the order was computed");
+        assert!(machine_events(&bench.board.trace().changes()) == events, "{work_ticks}");
+    }
+}
+
+/// The pins leave the same ink, each part of it once, and the measures are those of what is drawn.
+#[test]
+fn the_drawing_is_the_same_as_without() {
+    let lines = lattice();
+    let (early, _) = draw(&lines, true, MILLISECOND);
+    let (late, _) = draw(&lines, false, MILLISECOND);
+    let [early_strokes, late_strokes] =
+        [&early, &late].map(|bench| drawn(&bench.board.trace().changes()));
+    assert_ne!(early_strokes, late_strokes);
+    assert_eq!(ink(&early_strokes), ink(&late_strokes));
+    let steps = |strokes: &Run| strokes.iter().map(|stroke| stroke.len() - 1).sum::<usize>();
+    assert_eq!(steps(&early_strokes), steps(&late_strokes));
+    let status = early.plotter.machine().status();
+    assert_eq!(status.job.strokes as usize, early_strokes.len());
+    let JobSize { strokes, drawn, travelled, .. } = status.job;
+    let JobSize { strokes: all, drawn: ink, travelled: way, .. } = status.done;
+    assert_eq!([strokes.into(), drawn, travelled], [all.into(), ink, way]);
+    assert_eq!(early.plotter.job().report().lifts as usize + 1, early_strokes.len());
+    assert_eq!(late.plotter.job().report().components, early.plotter.job().report().components);
+    assert_eq!(late.plotter.job().report().odd_points, early.plotter.job().report().odd_points);
+}
+
+/// A preview computes the job without drawing it.
+#[test]
+fn a_job_that_is_only_computed_has_the_same_order() {
+    let lines = lattice();
+    let (bench, _) = draw(&lines, true, MILLISECOND);
+    let mut computed = loaded(&lines, true);
+    computed.plotter.compute(&mut NeverCancel, &mut Unobserved).expect("a job");
+    assert_eq!(computed.plotter.job().report(), bench.plotter.job().report());
+}
+
+/// Jobs whose order takes no time, and settings with which what is drawn before a stop depends on
+/// what follows: the order is that of a plotter without early ink.
+#[test]
+fn other_jobs_are_drawn_as_always() {
+    let few = job_lines("lattice2.obj", &["$page=60x60"]);
+    let mut jobs = vec![few];
+    for option in ["$effort=0", "$cycle=on", "$order=exact", "$224=40", "$221=1"] {
+        let mut lines = lattice();
+        lines.insert(lines.len() - 1, option.to_owned());
+        jobs.push(lines);
+    }
+    for lines in jobs {
+        let [early, late] = [true, false].map(|early_ink| draw(&lines, early_ink, MILLISECOND).0);
+        let option = lines.iter().rev().nth(1);
+        assert_eq!(early.plotter.job().report(), late.plotter.job().report(), "{option:?}");
+    }
+}
+
+/// Sends `bytes` while the order is computed, and returns the plotter once `$plot` is answered.
+fn disturbed(bytes: &[u8], milliseconds: u64) -> (Bench, String) {
+    let mut bench = loaded(&lattice(), true);
+    bench.board.set_work_ticks(MILLISECOND);
+    let at = bench.board.trace().now() + milliseconds * MILLISECOND;
+    bench.board.receive_meanwhile(at, bytes);
+    let answer = bench.say("$plot\n");
+    (bench, answer)
+}
+
+#[test]
+fn the_status_tells_what_the_machine_does() {
+    let (mut bench, answer) = disturbed(b"?", 400);
+    let status = answer.lines().find(|line| line.starts_with('<')).expect("a report");
+    assert!(status.starts_with("<Run|MPos:"), "{status}");
+    assert!(!status.contains("|Stage:"), "{status}");
+    let of = |name: &str, status: &str| {
+        let (_, rest) = status.split_once(name).expect("a field");
+        let (done, all) = rest.split_once('/').expect("two numbers");
+        let all = all.split(['|', '>']).next().expect("a number");
+        [done, all].map(|number| number.parse::<u32>().expect("a number"))
+    };
+    let [done, all] = of("|Strokes:", status);
+    let [_, ink] = of("|Ink:", status);
+    let left: u32 = status
+        .split_once("|Left:")
+        .and_then(|(_, left)| left.trim_end_matches('>').parse().ok())
+        .expect("a time");
+    assert!(done >= 1, "{status}");
+    let begun = bench.board.trace().now();
+    bench.finish();
+    let took = (bench.board.trace().now() - begun) / 25_000_000;
+    let size = bench.plotter.machine().status().job;
+    // What is not known yet is estimated.
+    assert!(all.abs_diff(size.strokes) * 10 < size.strokes, "{all} of {}", size.strokes);
+    assert!(u64::from(ink).abs_diff(size.drawn >> 18) <= 1, "{ink}");
+    assert!(u64::from(left).abs_diff(took) * 4 < took, "{left} s for {took} s");
+}
+
+#[test]
+fn a_job_is_held_and_goes_on() {
+    let (whole, _) = draw(&lattice(), true, MILLISECOND);
+    let (mut bench, answer) = disturbed(b"!", 400);
+    assert!(answer.ends_with("ok\n"), "{answer}");
+    bench.work(2000);
+    assert_eq!(bench.plotter.machine().state(), State::Hold { stopped: true });
+    let steps = drawn(&bench.board.trace().changes());
+    bench.work(2000);
+    assert_eq!(drawn(&bench.board.trace().changes()), steps);
+    bench.say("~");
+    bench.finish();
+    let all = |bench: &Bench| ink(&drawn(&bench.board.trace().changes()));
+    assert_eq!(all(&bench), all(&whole));
+}
+
+#[test]
+fn a_job_is_given_up_while_its_order_is_computed() {
+    let (mut bench, answer) = disturbed(b"\x18", 1000);
+    assert!(answer.contains("error:"), "{answer}");
+    bench.finish();
+    assert_eq!(bench.plotter.machine().state(), State::Idle);
+    let strokes = drawn(&bench.board.trace().changes()).len();
+    assert!((1..30).contains(&strokes), "{strokes}");
+    // The next job is drawn whole.
+    let before = bench.board.trace().changes().len();
+    let answer = bench.say("$plot\n");
+    assert!(answer.ends_with("ok\n"), "{answer}");
+    bench.finish();
+    assert!(bench.board.trace().changes().len() > before + 1000);
+}
+
+/// Draws the job without a cut. Returns its strokes and how many bytes of flash change.
+fn undisturbed(lines: &[String], work_ticks: u64) -> (Run, usize) {
+    let flash = CutFlash { budget: usize::MAX / 2, ..empty_flash() };
+    let (flash, changes) = switch_on_early::<16384>(flash, Some(work_ticks), |plotter| {
+        plotter.order(lines);
+        plotter.finish();
+        assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
+        assert!(plotter.say("$resume").ends_with("error:163\n"));
+    });
+    (drawn(&changes), usize::MAX / 2 - flash.budget)
+}
+
+/// Goes on with the job that has stopped, to its end. Returns whether there was one.
+fn go_on(plotter: &mut Powered<'_, '_>) -> bool {
+    let greeting = plotter.heard();
+    let answer = plotter.say("$resume=origin");
+    if answer.ends_with("error:163\n") {
+        assert!(!greeting.contains("stopped"), "{greeting}");
+        return false;
+    }
+    assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
+    assert!(plotter.is_cut() || answer.ends_with("ok\n"), "{answer}");
+    true
+}
+
+/// Cuts the power before each of these bytes of flash, counted from the beginning of a job, and
+/// once more while the job goes on.
+fn cut_before_bytes(lines: &[String], work_ticks: u64, offsets: impl Iterator<Item = usize>) {
+    let (whole, _) = undisturbed(lines, work_ticks);
+    let early = Some(work_ticks);
+    for budget in offsets {
+        let flash = CutFlash { budget, ..empty_flash() };
+        let (flash, changes) = switch_on_early::<16384>(flash, early, |plotter| {
+            plotter.order(lines);
+            if !plotter.is_cut() {
+                plotter.finish();
+            }
+        });
+        assert!(flash.is_cut, "{budget}");
+        let mut runs = vec![drawn(&changes)];
+        // The second cut comes while the order is kept again, if it was not.
+        let again = CutFlash { budget: 1000, ..flash.powered() };
+        let (flash, changes) = switch_on_early::<16384>(again, early, |plotter| {
+            if go_on(plotter) && !plotter.is_cut() {
+                plotter.finish();
+            }
+        });
+        runs.push(drawn(&changes));
+        let (_, changes) = switch_on_early::<16384>(flash.powered(), early, |plotter| {
+            if !go_on(plotter) {
+                if runs.concat() == whole {
+                    return;
+                }
+                assert!(runs.iter().all(Vec::is_empty), "the job is lost: cut before {budget}");
+                plotter.order(lines);
+            }
+            plotter.finish();
+        });
+        runs.push(drawn(&changes));
+        assert_one_drawing(&whole, &runs);
+    }
+}
+
+/// From the last pages of the drawing to the order and the first strokes behind it: each border of
+/// a page, and a byte on each side.
+#[test]
+fn after_a_cut_before_and_while_the_order_is_kept_the_drawing_is_whole() {
+    let lines = lattice();
+    // The pen is behind the order, or waits for it.
+    for (work_ticks, part) in [(MILLISECOND / 4, 0), (4 * MILLISECOND, 1)] {
+        let (whole, bytes) = undisturbed(&lines, work_ticks);
+        // One page for each stroke comes at the end or before the order.
+        let strokes = 256 * whole.len();
+        let borders = (bytes - strokes - 6 * 256..bytes - strokes + 16 * 256).step_by(256);
+        let around = borders.flat_map(|at| [at, at + 1, at + 255]);
+        cut_before_bytes(&lines, work_ticks, around.skip(part).step_by(7));
+    }
+}
+
+/// A job that was cut before its order was kept can be drawn anew without its model.
+#[test]
+fn a_job_without_an_order_is_drawn_again() {
+    let lines = lattice();
+    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
+    let budget = bytes - 256 * (whole.len() + 2);
+    let flash = CutFlash { budget, ..empty_flash() };
+    let (flash, changes) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
+        plotter.order(&lines);
+        plotter.run(10_000);
+    });
+    assert!(drawn(&changes).len() < whole.len());
+    for _ in 0..2 {
+        let (_, changes) =
+            switch_on_early::<16384>(flash.clone().powered(), Some(MILLISECOND), |plotter| {
+                assert!(plotter.say("$again").ends_with("ok\n"));
+                plotter.finish();
+            });
+        assert_eq!(drawn(&changes), whole);
+    }
+}

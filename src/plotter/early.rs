@@ -1,0 +1,321 @@
+//! Early ink: the pen draws the first strokes of a job while the order of the others is computed.
+//!
+//! [`choose_first`](crate::order::choose_first) says which strokes come first. Once they are known,
+//! the machine begins with them. The order is computed as always, by code that knows nothing of
+//! this; where it asks whether it is cancelled, [`Meanwhile`] keeps the machine going. So what is
+//! drawn depends on the drawing and the settings, and not on how fast the board computes: if the
+//! order is late, the pen waits, raised, behind the first strokes.
+//!
+//! A board with flash keeps the drawing and the first strokes before the pen moves, with all that
+//! the order is computed from. When the order is known, it is [added](super::Board::add) to that
+//! while the machine stands with the pen raised, and only then the other strokes are drawn. After a
+//! loss of power before that, the same order is computed again.
+
+use super::job::{Begun, Unordered};
+use super::listener::{Listener, MeasuredStrokes};
+use super::{Board, Cursor, Inner, Job, Observer, REPLY_BYTES, Reply, Unobserved, records, report};
+use crate::drawing::PagePoint;
+use crate::index::Index;
+use crate::machine::{JobSize, Measured, State, StrokeTime};
+use crate::order::{self, Effort, Method, Shape};
+use crate::protocol::{CommandError, RealTime};
+use crate::stage::{Aborted, Cancel};
+
+/// The number of targets that are measured in one turn of the main loop.
+const TARGETS_A_TURN: u32 = 64;
+
+/// A job whose order is known, but not released yet.
+#[derive(Debug)]
+pub(super) struct Pending<I> {
+    /// The job with its order.
+    job: Job<I>,
+    /// How far it has been measured.
+    cursor: Cursor<I>,
+    /// How much of it has been measured; `None` once all is.
+    measured: Option<Measured>,
+    /// The size of the job, once it is measured.
+    size: JobSize,
+}
+
+/// Keeps the machine going while the order of a job is computed, and ends the computation when the
+/// user gives the job up.
+struct Meanwhile<'h, 'm, B: Board, I> {
+    /// All but the working memory.
+    inner: &'h mut Inner<'m, I>,
+    /// The board.
+    board: &'h mut B,
+    /// What the machine may read.
+    begun: Begun<'h, I>,
+    /// Whether a status report waits for room in the output.
+    status_due: bool,
+}
+
+impl<B: Board, I: Index> Cancel for Meanwhile<'_, '_, B, I> {
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    fn check(&mut self) -> Result<(), Aborted> {
+        let Self { inner, board, begun, status_due } = self;
+        let requests = board.take_real_time();
+        report::greet_opened(inner.machine.state(), inner.resumption, *board);
+        if requests.has(RealTime::ABORT) {
+            inner.machine.abort();
+            return Err(Aborted);
+        }
+        inner.act(requests);
+        inner.watch(*board);
+        inner.note_progress(*board);
+        inner.plan(Some(*begun), *board);
+        board.begin_steps();
+        *status_due |= requests.has(RealTime::STATUS);
+        if *status_due && board.has_room(REPLY_BYTES) {
+            *status_due = false;
+            inner.report_status(*board);
+        }
+        match inner.machine.state() {
+            State::Run | State::Hold { .. } => Ok(()),
+            _ => Err(Aborted),
+        }
+    }
+}
+
+impl<I: Index> Inner<'_, I> {
+    /// How long strokes take, if the pen may begin before the order is known. This decides about
+    /// the order, so it depends on nothing but the options and the settings.
+    pub(super) fn early(&self) -> Option<StrokeTime> {
+        let settings = self.machine.settings();
+        let pace = settings.pace(order::Pace::BOARD);
+        let order::Options { method, shape, effort, .. } =
+            self.options.order(settings.page_steps(), pace);
+        // A pen that moves while the machine does, and strokes that are longer than they are drawn,
+        // depend on what comes behind. The exact method may need more memory than there is.
+        let may_begin = shape == Shape::OpenPath
+            && effort != Effort::Units(0)
+            && method != Method::Exact
+            && self.machine.stroke_ends().is_none()
+            && self.machine.moves_apart();
+        (may_begin && self.has_early_ink()).then(|| settings.stroke_time())
+    }
+
+    /// Whether this plotter's pen begins early.
+    #[cfg(any(test, feature = "host"))]
+    fn has_early_ink(&self) -> bool {
+        self.has_early_ink && !self.is_thorough
+    }
+
+    /// Whether this plotter's pen begins early.
+    #[cfg(not(any(test, feature = "host")))]
+    fn has_early_ink(&self) -> bool {
+        true
+    }
+
+    /// Computes the job of `$plot` and begins to draw it.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with.
+    #[inline(always)] // Adds no frame to the stack.
+    pub(super) fn plot_model<B: Board>(
+        &mut self,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<(), CommandError> {
+        let job = self.begin_job(listener, &mut Unobserved)?;
+        if !self.begins_early(job) {
+            self.job = job.ordered(self.words, listener)?;
+            let is_kept = self.save(listener.board);
+            self.begin(listener)?;
+            if is_kept {
+                self.keep_model(listener.board);
+            }
+            return Ok(());
+        }
+        let measured = self.begin_first(job, listener)?;
+        let ordered = self.order_meanwhile(job, listener);
+        match ordered {
+            Ok(job) => {
+                let (cursor, measured) = (Cursor::default(), Some(measured));
+                self.pending = Some(Pending { job, cursor, measured, size: JobSize::default() });
+                Ok(())
+            }
+            Err(error) => {
+                self.machine.abort();
+                Err(error)
+            }
+        }
+    }
+
+    /// Computes the drawing of `$plot`, in place of the last job.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    pub(super) fn begin_job(
+        &mut self,
+        cancel: &mut dyn Cancel,
+        observer: &mut dyn Observer<I>,
+    ) -> Result<Job<I>, CommandError> {
+        self.forget_job();
+        self.pipeline(cancel, observer).begin()
+    }
+
+    /// Begins to keep how far the job comes, which was computed from the model.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    fn keep_model<B: Board>(&mut self, board: &mut B) {
+        let contents = [self.model.checksum(), self.options.checksum()];
+        self.keep_progress(Some(contents), board);
+    }
+
+    /// Whether the machine begins with the first strokes of a job, of which only the drawing is
+    /// known: there are such strokes, and nothing can fail later.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    fn begins_early(&mut self, job: Job<I>) -> bool {
+        let Some(Unordered { first, .. }) = job.unordered() else { return false };
+        if self.machine.state() != State::Idle || first.segments == 0 || !job.lay_first(self.words)
+        {
+            return false;
+        }
+        let Some(drawing) = job.drawing(self.words) else { return false };
+        let Some(&begin) = drawing.points.first() else { return false };
+        let mut bounds = [begin, begin];
+        for point in drawing.points {
+            let [least, greatest] = &mut bounds;
+            *least = PagePoint { x: least.x.min(point.x), y: least.y.min(point.y) };
+            *greatest = PagePoint { x: greatest.x.max(point.x), y: greatest.y.max(point.y) };
+        }
+        first.segments < drawing.segments.len() && self.machine.takes_any_path(bounds)
+    }
+
+    /// Keeps the drawing of a job and lets the machine begin with its first strokes. Returns the
+    /// beginning of its measurement.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    fn begin_first<B: Board>(
+        &mut self,
+        job: Job<I>,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<Measured, CommandError> {
+        self.job = job;
+        let is_kept = self.save(listener.board);
+        let measured = self.machine.begin_measuring();
+        {
+            let strokes = self.job.strokes(self.words, &mut self.cursor, None);
+            let cancel: &mut dyn Cancel = listener;
+            let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+            self.machine.start(&mut strokes)?;
+            if strokes.aborted {
+                self.machine.abort();
+                return Err(CommandError::Aborted);
+            }
+        }
+        self.cursor = Cursor::default();
+        if let (Some(drawing), Some(Unordered { first, .. })) =
+            (job.drawing(self.words), job.unordered())
+        {
+            let rest = drawing.segments.iter().skip(first.segments);
+            let length = rest.map(|segment| {
+                let ends = [segment.from(), segment.to()]
+                    .map(|point| drawing.points.get(point.get()).copied().unwrap_or_default());
+                self.machine.length(ends)
+            });
+            self.machine.expect_more(first.strokes_left, length.sum());
+        }
+        if is_kept {
+            self.keep_model(listener.board);
+        }
+        Ok(measured)
+    }
+
+    /// Computes the order of the strokes while the machine draws the first ones.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with; the machine may still draw.
+    #[inline(always)] // Adds no frame to the stack.
+    fn order_meanwhile<B: Board>(
+        &mut self,
+        job: Job<I>,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<Job<I>, CommandError> {
+        self.act(core::mem::take(&mut listener.requests));
+        let words = core::mem::take(&mut self.words);
+        let board = &mut *listener.board;
+        let ordered = job.ordered_by(words, |begun, scratch, rest, unordered| {
+            let Unordered { first, options } = unordered;
+            let mut meanwhile = Meanwhile { inner: self, board, begun, status_due: false };
+            let Begun { drawing, drawn } = begun;
+            order::order_rest(drawing, first, drawn, options, scratch, &mut meanwhile, rest)
+        });
+        self.words = words;
+        ordered
+    }
+
+    /// Measures a job whose order has become known, and releases its strokes once the board has
+    /// kept the order. Returns whether there was anything to do.
+    #[inline(always)] // It is called in every turn of the main loop.
+    pub(super) fn follow_order<B: Board>(&mut self, board: &mut B) -> bool {
+        self.pending.is_some() && self.release(board)
+    }
+
+    /// Carries out [`Inner::follow_order`].
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn release<B: Board>(&mut self, board: &mut B) -> bool {
+        if !matches!(self.machine.state(), State::Run | State::Hold { .. }) {
+            // The job was given up. It is kept without the order, which can be computed again.
+            self.pending = None;
+            return false;
+        }
+        let Some(pending) = &mut self.pending else { return false };
+        if let Some(measured) = &mut pending.measured {
+            let mut strokes = pending.job.strokes(self.words, &mut pending.cursor, None);
+            for _ in 0..TARGETS_A_TURN {
+                // Every target was checked with the bounds of the drawing.
+                if !matches!(self.machine.measure_next(&mut strokes, measured), Ok(true)) {
+                    let measured = pending.measured.take();
+                    pending.size = measured
+                        .map(|measured| self.machine.end_measuring(measured))
+                        .unwrap_or_default();
+                    break;
+                }
+            }
+            return true;
+        }
+        let (job, size) = (pending.job, pending.size);
+        if self.resumption.keeps() {
+            // The flash is written while nothing moves.
+            if !self.machine.is_stopped() {
+                return false;
+            }
+            let kept = records::add_order(&job, size.strokes, self.words, board);
+            self.order_kept(size.strokes, kept, board);
+        }
+        self.pending = None;
+        self.machine.set_job_size(size);
+        self.job = job;
+        true
+    }
+
+    /// Computes the order of a job that was loaded, if it is not known, and keeps it.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with. The job stays kept as it was.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn complete_order<B: Board>(
+        &mut self,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<(), CommandError> {
+        if self.job.unordered().is_none() {
+            return Ok(());
+        }
+        self.job = self.job.ordered(self.words, listener)?;
+        let strokes = {
+            let strokes = self.job.strokes(self.words, &mut self.cursor, None);
+            let cancel: &mut dyn Cancel = listener;
+            let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+            let mut measured = self.machine.begin_measuring();
+            while self.machine.measure_next(&mut strokes, &mut measured)? {}
+            if strokes.aborted {
+                return Err(CommandError::Aborted);
+            }
+            self.machine.end_measuring(measured).strokes
+        };
+        self.cursor = Cursor::default();
+        let kept = records::add_order(&self.job, strokes, self.words, listener.board);
+        if kept.is_err() {
+            Reply(listener.board)
+                .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
+        }
+        Ok(())
+    }
+}
