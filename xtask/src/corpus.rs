@@ -1,4 +1,4 @@
-//! Draws every file of public collections of files by `penup preview`, and says what became of each.
+//! Draws every file of public collections by `penup preview`, and says what became of each.
 //!
 //! The collections are the test files of other programs, at fixed commits, which are fetched into
 //! `target/corpus`. A file may be refused, with a sentence. It must not make the client panic, keep
@@ -290,7 +290,8 @@ fn judge(code: Option<i32>, said: &str, path: &str) -> Fate {
     if let Some(panic) = said.lines().find(|line| line.contains("panicked at")) {
         return Fate::Panicked(panic.to_owned());
     }
-    let refusal = said.lines().find_map(|line| line.strip_prefix("penup: "));
+    let told = said.lines().filter_map(|line| line.strip_prefix("penup: "));
+    let refusal = told.filter(|told| !told.starts_with("note: ")).next_back();
     match (code, refusal) {
         // A panic of the client is 101; no code is a signal, such as that of a full stack.
         (None | Some(101), _) => Fate::Panicked(said.lines().last().unwrap_or("").to_owned()),
@@ -305,8 +306,8 @@ fn judge(code: Option<i32>, said: &str, path: &str) -> Fate {
 
 /// How many strokes the client says that it has drawn.
 fn strokes(said: &str) -> Option<u64> {
-    let before = said.split_once(" strokes, ")?.0;
-    before.rsplit(' ').next()?.parse().ok()
+    let counts = said.lines().filter_map(|line| Some(line.split_once(" strokes, ")?.0));
+    counts.filter_map(|before| before.rsplit(' ').next()?.parse().ok()).next_back()
 }
 
 /// The sentence of a refusal without what belongs to the file: its path, and numbers.
@@ -337,7 +338,11 @@ mod tests {
         assert!(matches!(judge(Some(101), panic, "a.svg"), Fate::Panicked(_)));
         assert!(matches!(judge(None, "", "a.svg"), Fate::Panicked(_)));
         assert!(matches!(judge(Some(2), "", "a.svg"), Fate::Panicked(_)));
-        let refused = "penup: /b/a.obj:12: face 7 has 2 corners\n    f 1 2\n";
+        let noted =
+            "penup: note: a.svg: it sends the strokes, and more\na.svg: 1 strokes, 9 mm drawn";
+        assert!(matches!(judge(Some(0), noted, "a.svg"), Fate::Drawn));
+        let refused =
+            "penup: note: /b/a.obj: no unit\npenup: /b/a.obj:12: face 7 has 2 corners\n    f 1 2\n";
         match judge(Some(1), refused, "/b/a.obj") {
             Fate::Refused(sentence) => assert_eq!(sentence, "face 0 has 0 corners"),
             _ => panic!("it is refused"),
