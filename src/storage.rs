@@ -18,6 +18,8 @@
 //!
 //! How far the work that a state describes has come can be kept beside it, in a [`Log`].
 
+#[cfg(feature = "tiles")]
+pub mod area;
 mod log;
 
 pub use log::{Log, NOTE_BYTES, Noted};

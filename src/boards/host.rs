@@ -4,8 +4,12 @@
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], and while bytes are sent at a set
 //! baud rate. So a run gives the same result every time.
 
+#[cfg(feature = "tiles")]
+mod area;
 mod flash;
 
+#[cfg(feature = "tiles")]
+pub use area::CutArea;
 pub use flash::{Cut, CutFlash};
 
 use crate::index::Index;

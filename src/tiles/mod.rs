@@ -47,7 +47,7 @@ use owner::OfTile;
 use page::{Rectangle, Tile};
 
 pub use page::Survey;
-pub use source::Projected;
+pub use source::{Projected, ProjectedStored};
 
 /// A model as it is read again and again: its corners, and its vertices as a camera sees them.
 pub trait ModelSource {
