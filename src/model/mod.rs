@@ -118,6 +118,15 @@ impl<'m, I: Index> Model<'m, I> {
         }
     }
 
+    /// The memory for vertices, which others may use while the model is empty. It is empty if the
+    /// model is not.
+    #[cfg(feature = "tiles")]
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    pub fn spare_words(&mut self) -> &mut [u64] {
+        let (_, words, _) = bytemuck::pod_align_to_mut(self.vertices.spare());
+        words
+    }
+
     /// Removes all vertices, elements, curves and pens.
     pub fn clear(&mut self) {
         self.vertices.truncate(0);

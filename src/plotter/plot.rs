@@ -54,6 +54,8 @@ impl<I: Index> Inner<'_, I> {
         let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
         let begun = match drawing {
             _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
+            #[cfg(feature = "tiles")]
+            Drawing::Model if self.is_in_flash() => self.plot_stored(&mut listener),
             Drawing::Model => self.compute(&mut listener, &mut Unobserved).and_then(|()| {
                 let is_kept = self.save(listener.board);
                 self.begin(&mut listener)?;
@@ -151,13 +153,13 @@ impl<I: Index> Inner<'_, I> {
 
     /// The units of work that count as one second when the order is improved.
     #[cfg(any(test, feature = "host"))]
-    fn units_per_second(&self) -> u32 {
+    pub(super) fn units_per_second(&self) -> u32 {
         if self.is_thorough { Pace::COMPUTER } else { Pace::BOARD }
     }
 
     /// The units of work that count as one second when the order is improved.
     #[cfg(not(any(test, feature = "host")))]
-    fn units_per_second(&self) -> u32 {
+    pub(super) fn units_per_second(&self) -> u32 {
         Pace::BOARD
     }
 }

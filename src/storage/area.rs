@@ -246,6 +246,7 @@ impl AreaWriter {
     ///
     /// # Errors
     /// [`NotWritten`]; what has come is then lost, and the area must be filled anew.
+    #[inline(never)] // Its callers share one copy of the code.
     pub fn push(
         &mut self,
         side: Side,

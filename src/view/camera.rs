@@ -6,7 +6,7 @@
 use super::ViewError;
 use crate::fixed::{sin_cos_degrees, square_root};
 use crate::geometry::Projection;
-use crate::model::Positions;
+use crate::model::{Position, Positions};
 
 /// A point or direction in model space. It is used only to set up the camera.
 pub type Direction = [f64; 3];
@@ -145,20 +145,27 @@ const EYE_DISTANCE: f64 = 3.5;
 ///
 /// The radius is used only to place the automatic eye, so a square root of 24 bits that is some 5 %
 /// off is accurate enough.
+#[cfg_attr(not(feature = "tiles"), inline(always))]
 pub(super) fn middle_and_radius(model: &impl Positions) -> Option<(Direction, f64)> {
-    let (low, high) = model.bounds()?;
-    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
+    Some(middle_and_radius_of(model.bounds()?, model.fraction_bits()))
+}
+
+/// The same of a model with this box around it.
+#[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
+#[cfg_attr(not(feature = "tiles"), inline(always))]
+fn middle_and_radius_of((low, high): (Position, Position), fraction_bits: u32) -> (Direction, f64) {
+    let unit = libm::ldexp(1.0, -(fraction_bits as i32));
     let (low, high) = (low.coordinates().map(f64::from), high.coordinates().map(f64::from));
     let middle = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0 * unit);
     let largest = [0, 1, 2].map(|axis| (high[axis] - low[axis]) / 2.0 * unit);
     let size = largest_component(largest);
     if size == 0.0 {
-        return Some((middle, 1.0));
+        return (middle, 1.0);
     }
     let squares =
         largest.iter().map(|half| to_single(half / size)).map(|half| to_single(half * half));
     let sum = squares.fold(0.0, |sum, square| to_single(sum + square));
-    Some((middle, size * estimated_root(sum)))
+    (middle, size * estimated_root(sum))
 }
 
 /// Rounds to the nearest number with the 24 bits of a single-precision float, for 0 and numbers

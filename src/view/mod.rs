@@ -137,11 +137,25 @@ impl View {
     // Not inlined, so that its variables take no stack while the rest of a job is computed.
     #[inline(never)]
     pub fn new(camera: &Camera, model: &impl Positions) -> Result<Self, ViewError> {
-        let Axes { directions, origin } = Axes::new(camera)?;
-        let fraction_bits = model.fraction_bits();
+        let axes = Axes::new(camera)?;
+        let extents = extents(&axes.directions, model).ok_or(ViewError::NothingToSee)?;
+        let bounds = model.bounds().ok_or(ViewError::NothingToSee)?;
+        Self::of_extents(camera, axes, extents, bounds, model.fraction_bits())
+    }
+
+    /// Computes the view of a model that extends so far along the axes of the camera, with this box
+    /// around it.
+    #[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
+    #[cfg_attr(not(feature = "tiles"), inline(always))]
+    fn of_extents(
+        camera: &Camera,
+        Axes { directions, origin }: Axes,
+        extents: [(f64, f64); 3],
+        bounds: (Position, Position),
+        fraction_bits: u32,
+    ) -> Result<Self, ViewError> {
         let projection = camera.lens.projection();
-        let extents = extents(&directions, model).ok_or(ViewError::NothingToSee)?;
-        let reach = reach(model);
+        let reach = reach(bounds, fraction_bits);
         let limit = f64::from(COORDINATE_LIMIT - 1);
         let shift = directions.map_each(|axis| -dot(axis, origin));
         let width = [0, 1]
@@ -233,10 +247,10 @@ impl View {
     ///
     /// # Errors
     /// Returns [`ViewError::BehindEye`] with the first vertex that is not.
-    pub fn refuse_behind<I: Index>(&self, model: &Model<'_, I>) -> Result<(), ViewError> {
+    pub fn refuse_behind(&self, model: &impl Positions) -> Result<(), ViewError> {
         let near = self.near.unwrap_or(i32::MIN);
-        let is_behind = |position: &Position| self.vertex(*position).z < near;
-        match model.vertices().iter().position(is_behind) {
+        let is_behind = |position: Position| self.vertex(position).z < near;
+        match model.positions().position(is_behind) {
             Some(vertex) => Err(ViewError::BehindEye { vertex: vertex + 1 }),
             None => Ok(()),
         }
@@ -275,13 +289,11 @@ fn as_ratio(value: f64) -> (u32, u32) {
 }
 
 /// Returns an upper bound of |direction · position| for directions of length 1, in model units.
-fn reach(model: &impl Positions) -> f64 {
-    let largest = model.bounds().map_or(0, |(low, high)| {
-        let corners = [low.coordinates(), high.coordinates()];
-        corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0)
-    });
+fn reach((low, high): (Position, Position), fraction_bits: u32) -> f64 {
+    let corners = [low.coordinates(), high.coordinates()];
+    let largest = corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0);
     // The factor is slightly more than the square root of 3.
-    1.75 * libm::ldexp(f64::from(largest), -(model.fraction_bits() as i32))
+    1.75 * libm::ldexp(f64::from(largest), -(fraction_bits as i32))
 }
 
 /// Returns, for each axis, the least and the greatest value of axis · position over all vertices.

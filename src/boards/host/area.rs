@@ -17,6 +17,8 @@ pub struct CutArea {
     pub erasures: Vec<u32>,
     /// The number of pages that were written.
     pub pages: usize,
+    /// Whether sectors may be erased: nothing moves.
+    pub(super) may_erase: bool,
 }
 
 impl CutArea {
@@ -28,6 +30,7 @@ impl CutArea {
             budget: usize::MAX,
             erasures: std::vec![0; bytes / SECTOR_BYTES],
             pages: 0,
+            may_erase: true,
         }
     }
 
@@ -63,12 +66,14 @@ impl CutArea {
 impl AreaFlash for CutArea {
     fn erase_sector(&mut self, at: usize) -> Result<(), NotWritten> {
         assert!(at.is_multiple_of(SECTOR_BYTES));
+        assert!(self.may_erase, "flash is erased while something moves");
         self.erasures[at / SECTOR_BYTES] += 1;
         self.each(at, &[0xFF; SECTOR_BYTES], true).map_err(|Cut| NotWritten)
     }
 
     fn write_page(&mut self, at: usize, page: &[u8; PAGE_BYTES]) -> Result<(), NotWritten> {
         assert!(at.is_multiple_of(PAGE_BYTES));
+        assert!(self.may_erase, "a model is written while something moves");
         let words = self.words[at / 4..][..PAGE_BYTES / 4].iter();
         let before: Vec<u8> =
             words.flat_map(|word| word.load(Ordering::Relaxed).to_le_bytes()).collect();
