@@ -145,7 +145,6 @@ const EYE_DISTANCE: f64 = 3.5;
 ///
 /// The radius is used only to place the automatic eye, so a square root of 24 bits that is some 5 %
 /// off is accurate enough.
-#[cfg_attr(not(feature = "tiles"), inline(always))]
 pub(super) fn middle_and_radius(model: &impl Positions) -> Option<(Direction, f64)> {
     Some(middle_and_radius_of(model.bounds()?, model.fraction_bits()))
 }

@@ -139,23 +139,21 @@ impl View {
     pub fn new(camera: &Camera, model: &impl Positions) -> Result<Self, ViewError> {
         let axes = Axes::new(camera)?;
         let extents = extents(&axes.directions, model).ok_or(ViewError::NothingToSee)?;
-        let bounds = model.bounds().ok_or(ViewError::NothingToSee)?;
-        Self::of_extents(camera, axes, extents, bounds, model.fraction_bits())
+        Self::of_extents(camera, axes, extents, reach(model), model.fraction_bits())
     }
 
-    /// Computes the view of a model that extends so far along the axes of the camera, with this box
-    /// around it.
+    /// Computes the view of a model that extends so far along the axes of the camera. `reach` is
+    /// what the function of this name returns.
     #[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
     #[cfg_attr(not(feature = "tiles"), inline(always))]
     fn of_extents(
         camera: &Camera,
         Axes { directions, origin }: Axes,
         extents: [(f64, f64); 3],
-        bounds: (Position, Position),
+        reach: f64,
         fraction_bits: u32,
     ) -> Result<Self, ViewError> {
         let projection = camera.lens.projection();
-        let reach = reach(bounds, fraction_bits);
         let limit = f64::from(COORDINATE_LIMIT - 1);
         let shift = directions.map_each(|axis| -dot(axis, origin));
         let width = [0, 1]
@@ -289,11 +287,13 @@ fn as_ratio(value: f64) -> (u32, u32) {
 }
 
 /// Returns an upper bound of |direction · position| for directions of length 1, in model units.
-fn reach((low, high): (Position, Position), fraction_bits: u32) -> f64 {
-    let corners = [low.coordinates(), high.coordinates()];
-    let largest = corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0);
+fn reach(model: &impl Positions) -> f64 {
+    let largest = model.bounds().map_or(0, |(low, high)| {
+        let corners = [low.coordinates(), high.coordinates()];
+        corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0)
+    });
     // The factor is slightly more than the square root of 3.
-    1.75 * libm::ldexp(f64::from(largest), -(fraction_bits as i32))
+    1.75 * libm::ldexp(f64::from(largest), -(model.fraction_bits() as i32))
 }
 
 /// Returns, for each axis, the least and the greatest value of axis · position over all vertices.
