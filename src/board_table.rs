@@ -46,6 +46,9 @@ pub struct BoardRow {
     pub memory: Capacities,
     /// The largest scene that the board must be able to draw.
     pub scene: Scene,
+    /// The number of bytes of flash behind the image for a model that is too large for the memory;
+    /// 0 if there is none.
+    pub model_flash: u64,
     /// The program that emulates the board, and the name by which it knows it.
     pub emulator: Emulator,
     /// How an image gets onto a real board; `None` if the board is emulated only.
@@ -205,12 +208,14 @@ pub const LM3S6965: BoardRow = BoardRow {
         steps: 619,
     },
     scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
+    model_flash: 0,
     emulator: Emulator::Qemu { machine: "lm3s6965evb" },
     flashing: None,
 };
 
 /// Raspberry Pi Pico. The log is that of the real board, because the same image is flashed. The
-/// budget is all that the memory map (`boards/pico.x`) leaves beside the records and the stack.
+/// budget is all that the memory map (`boards/pico.x`) leaves beside the model in flash, the records
+/// and the stack.
 pub const PICO: BoardRow = BoardRow {
     name: "pico",
     about: "Raspberry Pi Pico: RP2040, Cortex-M0+, 264 KiB of RAM, in rp2040js",
@@ -250,6 +255,7 @@ pub const PICO: BoardRow = BoardRow {
         steps: 1776,
     },
     scene: Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
+    model_flash: 1120 << 10,
     emulator: Emulator::Rp2040js,
     flashing: Some(Flashing {
         chip: "RP2040",

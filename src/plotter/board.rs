@@ -128,6 +128,10 @@ pub trait Board {
         let _ = notes;
         None
     }
+    /// Begins to execute the step events of the queue, as [`Board::wait`] does, and does not sleep.
+    /// Called while the main loop computes.
+    #[cfg(feature = "tiles")]
+    fn start_steps(&mut self) {}
     /// The flash in which a model is kept that is too large for the memory, and what writes it;
     /// `None` if the board has none.
     #[cfg(feature = "tiles")]

@@ -33,7 +33,8 @@ const MAPPED_AT: usize = ROW.flash.start as usize;
 const START: u32 = ROW.budget.flash as u32;
 /// Where the records begin. This must not change, because a new version of the firmware finds what
 /// an older one has kept.
-const RECORDS: u32 = 1760 << 10;
+const RECORDS: u32 = START + ROW.model_flash as u32;
+const _: () = assert!(RECORDS == 1760 << 10);
 /// The number of bytes in the flash chip, and so the offset at which it ends.
 const END: u32 = ROW.flash.size as u32;
 /// The unit in which flash is erased.

@@ -210,6 +210,10 @@ impl Board for Pico {
         self.steps.sync_consumed();
     }
 
+    fn start_steps(&mut self) {
+        self.steps.start();
+    }
+
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         Some((flash::model_area(), &mut self.kept.flash))
     }

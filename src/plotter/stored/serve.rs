@@ -227,6 +227,7 @@ impl<I: Index, B: Board> Cancel for Server<'_, '_, I, B> {
         inner.act(requests);
         inner.watch(*board);
         inner.plan(*board);
+        board.start_steps();
         *is_status_due |= requests.has(RealTime::STATUS);
         if *is_status_due && board.has_room(REPLY_BYTES) {
             *is_status_due = false;
