@@ -146,9 +146,10 @@ fn a_model_in_flash_is_the_one_in_memory() {
             let mut first = 0;
             for (element, pen) in model.elements().iter_with_pens() {
                 pens |= 1 << pen;
-                for corner in first..first + element.corner_count() {
-                    assert_eq!(stored.corner(corner), corners[corner]);
-                    assert_eq!(stored.pen(corner), pen, "seed {seed}, corner {corner}");
+                let count = element.corner_count();
+                for (number, corner) in corners.iter().enumerate().skip(first).take(count) {
+                    assert_eq!(stored.corner(number), *corner);
+                    assert_eq!(stored.pen(number), pen, "seed {seed}, corner {number}");
                 }
                 first += element.corner_count();
                 let _: Element<'_, u32> = element;

@@ -62,7 +62,7 @@ impl Upload {
         flash: &mut dyn AreaFlash,
     ) -> Result<Self, UploadError> {
         let corners = model.elements().corners().len();
-        let needed = model.vertices().len() * size_of::<Position>() + corners * CORNER_BYTES;
+        let needed = size_of_val(model.vertices()) + corners * CORNER_BYTES;
         if needed + 4 * crate::storage::PAGE_BYTES > area.bytes() {
             return Err(ModelError::StoreFull { vertices: 0, corners: 0 }.into());
         }

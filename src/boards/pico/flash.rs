@@ -24,7 +24,7 @@ use penup::storage::area::{Area, AreaFlash, NotWritten};
 use rp2040_hal::rom_data;
 
 use super::registers::{Get, IO_QSPI, Put, SSI};
-use super::{BOOT_2, ROW, critical, emergency};
+use super::{BOOT_2, ROW, critical, emergency, usb};
 
 /// The address at which the flash is mapped to memory, so that it can be read.
 const MAPPED_AT: usize = ROW.flash.start as usize;
@@ -195,6 +195,7 @@ impl Flash {
             boot_2,
         };
         critical::with_steps_masked(|| {
+            usb::note_masked();
             // SAFETY: interrupts are masked, one core runs, and the channel of the steps reads RAM;
             // the callers check that the position is within the flash.
             unsafe { carry_out(&rom, &mut work) };

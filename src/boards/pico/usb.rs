@@ -18,6 +18,8 @@
 mod connection;
 mod frame;
 
+pub use frame::note_masked;
+
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::NVIC;

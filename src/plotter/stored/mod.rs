@@ -24,6 +24,7 @@ use crate::storage::area::{Area, AreaFlash};
 
 /// What the flash holds.
 #[derive(Debug, Default)]
+#[expect(clippy::large_enum_variant, reason = "without an allocator it lies here anyway")]
 pub(super) enum Large {
     /// No model: the one in memory counts.
     #[default]

@@ -7,6 +7,8 @@
 //! which is on only while something waits to be sent. This delays a packet by at most some 0.5 ms
 //! when nothing was sent before, and later packets not at all.
 
+use core::sync::atomic::{AtomicBool, Ordering};
+
 use super::super::clock;
 use super::super::registers::{Get, Put, USB};
 
@@ -19,6 +21,15 @@ const LENGTH: u32 = 1000;
 /// allow for the time between reading the clock and writing to the buffer, and for a late
 /// interrupt.
 const SAFE: u32 = 700;
+
+/// Whether interrupts have been masked for long since the controller was last looked at, so that
+/// the interrupt of a frame may be late.
+static WERE_MASKED: AtomicBool = AtomicBool::new(false);
+
+/// Notes that interrupts are masked for long. Call it while they are.
+pub fn note_masked() {
+    WERE_MASKED.store(true, Ordering::Relaxed);
+}
 
 /// Knows how far the present frame of the bus has come.
 pub struct Frame {
@@ -41,6 +52,12 @@ impl Frame {
             return;
         }
         clear_interrupt();
+        if WERE_MASKED.load(Ordering::Relaxed) {
+            // This frame may have begun long ago. The next one tells the time.
+            WERE_MASKED.store(false, Ordering::Relaxed);
+            self.began = None;
+            return;
+        }
         let now = clock::microseconds();
         self.began = match self.began {
             // The interrupt may have come late, but not the frame: the chip's crystal is as exact
@@ -62,6 +79,7 @@ impl Frame {
             // An interrupt flag from before the interrupt was enabled says nothing about the time.
             self.began = None;
             clear_interrupt();
+            WERE_MASKED.store(false, Ordering::Relaxed);
             USB.inte().set(BEGAN);
         }
         self.began.is_some_and(|began| clock::microseconds().wrapping_sub(began) < SAFE)
