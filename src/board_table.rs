@@ -46,6 +46,9 @@ pub struct BoardRow {
     pub memory: Capacities,
     /// The largest scene that the board must be able to draw.
     pub scene: Scene,
+    /// The number of bytes of flash behind the image for a model that is too large for the memory;
+    /// 0 if there is none.
+    pub model_flash: u64,
     /// The program that emulates the board, and the name by which it knows it.
     pub emulator: Emulator,
     /// How an image gets onto a real board; `None` if the board is emulated only.
@@ -208,6 +211,7 @@ pub const LM3S6965: BoardRow = BoardRow {
         steps: 619,
     },
     scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },
+    model_flash: 0,
     emulator: Emulator::Qemu { machine: "lm3s6965evb" },
     flashing: None,
     // There is no flash left for it.
@@ -255,6 +259,8 @@ pub const PICO: BoardRow = BoardRow {
         steps: 1776,
     },
     scene: Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
+    // The feature that would use it is not on for this board yet.
+    model_flash: 0,
     emulator: Emulator::Rp2040js,
     flashing: Some(Flashing {
         chip: "RP2040",

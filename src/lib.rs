@@ -49,6 +49,7 @@ pub mod host_only;
 pub mod index;
 pub mod stage;
 
+pub mod storage;
 pub mod geometry;
 pub mod curve;
 pub mod model;
@@ -62,7 +63,6 @@ pub mod order;
 pub mod step;
 pub mod motion;
 pub mod machine;
-pub mod storage;
 #[cfg(feature = "hpgl")]
 pub mod hpgl;
 pub mod protocol;

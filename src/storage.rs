@@ -22,6 +22,8 @@
 //!
 //! How far the work that a state describes has come can be kept beside it, in a [`Log`].
 
+#[cfg(feature = "tiles")]
+pub mod area;
 mod log;
 
 pub use log::{Log, NOTE_BYTES, Noted};
@@ -131,6 +133,7 @@ impl Slots {
 
     /// Returns which slot holds the latest state, 0 or 1, and the checksum in its header, by which
     /// it is told from other states. `None` if there is no state.
+    #[inline(never)] // It is called in several places, and seldom.
     pub fn identify<F: ReadNorFlash>(self, flash: &mut F) -> Option<(usize, u32)> {
         let valid = self.find(flash)?;
         Some((valid.slot as usize, valid.sum))

@@ -2,10 +2,10 @@
 //!
 //! What fits in the plotter's memory is sent as a model, and the plotter computes the drawing. What
 //! does not fit is computed here by the same library, and its strokes are sent while they are
-//! drawn.
+//! drawn. If the user wishes, the plotter computes that, too: a solid goes to its flash.
 
 use crate::error::Error;
-use crate::preview::InMemory;
+use crate::preview::{InMemory, ModelSize};
 use crate::table::BoardRow;
 use clap::ValueEnum;
 use penup::machine::Settings;
@@ -32,6 +32,24 @@ pub struct Capacity {
     pub vertices: usize,
     /// The number of corners of faces and ends of bars.
     pub corners: usize,
+    /// The number of bytes of flash for a solid that is larger; 0 if there is none.
+    pub flash: usize,
+}
+
+impl Capacity {
+    /// The capacity of a board of the table.
+    pub fn of(board: &BoardRow) -> Self {
+        let BoardRow { memory, model_flash, .. } = board;
+        let flash = usize::try_from(*model_flash).unwrap_or(0);
+        Self { vertices: memory.vertices, corners: memory.corners, flash }
+    }
+
+    /// Whether a model of this size fits in flash: 12 bytes for a vertex and 3 for a corner, in
+    /// whole pages of 256.
+    fn holds_in_flash(self, size: &ModelSize) -> bool {
+        let pages = (12 * size.vertices).div_ceil(256) + (3 * size.corners).div_ceil(256);
+        size.curves == 0 && pages < self.flash / 256
+    }
 }
 
 /// What is known of a plotter before a drawing is sent to it.
@@ -43,6 +61,8 @@ pub struct Known {
     pub board: Option<&'static BoardRow>,
     /// Its settings. `None` if its firmware has settings that this program does not know.
     pub settings: Option<Settings>,
+    /// The number of vertices of the model that its flash keeps; 0 if there is none.
+    pub kept: usize,
 }
 
 /// Where a drawing is computed, and why.
@@ -60,7 +80,7 @@ pub struct Choice {
 /// # Errors
 /// The drawing does not fit the machine, or it does not fit the plotter that is to compute it.
 pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice, Error> {
-    let Capacity { vertices, corners } = known.capacity;
+    let Capacity { vertices, corners, .. } = known.capacity;
     // Settings of a newer firmware are not known here. Then the plotter itself decides.
     let Some(settings) = known.settings else {
         if compute == Compute::Host {
@@ -88,6 +108,13 @@ pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice
         .into_iter()
         .find(|(_, count, limit)| count > limit);
     if let Some((what, count, limit)) = is_too_large {
+        if compute == Compute::Board && known.capacity.holds_in_flash(&size) && !plotter.is_plan() {
+            let reason = format!(
+                "the drawing has {count} {what}, and the board's memory takes {limit}: it goes to \
+                 the board's flash, and is computed and drawn part by part"
+            );
+            return Ok(Choice { host: None, totals, reason: Some(reason) });
+        }
         if compute == Compute::Board {
             return Err(Error::TooLarge { what, count, limit });
         }

@@ -80,11 +80,11 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
     let mut board = machines::emulate(args.board)?;
     let moving = MovingPlotter::new();
     drop(booting);
-    let memory = args.board.memory;
     let known = Known {
-        capacity: Capacity { vertices: memory.vertices, corners: memory.corners },
+        capacity: Capacity::of(args.board),
         board: Some(args.board),
         settings: Some(machine::Settings::default()),
+        kept: 0,
     };
     let plot = Plot { args, source: &source, file: &file, quiet };
     let drawn =
@@ -131,6 +131,12 @@ impl Plot<'_> {
         let job = &self.source.job;
         let compute = if self.args.from > 0 { Compute::Host } else { self.args.compute };
         let choice = compute::choose(known, job, compute)?;
+        if known.kept > 0 && choice.host.is_none() {
+            self.note(&[format!(
+                "the plotter's flash keeps a model of {} vertices, which this drawing replaces",
+                known.kept
+            )]);
+        }
         let notes = [choice.totals].into_iter().filter(|totals| !totals.is_empty());
         self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
         let passes = self.args.passes.multipass;

@@ -132,6 +132,11 @@ impl<I: Index> InMemory<I> {
         }
     }
 
+    /// Whether the model is a plan: it has only bars and curves, at one height.
+    pub fn is_plan(&self) -> bool {
+        self.plotter.model().is_plan()
+    }
+
     /// Computes the drawing of the model that was sent, as lines that a plotter draws while they
     /// come, without its first `from` strokes, and the report on all of it. More work is spent on
     /// the order than by a plotter, because a computer is faster.

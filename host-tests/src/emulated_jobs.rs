@@ -2,6 +2,7 @@
 
 use crate::whole_jobs::{Bench, job_lines, machine_events};
 use penup::board_table::{BoardRow, LM3S6965, PICO};
+use penup::boards::host::CutArea;
 use penup::motion::Block;
 use penup::plotter::{Memory, MemorySlices};
 use penup_client::emulator::{self, EmulatedBoard, Machine, MachineEventKind};
@@ -29,6 +30,9 @@ macro_rules! memory_of {
 pub fn bench_like(board: &'static BoardRow) -> Bench {
     let memory: MemorySlices = if board == &PICO { memory_of!(PICO) } else { memory_of!(LM3S6965) };
     let mut bench = Bench::with_queue(memory, board.memory.steps);
+    if board.model_flash > 0 {
+        bench.board.set_model_flash(Some(CutArea::new(board.model_flash as usize)));
+    }
     bench.heard();
     Bench { plotter: bench.plotter.with_early_ink(board.early_ink), ..bench }
 }

@@ -4,8 +4,12 @@
 //! Time passes only in [`Board::wait`] and [`HostBoard::pass`], and while bytes are sent at a set
 //! baud rate. So a run gives the same result every time.
 
+#[cfg(feature = "tiles")]
+mod area;
 mod flash;
 
+#[cfg(feature = "tiles")]
+pub use area::CutArea;
 pub use flash::{Cut, CutFlash};
 
 use crate::index::Index;
@@ -18,6 +22,8 @@ use crate::plotter::{
 };
 use crate::protocol::{LineReader, RealTime, Sorter};
 use crate::storage::Noted;
+#[cfg(feature = "tiles")]
+use crate::storage::area::{Area, AreaFlash};
 use core::convert::Infallible;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use std::boxed::Box;
@@ -318,6 +324,9 @@ pub struct HostBoard<'q> {
     work_ticks: u64,
     /// Which step pins are inverted, as a mask, and whether the enable pin is.
     inverted: (u8, bool),
+    /// The flash for a model that is too large for the memory, if the board has it.
+    #[cfg(feature = "tiles")]
+    model_flash: Option<CutArea>,
 }
 
 impl core::fmt::Debug for HostBoard<'_> {
@@ -352,6 +361,8 @@ impl<'q> HostBoard<'q> {
             #[cfg(feature = "early-ink")]
             meanwhile: Vec::new(),
             inverted: (0, false),
+            #[cfg(feature = "tiles")]
+            model_flash: None,
         }
     }
 
@@ -382,6 +393,13 @@ impl<'q> HostBoard<'q> {
     #[cfg(feature = "early-ink")]
     pub fn set_work_ticks(&mut self, ticks: u64) {
         self.work_ticks = ticks;
+    }
+
+    /// Gives the board flash for a model that is too large for the memory, or takes it away. Returns
+    /// what it had before.
+    #[cfg(feature = "tiles")]
+    pub fn set_model_flash(&mut self, flash: Option<CutArea>) -> Option<CutArea> {
+        core::mem::replace(&mut self.model_flash, flash)
     }
 
     /// Sets how long it takes, in ticks, to write to the flash while a job is drawn. Without it,
@@ -590,6 +608,16 @@ impl Board for HostBoard<'_> {
 
     fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         self.kept.as_mut()?.progress(notes)
+    }
+
+    /// # Panics
+    /// What writes it does, when something moves.
+    #[cfg(feature = "tiles")]
+    fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
+        let state = self.state;
+        let flash = self.model_flash.as_mut()?;
+        flash.may_erase = state.is_drained();
+        Some((flash.area(), flash))
     }
 
     fn invert_driver_pins(&mut self, steps: u8, enable: bool) {

@@ -239,6 +239,27 @@ impl PageMap {
         PagePoint { x, y }
     }
 
+    /// Returns the least and the greatest coordinates of what lies within `bounds` and on the page,
+    /// in steps, or a step beyond them.
+    #[cfg(feature = "tiles")]
+    pub fn extent(
+        &self,
+        bounds: &Bounds,
+        page: &Page,
+        steps: StepsPerMillimetre,
+    ) -> [PagePoint; 2] {
+        let corner = |[x, y]: [i64; 2], beyond: i32| {
+            let PagePoint { x, y } = self.point(x, y, 1 << Bounds::FRACTION_BITS);
+            let [x, y] = [(x, 0), (y, 1)].map(|(c, axis): (i32, usize)| {
+                // A page has fewer steps than the limit.
+                let side = side_steps(page, steps, axis).clamp(0, PAGE_LIMIT.into()) as i32;
+                (c + beyond).clamp(0, side)
+            });
+            PagePoint { x, y }
+        };
+        [corner(bounds.low, -1), corner(bounds.high, 1)]
+    }
+
     /// Returns the image point (x/w, y/w) in 1/256 steps, for [`crate::curve::Spline::chords`]. As
     /// [`PageMap::point`], but not limited to the page.
     pub fn fine(&self, x: i64, y: i64, w: i64) -> crate::curve::Fine {

@@ -101,6 +101,14 @@ impl Machine<'_> {
         Ok(())
     }
 
+    /// The job that is being drawn is so much larger than was known, because more of it has been
+    /// computed. The time for it is added here.
+    #[cfg(feature = "tiles")]
+    pub fn grow_job(&mut self, more: JobSize) {
+        let milliseconds = super::estimate::even_milliseconds(&self.settings, more);
+        self.progress.grow(JobSize { milliseconds, ..more });
+    }
+
     /// Whether the machine, which has drawn all targets that have come, has to wait for others. It
     /// stands with the pen raised then.
     #[cfg(any(feature = "stream", feature = "early-ink"))]

@@ -40,6 +40,15 @@ impl Progress {
         self.begun_at.strokes = self.begun_at.strokes.wrapping_add(1);
     }
 
+    /// The job is so much larger than was known.
+    #[cfg(feature = "tiles")]
+    pub(super) const fn grow(&mut self, more: JobSize) {
+        self.size.strokes += more.strokes;
+        self.size.drawn += more.drawn;
+        self.size.travelled += more.travelled;
+        self.size.milliseconds += more.milliseconds;
+    }
+
     /// Adds a move that was sent alone and is `length` long, in 2^-18 mm.
     pub(super) fn add_move(&mut self, target: Target, length: u64) {
         if target.ink.is_some() {

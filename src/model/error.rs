@@ -63,6 +63,14 @@ pub enum ModelError {
     /// There are more names than pens, or a pen number is not below
     /// [`PEN_LIMIT`](super::PEN_LIMIT).
     TooManyPens,
+    /// The flash has no room for another part of the model.
+    #[cfg(feature = "tiles")]
+    StoreFull {
+        /// The number of vertices that it holds.
+        vertices: usize,
+        /// The number of corners of faces and ends of bars that it holds.
+        corners: usize,
+    },
     /// There is not enough working memory for the edit.
     Scratch(OutOfScratch),
 }

@@ -14,7 +14,11 @@ mod error;
 mod pens;
 mod precision;
 mod store;
+#[cfg(feature = "tiles")]
+mod stored;
 mod undo;
+#[cfg(feature = "tiles")]
+mod upload;
 mod vertices;
 
 pub use curves::{Curves, StoredCurve};
@@ -22,9 +26,14 @@ pub use edit::{Change, Edit, ElementKind, Numbers};
 pub use elements::{Corner, Element, Elements};
 pub use error::ModelError;
 pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
+#[cfg(feature = "tiles")]
+pub use stored::StoredModel;
+#[cfg(feature = "tiles")]
+pub use upload::{Upload, UploadError};
 
 use crate::array::MapEach;
 use crate::fixed::Decimal;
+use crate::geometry::Precision;
 use crate::index::Index;
 use bytemuck::{Pod, Zeroable};
 use curves::CurveList;
@@ -107,6 +116,15 @@ impl<'m, I: Index> Model<'m, I> {
             curves: CurveList::default(),
             pens: PenBook::default(),
         }
+    }
+
+    /// The memory for vertices, which others may use while the model is empty. It is empty if the
+    /// model is not.
+    #[cfg(feature = "tiles")]
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    pub fn spare_words(&mut self) -> &mut [u64] {
+        let (_, words, _) = bytemuck::pod_align_to_mut(self.vertices.spare());
+        words
     }
 
     /// Removes all vertices, elements, curves and pens.
@@ -246,28 +264,11 @@ impl<'m, I: Index> Model<'m, I> {
         coordinates: [Decimal; 3],
         before: BeforeChange<'_, I>,
     ) -> Result<Position, ModelError> {
-        let fraction_bits = (0..=self.fraction_bits)
-            .rev()
-            .find(|bits| {
-                coordinates.iter().all(|coordinate| {
-                    coordinate
-                        .to_binary_truncated(*bits)
-                        .is_ok_and(|value| value.unsigned_abs() <= POSITION_LIMIT as u64)
-                })
-            })
-            .ok_or(ModelError::CoordinateTooLarge)?;
-        let [x, y, z] = coordinates.map_each(|coordinate| {
-            // It is in range, because the search above tried it.
-            coordinate
-                .to_binary_truncated(fraction_bits)
-                .ok()
-                .and_then(|value| i32::try_from(value).ok())
-                .unwrap_or(0)
-        });
+        let (position, fraction_bits) = truncated(coordinates, self.fraction_bits)?;
         before(self);
         self.coarsen(self.fraction_bits - fraction_bits);
         self.rounding.write(&coordinates);
-        Ok(Position { x, y, z })
+        Ok(position)
     }
 
     /// Makes the unit coarser by a factor of 2^`bits`, and converts all vertices to it.
@@ -347,24 +348,7 @@ impl<'m, I: Index> Model<'m, I> {
         numbers: impl Iterator<Item = i32>,
         needed: usize,
     ) -> Result<usize, ModelError> {
-        let vertices = self.vertices.len();
-        let (mut count, mut first, mut last) = (0, None, None);
-        for number in numbers {
-            let vertex = resolve::<I>(number, vertices)
-                .ok_or(ModelError::UnknownVertex { number, vertices })?;
-            if last.replace((vertex, number)).is_some_and(|(before, _)| before == vertex) {
-                return Err(ModelError::RepeatedVertex { number });
-            }
-            first = first.or(Some(vertex));
-            count += 1;
-        }
-        match last {
-            _ if count < needed => Err(ModelError::TooFewCorners { needed }),
-            Some((vertex, number)) if needed > 2 && first == Some(vertex) => {
-                Err(ModelError::RepeatedVertex { number })
-            }
-            _ => Ok(count),
-        }
+        check_numbers::<I>(numbers, needed, self.vertices.len())
     }
 
     /// Returns how many half-words of memory it takes to let elements with this pen follow: none if
@@ -453,6 +437,103 @@ impl<'m, I: Index> Model<'m, I> {
         self.faces == 0
             && self.bars + self.curves.count > 0
             && self.bounds().is_some_and(|(low, high)| low.z == high.z)
+    }
+}
+
+/// Converts coordinates to the finest unit, not finer than 2^-`fraction_bits`, in which they are
+/// within the limit. Returns the number of fraction bits of that unit, too.
+///
+/// # Errors
+/// [`ModelError::CoordinateTooLarge`].
+#[inline(always)] // On a board with little flash it has one caller.
+fn truncated(coordinates: [Decimal; 3], fraction_bits: u32) -> Result<(Position, u32), ModelError> {
+    let fraction_bits = (0..=fraction_bits)
+        .rev()
+        .find(|bits| {
+            coordinates.iter().all(|coordinate| {
+                coordinate
+                    .to_binary_truncated(*bits)
+                    .is_ok_and(|value| value.unsigned_abs() <= POSITION_LIMIT as u64)
+            })
+        })
+        .ok_or(ModelError::CoordinateTooLarge)?;
+    let [x, y, z] = coordinates.map_each(|coordinate| {
+        // It is in range, because the search above tried it.
+        coordinate
+            .to_binary_truncated(fraction_bits)
+            .ok()
+            .and_then(|value| i32::try_from(value).ok())
+            .unwrap_or(0)
+    });
+    Ok((Position { x, y, z }, fraction_bits))
+}
+
+/// Returns how many numbers there are, if each names one of so many vertices and differs from the
+/// one before. Where three are `needed`, for a face, the last must also differ from the first.
+#[inline(always)] // On a board with little flash it has one caller.
+fn check_numbers<I: Index>(
+    numbers: impl Iterator<Item = i32>,
+    needed: usize,
+    vertices: usize,
+) -> Result<usize, ModelError> {
+    let (mut count, mut first, mut last) = (0, None, None);
+    for number in numbers {
+        let vertex =
+            resolve::<I>(number, vertices).ok_or(ModelError::UnknownVertex { number, vertices })?;
+        if last.replace((vertex, number)).is_some_and(|(before, _)| before == vertex) {
+            return Err(ModelError::RepeatedVertex { number });
+        }
+        first = first.or(Some(vertex));
+        count += 1;
+    }
+    match last {
+        _ if count < needed => Err(ModelError::TooFewCorners { needed }),
+        Some((vertex, number)) if needed > 2 && first == Some(vertex) => {
+            Err(ModelError::RepeatedVertex { number })
+        }
+        _ => Ok(count),
+    }
+}
+
+/// What a camera must know of a model.
+pub trait Positions {
+    /// The number of fraction bits, 0 to 30: the unit of every coordinate is 2^-this.
+    fn fraction_bits(&self) -> u32;
+
+    /// The smallest box around all vertices, or `None` if there are none.
+    fn bounds(&self) -> Option<(Position, Position)>;
+
+    /// The positions of all vertices, in the order in which they were sent.
+    fn positions(&self) -> impl Iterator<Item = Position>;
+
+    /// The error bound of each coordinate, in the model's unit.
+    fn precision(&self) -> Precision;
+
+    /// The precision when the user states the error bound, as `chosen` in the model's own
+    /// coordinates. Zero means that the coordinates are exact.
+    fn chosen_precision(&self, chosen: Decimal) -> Precision {
+        let known = self.precision();
+        let units = chosen.to_binary(self.fraction_bits()).unwrap_or(i64::MAX);
+        let written = u32::try_from(units).unwrap_or(u32::MAX).min(1 << FINEST_FRACTION_BITS);
+        Precision { written: written.max(known.unit), unit: known.unit }
+    }
+}
+
+impl<I: Index> Positions for Model<'_, I> {
+    fn fraction_bits(&self) -> u32 {
+        self.fraction_bits
+    }
+
+    fn bounds(&self) -> Option<(Position, Position)> {
+        Model::bounds(self)
+    }
+
+    fn positions(&self) -> impl Iterator<Item = Position> {
+        self.vertices.iter().copied()
+    }
+
+    fn precision(&self) -> Precision {
+        Model::precision(self)
     }
 }
 

@@ -36,7 +36,7 @@ impl Rounding {
     }
 
     /// Returns the error bound of each coordinate, in units of 2^-`fraction_bits`.
-    fn precision(&self, fraction_bits: u32) -> Precision {
+    pub(super) fn precision(&self, fraction_bits: u32) -> Precision {
         let unit = u32::from(self.decimals > 0);
         let decimals = u32::from(self.decimals);
         let half = match 10u64.checked_pow(decimals) {
@@ -111,15 +111,6 @@ impl<I: Index> Model<'_, I> {
     /// ```
     pub fn precision(&self) -> Precision {
         self.rounding.precision(self.fraction_bits)
-    }
-
-    /// Returns the precision when the user states the error bound, as `chosen` in the model's own
-    /// coordinates. Zero means that the coordinates are exact.
-    pub fn chosen_precision(&self, chosen: Decimal) -> Precision {
-        let known = self.precision();
-        let units = chosen.to_binary(self.fraction_bits).unwrap_or(i64::MAX);
-        let written = u32::try_from(units).unwrap_or(u32::MAX).min(1 << FINEST_FRACTION_BITS);
-        Precision { written: written.max(known.unit), unit: known.unit }
     }
 }
 

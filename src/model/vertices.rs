@@ -22,6 +22,12 @@ impl<'m> Vertices<'m> {
         self.memory.len()
     }
 
+    /// Returns all memory if no position is in it, else none.
+    #[cfg(feature = "tiles")]
+    pub(super) fn spare(&mut self) -> &mut [Position] {
+        if self.count == 0 { self.memory } else { &mut [] }
+    }
+
     /// Adds a position at the end. Returns `None`, and changes nothing, if there is no room.
     pub(super) fn push(&mut self, position: Position) -> Option<()> {
         *self.memory.get_mut(self.count)? = position;

@@ -7,6 +7,8 @@ use crate::machine::Contacts;
 use crate::motion::EventQueue;
 use crate::protocol::RealTime;
 use crate::storage::Noted;
+#[cfg(feature = "tiles")]
+use crate::storage::area::{Area, AreaFlash};
 
 /// A board: its serial ports, and the interrupt that turns step events into pin levels.
 pub trait Board {
@@ -160,6 +162,16 @@ pub trait Board {
     /// points within strokes are passed; `None` if no drawing of that job has begun.
     fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
         let _ = notes;
+        None
+    }
+    /// Begins to execute the step events of the queue, as [`Board::wait`] does, and does not sleep.
+    /// Called while the main loop computes.
+    #[cfg(feature = "tiles")]
+    fn start_steps(&mut self) {}
+    /// The flash in which a model is kept that is too large for the memory, and what writes it;
+    /// `None` if the board has none.
+    #[cfg(feature = "tiles")]
+    fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         None
     }
     /// Inverts the step pins of the motors in the mask, and the enable pin if `enable`, as `$2` and

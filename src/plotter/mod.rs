@@ -29,6 +29,8 @@ mod report;
 mod resume;
 #[cfg(feature = "convex")]
 mod solid;
+#[cfg(feature = "tiles")]
+mod stored;
 mod stream;
 #[cfg(feature = "stream")]
 mod streamed;
@@ -180,6 +182,12 @@ struct Inner<'m, I> {
     /// How far the strokes of a job have come that are sent while they are drawn.
     #[cfg(feature = "stream")]
     streamed: streamed::Streamed,
+    /// What the flash for models holds.
+    #[cfg(feature = "tiles")]
+    large: stored::Large,
+    /// How far the drawing of a model in flash has come.
+    #[cfg(feature = "tiles")]
+    parts: stored::Parts<I>,
     /// The modes that lines of G-code have set.
     program: Program,
     /// What stays when a program ends.
@@ -246,6 +254,10 @@ impl<'m, I: Index> Plotter<'m, I> {
                 has_early_ink: false,
                 #[cfg(feature = "early-ink")]
                 pending: None,
+                #[cfg(feature = "tiles")]
+                large: stored::Large::default(),
+                #[cfg(feature = "tiles")]
+                parts: stored::Parts::default(),
                 program: Program::default(),
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
@@ -280,7 +292,15 @@ impl<'m, I: Index> Plotter<'m, I> {
         #[cfg(feature = "resume")]
         self.inner.report_held(None, board);
         self.inner.resumption.report(State::Idle, board);
+        #[cfg(feature = "tiles")]
+        self.inner.find_stored(board);
         self.inner.run_startup_lines(board);
+    }
+
+    /// Takes what the board has kept, and greets the user, as after every reset.
+    #[cfg(any(test, feature = "host"))]
+    pub fn power_up<B: Board>(&mut self, board: &mut B) {
+        self.begin(board);
     }
 
     /// Returns the same plotter without `$undo`. With it, the time in which a model is received
@@ -344,7 +364,13 @@ impl<'m, I: Index> Plotter<'m, I> {
         let waits = self.hpgl.must_wait(waits);
         let waits = waits || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
-        let Some((port, byte)) = byte else { return planned || requests != RealTime::default() };
+        let Some((port, byte)) = byte else {
+            #[cfg(feature = "tiles")]
+            if self.tend_parts(board) {
+                return true;
+            }
+            return planned || requests != RealTime::default();
+        };
         self.inner.busy_at = board.microseconds();
         #[cfg(feature = "hpgl")]
         if self.take_hpgl(port, byte, board) {
@@ -401,6 +427,22 @@ impl<'m, I: Index> Plotter<'m, I> {
             board.show_drive();
         }
         true
+    }
+
+    /// Computes the next part of a drawing that is drawn part by part. Returns whether there was
+    /// one to compute.
+    #[cfg(feature = "tiles")]
+    #[inline(always)] // It is called in every turn of the main loop.
+    fn tend_parts<B: Board>(&mut self, board: &mut B) -> bool {
+        if !self.inner.parts.is_active() {
+            return false;
+        }
+        let tended = self.inner.tend_parts(board);
+        if tended == stored::Tended::Aborted {
+            self.inner.machine.abort();
+            self.reset(board);
+        }
+        tended != stored::Tended::Idle
     }
 
     /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
@@ -522,6 +564,10 @@ impl<I: Index> Inner<'_, I> {
         {
             strokes.streamed = Some(&self.streamed);
         }
+        #[cfg(feature = "tiles")]
+        if self.parts.is_active() {
+            strokes.ring = self.model.spare_words();
+        }
         self.machine.fill(&mut strokes, board.queue());
         self.machine.planned_position() != before
     }
@@ -554,6 +600,10 @@ impl<I: Index> Inner<'_, I> {
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
         let command = Command::parse(line)?;
+        #[cfg(feature = "tiles")]
+        let Some(command) = self.carry_out_in_flash(command, board)? else {
+            return Ok(Next::Nothing);
+        };
         let one_pen = self.options.one_pen;
         let (model, mut undo_copy, _) = self.split();
         let save_copy = &mut |model: &Model<'_, I>| undo_copy.save(model);

@@ -56,6 +56,8 @@ impl<I: Index> Inner<'_, I> {
         let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
         let begun = match drawing {
             _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
+            #[cfg(feature = "tiles")]
+            Drawing::Model if self.is_in_flash() => self.plot_stored(&mut listener),
             #[cfg(feature = "early-ink")]
             Drawing::Model => self.plot_model(&mut listener),
             #[cfg(not(feature = "early-ink"))]
@@ -214,13 +216,13 @@ impl<I: Index> Inner<'_, I> {
 
     /// The units of work that count as one second when the order is improved.
     #[cfg(any(test, feature = "host"))]
-    fn units_per_second(&self) -> u32 {
+    pub(super) fn units_per_second(&self) -> u32 {
         if self.is_thorough { Pace::COMPUTER } else { Pace::BOARD }
     }
 
     /// The units of work that count as one second when the order is improved.
     #[cfg(not(any(test, feature = "host")))]
-    fn units_per_second(&self) -> u32 {
+    pub(super) fn units_per_second(&self) -> u32 {
         Pace::BOARD
     }
 }

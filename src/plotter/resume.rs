@@ -103,7 +103,13 @@ mod with_feature {
         [u32::from(contents.is_some()), model, options]
     }
 
+    /// The word of notes with this index.
+    fn word(notes: &Notes, index: usize) -> u32 {
+        notes.get(index).map_or(0, |word| u32::from_le_bytes(*word))
+    }
+
     /// The notes of a job of so many strokes, with a mark and the three words that tell more of it.
+    #[inline(never)] // It is called in several places, and its loop is unrolled.
     fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
         let [first, second, third] = more;
         let head = [layout, version(), strokes, first, second, third];
@@ -294,13 +300,12 @@ mod with_feature {
 
         /// Checks that what a job depends on is as it was when the job began.
         fn check_notes(&self, notes: &Notes) -> Result<(), CommandError> {
-            let [_, found_version, _, is_known, model, _, settings @ ..] =
-                notes.map(u32::from_le_bytes);
-            if found_version != version() {
+            if word(notes, 1) != version() {
                 return Err(CommandError::OtherVersion);
             }
-            for pair in settings.as_chunks::<2>().0 {
-                let [number, bits] = *pair;
+            let (is_known, model) = (word(notes, 3), word(notes, 4));
+            for at in (HEAD..WORDS).step_by(2) {
+                let (number, bits) = (word(notes, at), word(notes, at + 1));
                 let setting = u16::try_from(number).ok().and_then(Setting::numbered);
                 let before = Value::from_bits(bits.cast_signed());
                 match setting {
@@ -373,13 +378,12 @@ mod with_feature {
             if let Some([drawn, all]) = stopped.filter(is_rest)
                 && let Some((notes, _)) = read(board)
                 && is_streamed(&notes)
-                && let [_, _, _, at_once, found, ..] = notes.map(u32::from_le_bytes)
-                && found == id
+                && word(&notes, 4) == id
             {
                 self.machine.log_strokes(0);
                 self.resumption = Resumption {
                     progress: Some([drawn, all]),
-                    more_at_once: at_once.saturating_sub(1),
+                    more_at_once: word(&notes, 3).saturating_sub(1),
                     drawn_before: drawn,
                     is_lost: false,
                 };
@@ -426,7 +430,7 @@ mod with_feature {
                 return Ok(false);
             };
             self.check_notes(&notes)?;
-            let [_, _, _, _, id, ..] = notes.map(u32::from_le_bytes);
+            let id = word(&notes, 4);
             let is_lost = u8::from(self.resumption.is_lost);
             Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost}]"));
             Ok(true)
@@ -435,13 +439,12 @@ mod with_feature {
 
     /// Whether the notes are those of a job that is sent while it is drawn.
     fn is_streamed(notes: &Notes) -> bool {
-        let [layout, ..] = notes.map(u32::from_le_bytes);
-        layout == STREAMED
+        word(notes, 0) == STREAMED
     }
 
     /// How many strokes of a job with these notes are drawn once so much is noted.
     fn done(notes: &Notes, noted: Noted) -> u32 {
-        let [_, _, strokes, at_once, ..] = notes.map(u32::from_le_bytes);
+        let (strokes, at_once) = (word(notes, 2), word(notes, 3));
         if is_streamed(notes) {
             noted.parts.saturating_mul(at_once).min(strokes)
         } else {
@@ -453,7 +456,7 @@ mod with_feature {
     fn read<B: Board>(board: &mut B) -> Option<(Notes, Noted)> {
         let mut notes: Notes = [[0; 4]; WORDS];
         let (length, noted) = board.progress(notes.as_flattened_mut())?;
-        let [layout, ..] = notes.map(u32::from_le_bytes);
+        let layout = word(&notes, 0);
         let is_known = layout == LAYOUT || layout == STREAMED;
         (length == size_of::<Notes>() && is_known).then_some((notes, noted))
     }
@@ -473,8 +476,7 @@ mod with_feature {
 
     /// The number of strokes of a job, as its notes have it.
     fn strokes(notes: &Notes) -> u32 {
-        let [_, _, strokes, ..] = notes.map(u32::from_le_bytes);
-        strokes
+        word(notes, 2)
     }
 
     /// Tells the user that a job cannot go on after a loss of power.

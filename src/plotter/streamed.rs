@@ -30,6 +30,30 @@ pub(super) struct Streamed {
 }
 
 impl Streamed {
+    /// A job of which it is not known yet how many targets it has.
+    #[cfg(feature = "tiles")]
+    pub(super) fn open_ended() -> Self {
+        let header = StreamHeader { targets: u32::MAX, ..StreamHeader::default() };
+        Self { header, taken: 0, released: 0 }
+    }
+
+    /// The job has no other targets than those that have come.
+    #[cfg(feature = "tiles")]
+    pub(super) fn end_here(&mut self) {
+        self.header.targets = self.taken;
+    }
+
+    /// Takes the next target, for which there is room. The machine may read it.
+    #[cfg(feature = "tiles")]
+    pub(super) fn put(&mut self, ring: &mut [u64], target: StreamedTarget) {
+        let place = (self.taken as usize).checked_rem(ring.len());
+        if let Some(word) = place.and_then(|place| ring.get_mut(place)) {
+            *word = packed(target);
+        }
+        self.taken += 1;
+        self.released = self.taken;
+    }
+
     /// Whether there are targets that have not come yet.
     #[inline(always)] // It is called in every turn of the main loop.
     fn is_open(&self) -> bool {
@@ -37,7 +61,7 @@ impl Streamed {
     }
 
     /// The number of targets for which a ring of `length` has room once so many have been `read`.
-    fn room(&self, length: usize, read: usize) -> usize {
+    pub(super) fn room(&self, length: usize, read: usize) -> usize {
         length.saturating_sub((self.taken as usize).saturating_sub(read))
     }
 
@@ -100,6 +124,10 @@ impl<I: Index> Inner<'_, I> {
 
     /// Whether strokes are being sent that the machine draws.
     pub(super) fn is_streamed(&self) -> bool {
+        #[cfg(feature = "tiles")]
+        if self.parts.is_active() {
+            return false;
+        }
         self.streamed.header.targets > 0
             && matches!(self.machine.state(), State::Run | State::Hold { .. })
             && !self.machine.is_streaming()

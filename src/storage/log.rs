@@ -108,6 +108,7 @@ impl Log {
 
     /// Returns the number of bits that are clear, from the first one on. A flash that fails ends
     /// the count.
+    #[inline(never)] // It is called seldom.
     fn count<F: ReadNorFlash>(self, flash: &mut F) -> u32 {
         let mut count = 0;
         let mut piece = [0; PIECE_BYTES];
@@ -128,6 +129,7 @@ impl Log {
 
     /// Returns the number of bits that are clear, from the last one back. A flash that fails ends
     /// the count.
+    #[inline(never)] // It is called seldom.
     fn count_points<F: ReadNorFlash>(self, flash: &mut F) -> u32 {
         let mut count = 0;
         let mut piece = [0; PIECE_BYTES];

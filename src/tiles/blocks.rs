@@ -3,7 +3,7 @@
 use super::outline::Outline;
 use super::page::{GridPoint, Rectangle, Survey};
 use super::{ModelSource, Sight};
-use crate::stage::{Cancel, Scratch};
+use crate::stage::{Cancel, Scratch, items};
 use crate::visibility::VisibilityError;
 use bytemuck::{Pod, Zeroable};
 
@@ -40,6 +40,26 @@ impl Block {
 /// The page is divided into so many rows and columns to count the elements on it.
 const DIVISIONS: u16 = 16;
 
+/// The number of parts that this makes.
+const PARTS: usize = (DIVISIONS * DIVISIONS) as usize;
+
+/// How the index of a model lies in memory: the blocks, and the counts behind them.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PausedBlocks {
+    /// The number of blocks.
+    count: usize,
+    /// The number of corners of a block.
+    length: usize,
+}
+
+impl PausedBlocks {
+    /// The number of words of memory.
+    pub fn words(self) -> usize {
+        let bytes = Scratch::bytes_for::<Block>(self.count) + Scratch::bytes_for::<u32>(PARTS);
+        bytes / size_of::<u64>()
+    }
+}
+
 /// The index of a model.
 #[derive(Debug)]
 pub(super) struct Blocks<'t> {
@@ -67,7 +87,7 @@ impl<'t> Blocks<'t> {
         let most = (scratch.available_bytes() / (SHARE * size_of::<Block>())).max(1);
         let length = corners.div_ceil(most).max(FEWEST_CORNERS);
         let blocks: &mut [Block] = scratch.take(corners.div_ceil(length))?;
-        let counts: &mut [u32] = scratch.take(usize::from(DIVISIONS * DIVISIONS))?;
+        let counts: &mut [u32] = scratch.take(PARTS)?;
         let mut first = 0;
         for (number, block) in blocks.iter_mut().enumerate() {
             let mut all = Rectangle::NONE;
@@ -84,6 +104,19 @@ impl<'t> Blocks<'t> {
             *block = Block::around(all);
         }
         Ok(Self { blocks, counts, length })
+    }
+
+    /// Returns how the index lies in memory.
+    pub fn pause(&self) -> PausedBlocks {
+        PausedBlocks { count: self.blocks.len(), length: self.length }
+    }
+
+    /// Finds the index again, which lies at the front of the memory in which it was made.
+    pub fn go_on(paused: PausedBlocks, memory: &'t [u64]) -> Option<Self> {
+        let PausedBlocks { count, length } = paused;
+        let blocks = items(memory, count)?;
+        let behind = memory.get(Scratch::bytes_for::<Block>(count) / size_of::<u64>()..)?;
+        Some(Self { blocks, counts: items(behind, PARTS)?, length })
     }
 
     /// Returns a number of elements that have their lower left corner in a rectangle. There may be

@@ -17,6 +17,7 @@
 //! index says which parts of it lie where on the page.
 //!
 //! # Memory
+//! A search can be paused between two tiles ([`Tiles::pause`]); only its index then stays in memory.
 //! A sixteenth of the memory at most is the index of the blocks; another KiB counts the elements on
 //! each part of the page. A small scene takes 8 bytes for each element, 32 for each vertex (20 if
 //! no positions are known), 2 for each corner, and what the search takes. The fewest elements for
@@ -40,14 +41,14 @@ use crate::index::Index;
 use crate::model::{Corner, Position};
 use crate::stage::{Cancel, Scratch};
 use crate::visibility::{Options, StretchSink, VisibilityError, YieldCounter};
-use blocks::Blocks;
+use blocks::{Blocks, PausedBlocks};
 use load::Reach;
 use outline::Outline;
 use owner::OfTile;
 use page::{Rectangle, Tile};
 
 pub use page::Survey;
-pub use source::Projected;
+pub use source::{Projected, ProjectedStored};
 
 /// A model as it is read again and again: its corners, and its vertices as a camera sees them.
 pub trait ModelSource {
@@ -111,6 +112,46 @@ pub struct Tiles<'t, S> {
     next: Option<Tile>,
 }
 
+/// A search between two tiles. Its index lies in memory that others must not change.
+#[derive(Debug, Clone, Copy)]
+pub struct PausedTiles {
+    /// What is known of all elements.
+    survey: Survey,
+    /// How the index of the blocks lies in memory.
+    blocks: PausedBlocks,
+    /// The tile that comes next.
+    next: Option<Tile>,
+}
+
+impl PausedTiles {
+    /// The number of words at the front of the memory that the index takes.
+    pub fn index_words(&self) -> usize {
+        self.blocks.words()
+    }
+
+    /// The number of faces that are left out because they have no area.
+    pub fn degenerate_faces(&self) -> u32 {
+        self.survey.degenerate_faces
+    }
+
+    /// Whether there is no tile left.
+    pub fn is_over(&self) -> bool {
+        self.next.is_none()
+    }
+
+    /// Begins anew with the first tile.
+    pub fn restart(&mut self) {
+        self.next = Some(Tile::FIRST);
+    }
+
+    /// Divides the tile that comes next. Returns whether that is possible.
+    pub fn divide(&mut self) -> bool {
+        let divided = self.next.and_then(Tile::divided);
+        self.next = divided.or(self.next);
+        divided.is_some()
+    }
+}
+
 /// Finds the stretches of every edge, every bar and every seam of a model and hands them to `sink`.
 /// They are those of [`crate::visibility::find_stretches`], in another order. Where the near plane
 /// cuts an edge, the vertex there has the number [`Index::NONE`]; of several vertices at one
@@ -160,10 +201,55 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         Ok(Some(Self { source, sight, options, survey, blocks, next: Some(Tile::FIRST) }))
     }
 
+    /// Ends for now, so that the memory can be used for other things. The index, which lies at the
+    /// front of the memory that was given to [`Tiles::new`], must stay as it is.
+    pub fn pause(self) -> PausedTiles {
+        let Self { survey, blocks, next, .. } = self;
+        PausedTiles { survey, blocks: blocks.pause(), next }
+    }
+
+    /// Goes on with a search, with the same model and options. `index` is the memory that was given
+    /// to [`Tiles::new`], or the front of it. Returns `None` if it is shorter than the index.
+    pub fn go_on(
+        source: &'t S,
+        sight: Sight,
+        options: Options,
+        paused: PausedTiles,
+        index: &'t [u64],
+    ) -> Option<Self> {
+        let PausedTiles { survey, blocks, next } = paused;
+        let blocks = Blocks::go_on(blocks, index)?;
+        Some(Self { source, sight, options, survey, blocks, next })
+    }
+
+    /// Calls `visit` with each point of each element that has an extent and is seen.
+    ///
+    /// # Errors
+    /// [`VisibilityError::Aborted`].
+    pub fn each_point(
+        &self,
+        cancel: &mut dyn Cancel,
+        visit: &mut dyn FnMut(Vertex),
+    ) -> Result<(), VisibilityError> {
+        let yield_counter = &mut YieldCounter::new(cancel);
+        let mut first = 0;
+        while first < self.source.corner_count() {
+            yield_counter.spend(PLACE)?;
+            let outline = Outline::at(self.source, first);
+            first = outline.end();
+            let is_seen = outline.bounds(&self.sight, &self.survey).is_some();
+            if is_seen && outline.has_extent() {
+                outline.each_point(self.sight.near, visit);
+            }
+        }
+        Ok(())
+    }
+
     /// Finds the stretches of the next tile. Returns whether there was one.
     ///
     /// # Errors
-    /// See [`VisibilityError`].
+    /// See [`VisibilityError`]. If the sink is full, [`PausedTiles::divide`] makes the tile
+    /// smaller, and the search may go on with it; what the sink has received of it is void.
     pub fn follow_next<N: Index>(
         &mut self,
         mut scratch: Scratch<'_>,
@@ -174,6 +260,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         while !self.follow(tile, scratch.reborrow(), cancel, sink)? {
             // Only a tile that can be divided is not followed.
             tile = tile.divided().unwrap_or(tile);
+            self.next = Some(tile);
         }
         self.next = tile.next();
         Ok(true)

@@ -251,9 +251,13 @@ impl Window {
 
 /// A tile: one of the parts into which the page is divided by halving it, again and again, in
 /// turn across and along.
+///
+/// Tiles follow each other as the numbers of a Gray code do, so that the next one mostly lies
+/// beside the one before.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Tile {
-    /// For each division which half, 1 for the right or upper one; the last one is the lowest bit.
+    /// For each division which half, 1 for the one that comes later; the last one is the lowest
+    /// bit.
     path: u32,
     /// The number of divisions.
     depth: u32,
@@ -279,10 +283,12 @@ impl Tile {
     /// Returns the points of the grid that belong to the tile.
     pub fn rectangle(self) -> Rectangle {
         let (mut low, mut bits) = ([0u32; 2], [GRID_BITS; 2]);
+        // In a half that comes later, the halves follow each other in the opposite order.
+        let halves = self.path ^ self.path >> 1;
         for level in 0..self.depth {
             let axis = level as usize % 2;
             bits[axis] -= 1;
-            low[axis] |= (self.path >> (self.depth - 1 - level) & 1) << bits[axis];
+            low[axis] |= (halves >> (self.depth - 1 - level) & 1) << bits[axis];
         }
         let high = [0, 1].map(|axis: usize| low[axis] + ((1u32 << bits[axis]) - 1));
         // All are below 2^16.

@@ -1,9 +1,9 @@
-//! A model in memory, as the tiles read it.
+//! A model in memory or in flash, as the tiles read it.
 
 use super::{ModelSource, Sight};
 use crate::geometry::{Precision, Vertex};
 use crate::index::Index;
-use crate::model::{Corner, Elements, Model, Position};
+use crate::model::{Corner, Elements, Model, Position, StoredModel};
 use crate::view::View;
 
 /// A model in memory, seen through a camera. Its curves are left out.
@@ -25,11 +25,18 @@ impl<'m, I: Index> Projected<'m, I> {
 
     /// Returns how the model is seen if its positions have this precision.
     pub fn sight(&self, precision: Precision) -> Sight {
-        Sight {
-            projection: self.view.projection(),
-            near: self.view.near(),
+        Sight::new(self.view, precision)
+    }
+}
+
+impl Sight {
+    /// Returns how a view shows a model whose positions have this precision.
+    pub fn new(view: &View, precision: Precision) -> Self {
+        Self {
+            projection: view.projection(),
+            near: view.near(),
             precision,
-            error_bound: self.view.error_bound(precision.written),
+            error_bound: view.error_bound(precision.written),
         }
     }
 }
@@ -57,5 +64,43 @@ impl<I: Index> ModelSource for Projected<'_, I> {
 
     fn vertex(&self, vertex: u32) -> Vertex {
         self.view.vertex(self.positions.get(vertex as usize).copied().unwrap_or_default())
+    }
+}
+
+/// A model in flash, seen through a camera.
+#[derive(Debug, Clone, Copy)]
+pub struct ProjectedStored<'m, 'f> {
+    /// The model.
+    model: &'m StoredModel<'f>,
+    /// The camera.
+    view: &'m View,
+}
+
+impl<'m, 'f> ProjectedStored<'m, 'f> {
+    /// Makes the source of a model.
+    pub fn new(model: &'m StoredModel<'f>, view: &'m View) -> Self {
+        Self { model, view }
+    }
+}
+
+impl ModelSource for ProjectedStored<'_, '_> {
+    fn corner_count(&self) -> usize {
+        self.model.corner_count()
+    }
+
+    fn corner(&self, index: usize) -> Corner<u32> {
+        self.model.corner(index)
+    }
+
+    fn pen(&self, corner: usize) -> u8 {
+        self.model.pen(corner)
+    }
+
+    fn position(&self, vertex: u32) -> Option<Position> {
+        Some(self.model.position(vertex as usize))
+    }
+
+    fn vertex(&self, vertex: u32) -> Vertex {
+        self.view.vertex(self.model.position(vertex as usize))
     }
 }

@@ -6,8 +6,7 @@
 use super::ViewError;
 use crate::fixed::{sin_cos_degrees, square_root};
 use crate::geometry::Projection;
-use crate::index::Index;
-use crate::model::Model;
+use crate::model::{Position, Positions};
 
 /// A point or direction in model space. It is used only to set up the camera.
 pub type Direction = [f64; 3];
@@ -76,8 +75,8 @@ impl Camera {
     /// right, from in front and from above; an oblique view looks from in front. The eye is so far
     /// away that the whole model is well inside the field of view. The camera looks at `at`, or at
     /// the middle of the model if that is `None`. Returns `None` for a model without vertices.
-    pub fn automatic<I: Index>(
-        model: &Model<'_, I>,
+    pub fn automatic(
+        model: &impl Positions,
         lens: Lens,
         at: Option<Direction>,
         up: Option<Direction>,
@@ -92,8 +91,8 @@ impl Camera {
     /// Returns an axonometric view from an azimuth of `azimuth` degrees (0 is along the x axis, -90
     /// is in front) and an elevation of `elevation` degrees above the xy plane. An isometric view
     /// is (-45, 35.264…). Returns `None` for a model without vertices.
-    pub fn axonometric<I: Index>(
-        model: &Model<'_, I>,
+    pub fn axonometric(
+        model: &impl Positions,
         azimuth: f64,
         elevation: f64,
         at: Option<Direction>,
@@ -108,8 +107,8 @@ impl Camera {
     /// Returns Harrison's view, along the z axis of the turned model (see [`Pose::Turned`]). It
     /// looks from `eye`, or, if that is `None`, from so far away that the whole model is well
     /// inside the field of view. Returns `None` for a model without vertices.
-    pub fn turned<I: Index>(
-        model: &Model<'_, I>,
+    pub fn turned(
+        model: &impl Positions,
         lens: Lens,
         angles: [f64; 3],
         eye: Option<Direction>,
@@ -123,8 +122,8 @@ impl Camera {
 
     /// Returns the camera that looks from the direction `from` at `at` or at the middle of the
     /// model.
-    fn from_direction<I: Index>(
-        model: &Model<'_, I>,
+    fn from_direction(
+        model: &impl Positions,
         from: Direction,
         lens: Lens,
         at: Option<Direction>,
@@ -146,20 +145,26 @@ const EYE_DISTANCE: f64 = 3.5;
 ///
 /// The radius is used only to place the automatic eye, so a square root of 24 bits that is some 5 %
 /// off is accurate enough.
-pub(super) fn middle_and_radius<I: Index>(model: &Model<'_, I>) -> Option<(Direction, f64)> {
-    let (low, high) = model.bounds()?;
-    let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
+pub(super) fn middle_and_radius(model: &impl Positions) -> Option<(Direction, f64)> {
+    Some(middle_and_radius_of(model.bounds()?, model.fraction_bits()))
+}
+
+/// The same of a model with this box around it.
+#[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
+#[cfg_attr(not(feature = "tiles"), inline(always))]
+fn middle_and_radius_of((low, high): (Position, Position), fraction_bits: u32) -> (Direction, f64) {
+    let unit = libm::ldexp(1.0, -(fraction_bits as i32));
     let (low, high) = (low.coordinates().map(f64::from), high.coordinates().map(f64::from));
     let middle = [0, 1, 2].map(|axis| (low[axis] + high[axis]) / 2.0 * unit);
     let largest = [0, 1, 2].map(|axis| (high[axis] - low[axis]) / 2.0 * unit);
     let size = largest_component(largest);
     if size == 0.0 {
-        return Some((middle, 1.0));
+        return (middle, 1.0);
     }
     let squares =
         largest.iter().map(|half| to_single(half / size)).map(|half| to_single(half * half));
     let sum = squares.fold(0.0, |sum, square| to_single(sum + square));
-    Some((middle, size * estimated_root(sum)))
+    (middle, size * estimated_root(sum))
 }
 
 /// Rounds to the nearest number with the 24 bits of a single-precision float, for 0 and numbers

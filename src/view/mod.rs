@@ -31,7 +31,7 @@ use crate::array::MapEach;
 use crate::fixed::square_root;
 use crate::geometry::{COORDINATE_LIMIT, Projection, Vertex};
 use crate::index::Index;
-use crate::model::{Model, Position};
+use crate::model::{Model, Position, Positions};
 use crate::stage::{Aborted, Cancel};
 use camera::{Axes, dot, largest_component};
 
@@ -136,12 +136,24 @@ impl View {
     /// See [`ViewError`].
     // Not inlined, so that its variables take no stack while the rest of a job is computed.
     #[inline(never)]
-    pub fn new<I: Index>(camera: &Camera, model: &Model<'_, I>) -> Result<Self, ViewError> {
-        let Axes { directions, origin } = Axes::new(camera)?;
-        let fraction_bits = model.fraction_bits();
+    pub fn new(camera: &Camera, model: &impl Positions) -> Result<Self, ViewError> {
+        let axes = Axes::new(camera)?;
+        let extents = extents(&axes.directions, model).ok_or(ViewError::NothingToSee)?;
+        Self::of_extents(camera, axes, extents, reach(model), model.fraction_bits())
+    }
+
+    /// Computes the view of a model that extends so far along the axes of the camera. `reach` is
+    /// what the function of this name returns.
+    #[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
+    #[cfg_attr(not(feature = "tiles"), inline(always))]
+    fn of_extents(
+        camera: &Camera,
+        Axes { directions, origin }: Axes,
+        extents: [(f64, f64); 3],
+        reach: f64,
+        fraction_bits: u32,
+    ) -> Result<Self, ViewError> {
         let projection = camera.lens.projection();
-        let extents = extents(&directions, model).ok_or(ViewError::NothingToSee)?;
-        let reach = reach(model);
         let limit = f64::from(COORDINATE_LIMIT - 1);
         let shift = directions.map_each(|axis| -dot(axis, origin));
         let width = [0, 1]
@@ -233,10 +245,10 @@ impl View {
     ///
     /// # Errors
     /// Returns [`ViewError::BehindEye`] with the first vertex that is not.
-    pub fn refuse_behind<I: Index>(&self, model: &Model<'_, I>) -> Result<(), ViewError> {
+    pub fn refuse_behind(&self, model: &impl Positions) -> Result<(), ViewError> {
         let near = self.near.unwrap_or(i32::MIN);
-        let is_behind = |position: &Position| self.vertex(*position).z < near;
-        match model.vertices().iter().position(is_behind) {
+        let is_behind = |position: Position| self.vertex(position).z < near;
+        match model.positions().position(is_behind) {
             Some(vertex) => Err(ViewError::BehindEye { vertex: vertex + 1 }),
             None => Ok(()),
         }
@@ -275,7 +287,7 @@ fn as_ratio(value: f64) -> (u32, u32) {
 }
 
 /// Returns an upper bound of |direction · position| for directions of length 1, in model units.
-fn reach<I: Index>(model: &Model<'_, I>) -> f64 {
+fn reach(model: &impl Positions) -> f64 {
     let largest = model.bounds().map_or(0, |(low, high)| {
         let corners = [low.coordinates(), high.coordinates()];
         corners.iter().flatten().map(|c| c.unsigned_abs()).max().unwrap_or(0)
@@ -285,21 +297,20 @@ fn reach<I: Index>(model: &Model<'_, I>) -> f64 {
 }
 
 /// Returns, for each axis, the least and the greatest value of axis · position over all vertices.
-fn extents<I: Index>(axes: &[Direction; 3], model: &Model<'_, I>) -> Option<[(f64, f64); 3]> {
+fn extents(axes: &[Direction; 3], model: &impl Positions) -> Option<[(f64, f64); 3]> {
     // The sums use integers, with 30 bits of each direction, so that no vertex needs floating
     // point.
     let fixed_axes = axes.map(|axis| axis.map(|d| libm::round(libm::ldexp(d, 30)) as i64));
-    let along = |axis: &[i64; 3], vertex: &Position| -> i64 {
+    let along = |axis: &[i64; 3], vertex: Position| -> i64 {
         axis.iter().zip(vertex.coordinates()).map(|(d, coordinate)| d * i64::from(coordinate)).sum()
     };
     let unit = libm::ldexp(1.0, -(30 + model.fraction_bits() as i32));
-    model.vertices().first()?;
+    model.positions().next()?;
     Some(fixed_axes.map(|axis| {
-        let (low, high) =
-            model.vertices().iter().fold((i64::MAX, i64::MIN), |(low, high), vertex| {
-                let value = along(&axis, vertex);
-                (low.min(value), high.max(value))
-            });
+        let (low, high) = model.positions().fold((i64::MAX, i64::MIN), |(low, high), vertex| {
+            let value = along(&axis, vertex);
+            (low.min(value), high.max(value))
+        });
         (low as f64 * unit, high as f64 * unit)
     }))
 }

@@ -238,13 +238,39 @@ pub fn find_stretches<I: Index>(
     cancel: &mut dyn Cancel,
     sink: &mut dyn StretchSink<I>,
 ) -> Result<Report, VisibilityError> {
+    find_some(scene, options, scratch, cancel, Owner::default(), sink)
+}
+
+/// Which edges and seams are followed; all of them with `None`.
+#[cfg(feature = "tiles")]
+type Owner<'o, I> = Option<&'o mut dyn Ownership<I>>;
+/// All edges and seams are followed.
+#[cfg(not(feature = "tiles"))]
+type Owner<'o, I> = core::marker::PhantomData<(&'o (), I)>;
+
+/// Finds the stretches of the edges and seams of an owner.
+#[cfg_attr(feature = "tiles", inline(never))] // Both callers share one copy of the code.
+#[cfg_attr(not(feature = "tiles"), inline(always))]
+fn find_some<I: Index>(
+    scene: &Scene<'_, I>,
+    options: Options,
+    scratch: Scratch<'_>,
+    cancel: &mut dyn Cancel,
+    owner: Owner<'_, I>,
+    sink: &mut dyn StretchSink<I>,
+) -> Result<Report, VisibilityError> {
     let mut scratch = scratch; // It lives no longer than the scene.
     let yield_counter = &mut YieldCounter::new(cancel);
     let around = &index(scene, options, &mut scratch, yield_counter)?;
     let faces = around.faces.len();
     let marks = Marks::new(faces, StretchFinder::<I>::least_bytes(faces), &mut scratch)?;
     let grid = &Grid::new(around, scratch, yield_counter)?;
-    let mut search = StretchFinder::new(around, grid, marks, options);
+    #[cfg(feature = "tiles")]
+    let owner: Owner<'_, I> = match owner {
+        Some(owner) => Some(&mut *owner), // It lives no longer than the scene.
+        None => None,
+    };
+    let mut search = StretchFinder::new(around, grid, marks, options, owner);
     search.follow_edges(0..around.outlines.corners.len(), yield_counter, sink)?;
     if options.with_seams {
         search.follow_seams(0..faces, yield_counter, sink)?;

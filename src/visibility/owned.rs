@@ -4,10 +4,7 @@
 //! are followed. So the edges of a larger scene can be shared out among small ones, each of which
 //! has all the faces that matter to its own edges.
 
-use super::grid::Grid;
-use super::search::{Marks, StretchFinder};
-use super::yield_counter::YieldCounter;
-use super::{Options, Scene, StretchSink, VisibilityError, index};
+use super::{Options, Scene, StretchSink, VisibilityError, find_some};
 use crate::geometry::Vertex;
 use crate::index::Index;
 use crate::stage::{Cancel, Scratch};
@@ -39,16 +36,5 @@ pub fn find_owned_stretches<I: Index>(
     owner: &mut dyn Ownership<I>,
     sink: &mut dyn StretchSink<I>,
 ) -> Result<(), VisibilityError> {
-    let mut scratch = scratch; // It lives no longer than the scene.
-    let yield_counter = &mut YieldCounter::new(cancel);
-    let around = &index(scene, options, &mut scratch, yield_counter)?;
-    let faces = around.faces.len();
-    let marks = Marks::new(faces, StretchFinder::<I>::least_bytes(faces), &mut scratch)?;
-    let grid = &Grid::new(around, scratch, yield_counter)?;
-    let mut search = StretchFinder::new(around, grid, marks, options).owned_by(owner);
-    search.follow_edges(0..around.outlines.corners.len(), yield_counter, sink)?;
-    if options.with_seams {
-        search.follow_seams(0..faces, yield_counter, sink)?;
-    }
-    Ok(())
+    find_some(scene, options, scratch, cancel, Some(owner), sink).map(|_| ())
 }

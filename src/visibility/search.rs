@@ -11,14 +11,12 @@ use super::edge_query::EdgeQuery;
 use super::edges::sides;
 use super::face_set::FaceSet;
 use super::grid::{Grid, coarse_depth};
-#[cfg(feature = "tiles")]
-use super::owned::Ownership;
 use super::profile::{EdgeInterval, FEWEST_PIECES, Profile, ProfilePiece, mark};
 use super::raster::Bounds;
 use super::scene_index::SceneIndex;
 use super::seams::seam;
 use super::yield_counter::YieldCounter;
-use super::{Options, Stretch, StretchSink, VisibilityError};
+use super::{Options, Owner, Stretch, StretchSink, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, EdgeParameter, Vertex};
 use crate::index::Index;
@@ -87,7 +85,7 @@ pub struct StretchFinder<'s, I: Index> {
     options: Options,
     /// Which edges and seams are followed; all of them with `None`.
     #[cfg(feature = "tiles")]
-    owner: Option<&'s mut dyn Ownership<I>>,
+    owner: Owner<'s, I>,
 }
 
 impl<'s, I: Index> StretchFinder<'s, I> {
@@ -103,6 +101,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         grid: &'s Grid<'s, I>,
         marks: Marks<'s, I>,
         options: Options,
+        _owner: Owner<'s, I>,
     ) -> Self {
         Self {
             around,
@@ -110,14 +109,8 @@ impl<'s, I: Index> StretchFinder<'s, I> {
             marks,
             options,
             #[cfg(feature = "tiles")]
-            owner: None,
+            owner: _owner,
         }
-    }
-
-    /// Follows only the edges and seams that `owner` says are its own.
-    #[cfg(feature = "tiles")]
-    pub fn owned_by(self, owner: &'s mut dyn Ownership<I>) -> Self {
-        Self { owner: Some(owner), ..self }
     }
 
     /// Whether to follow the edge between two vertices.

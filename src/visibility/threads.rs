@@ -128,7 +128,7 @@ fn search<I: Index>(
     let faces = around.faces.len();
     let mut memory = vec![0; Marks::<I>::most_bytes(faces).div_ceil(size_of::<u64>())];
     let marks = Marks::new(faces, 0, &mut Scratch::new(&mut memory))?;
-    let mut finder = StretchFinder::new(around, grid, marks, options);
+    let mut finder = StretchFinder::new(around, grid, marks, options, super::Owner::default());
     let mut found = Collected(Vec::new());
     let mut stopping = Stopping(stop);
     let yield_counter = &mut YieldCounter::new(&mut stopping);

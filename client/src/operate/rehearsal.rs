@@ -13,16 +13,16 @@ use penup_job::protocol::{BUILD, MODEL, Reply};
 /// # Errors
 /// As [`Sender::stream`].
 pub fn limits(sender: &mut Sender<'_>) -> Result<Known, Error> {
-    let capacity = agreed(sender, |sender| Ok(capacity_in(&sender.ask(MODEL)?)))?;
+    let (capacity, kept) = agreed(sender, |sender| {
+        let replies = sender.ask(MODEL)?;
+        Ok(capacity_in(&replies).map(|capacity| (capacity, kept_in(&replies))))
+    })?;
     let settings = simulated(&read(sender)?).ok();
     // A board whose name is not known, or was damaged, is rehearsed with this computer's numbers.
     let board = sender.ask(BUILD)?.iter().find_map(board_in);
     // A board of the name that was built with other limits is another board.
-    let is_same = |board: &&BoardRow| {
-        let memory = board.memory;
-        capacity == Capacity { vertices: memory.vertices, corners: memory.corners }
-    };
-    Ok(Known { capacity, board: board.filter(is_same), settings })
+    let is_same = |board: &&BoardRow| capacity == Capacity::of(board);
+    Ok(Known { capacity, board: board.filter(is_same), settings, kept })
 }
 
 /// The board in the answer to `$I`: `[VER:1.1h.penup 0.1.0 pico:a text of the user's]`.
@@ -42,5 +42,26 @@ fn capacity_in(replies: &[Reply]) -> Option<Capacity> {
             rest.split_once(" of ")?.1.parse().ok()
         })
     };
-    Some(Capacity { vertices: limit("vertices ")?, corners: limit("corners ")? })
+    let flash = replies.iter().find_map(|reply| {
+        let (before, _) = flash_of(reply)?.split_once(" bytes")?;
+        before.rsplit(' ').next()?.parse().ok()
+    });
+    let flash = flash.unwrap_or(0);
+    Some(Capacity { vertices: limit("vertices ")?, corners: limit("corners ")?, flash })
+}
+
+/// What the answer to `$model` says of the flash for models: `[FLASH:1146880 bytes for a larger
+/// model]`, or `[FLASH:vertices 9, faces 8, bars 0, corners 24 in 1146880 bytes]`.
+fn flash_of(reply: &Reply) -> Option<&str> {
+    let Reply::Other(line) = reply else { return None };
+    line.strip_prefix("[FLASH:")?.strip_suffix(']')
+}
+
+/// The number of vertices of the model that the plotter's flash keeps.
+fn kept_in(replies: &[Reply]) -> usize {
+    let vertices = replies.iter().find_map(|reply| {
+        let (vertices, _) = flash_of(reply)?.strip_prefix("vertices ")?.split_once(',')?;
+        vertices.parse().ok()
+    });
+    vertices.unwrap_or(0)
 }

@@ -1,4 +1,4 @@
-//! The end of the flash, where records survive a loss of power.
+//! The end of the flash, where records, and a model if there is room, survive a loss of power.
 //!
 //! The code runs from the same flash, which cannot be read while it is erased or written. So the
 //! functions of the boot ROM do this work, called from RAM with interrupts masked: 45 ms for a
@@ -12,6 +12,8 @@
 
 use core::fmt::Write;
 use core::ptr;
+#[cfg(feature = "tiles")]
+use core::sync::atomic::AtomicU32;
 
 use embedded_storage::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
@@ -19,6 +21,8 @@ use embedded_storage::nor_flash::{
 use heapless::String;
 use penup::plotter::Layout;
 use penup::storage::PAGE_BYTES;
+#[cfg(feature = "tiles")]
+use penup::storage::area::{Area, AreaFlash, NotWritten};
 use rp2040_hal::rom_data;
 
 use super::registers::{Get, IO_QSPI, Put, SSI};
@@ -26,9 +30,13 @@ use super::{BOOT_2, ROW, critical, emergency, usb};
 
 /// The address at which the flash is mapped to memory, so that it can be read.
 const MAPPED_AT: usize = ROW.flash.start as usize;
-/// The memory map reserves the flash from here on for this module. What lies below, from 640 KiB
-/// on, is to stay free for a stored model.
+/// The memory map reserves the flash from here on for this module: first for a model that is too
+/// large for the memory, if the board's row gives it some.
 const START: u32 = ROW.budget.flash as u32;
+/// Where the records begin. This must not change, because a new version of the firmware finds what
+/// an older one has kept.
+const RECORDS: u32 = START + ROW.model_flash as u32;
+const _: () = assert!(RECORDS == 1760 << 10);
 /// The number of bytes in the flash chip, and so the offset at which it ends.
 const END: u32 = ROW.flash.size as u32;
 /// The unit in which flash is erased.
@@ -36,7 +44,7 @@ const SECTOR_BYTES: usize = 4096;
 /// Room for all of the working memory, with a page before it and less than a sector of figures.
 const JOB_BYTES: u32 = (128 << 10) + SECTOR_BYTES as u32;
 /// Where in the flash each record lies.
-pub const LAYOUT: Layout = Layout::from(START, JOB_BYTES);
+pub const LAYOUT: Layout = Layout::from(RECORDS, JOB_BYTES);
 const _: () = assert!(LAYOUT.end() == END);
 
 /// The flash in which records are kept. Addresses count from its beginning.
@@ -262,3 +270,32 @@ impl NorFlash for Flash {
 }
 
 impl MultiwriteNorFlash for Flash {}
+
+/// The flash for a model, as it is read.
+#[cfg(feature = "tiles")]
+pub fn model_area() -> Area<'static> {
+    const WORDS: usize = (RECORDS - START) as usize / size_of::<AtomicU32>();
+    let address = (MAPPED_AT + START as usize) as *const AtomicU32;
+    // SAFETY: so many words are mapped to flash there, for ever. They change while the flash is
+    // erased or written, which atomic words may; nothing writes them through this slice.
+    Area::new(unsafe { core::slice::from_raw_parts(address, WORDS) })
+}
+
+#[cfg(feature = "tiles")]
+impl AreaFlash for Flash {
+    fn erase_sector(&mut self, at: usize) -> Result<(), NotWritten> {
+        let from = START + at as u32;
+        if from >= RECORDS {
+            return Err(NotWritten);
+        }
+        self.erase(from, from + SECTOR_BYTES as u32).map_err(|Worn| NotWritten)
+    }
+
+    fn write_page(&mut self, at: usize, page: &[u8; PAGE_BYTES]) -> Result<(), NotWritten> {
+        let to = START + at as u32;
+        if to >= RECORDS {
+            return Err(NotWritten);
+        }
+        self.write(to, page).map_err(|Worn| NotWritten)
+    }
+}

@@ -45,6 +45,8 @@ use penup::motion::{Block, EventQueue};
 use penup::plotter::{Board, Kept, Memory, MemorySlices, NotStored, Record, Replies, Stored};
 use penup::protocol::RealTime;
 use penup::storage::Noted;
+#[cfg(feature = "tiles")]
+use penup::storage::area::{Area, AreaFlash};
 use rp2040_hal::clocks::init_clocks_and_plls;
 use rp2040_hal::fugit::ExtU32;
 use rp2040_hal::gpio::Pins;
@@ -207,6 +209,16 @@ impl Board for Pico {
 
     fn step_now(&mut self) {
         self.steps.sync_consumed();
+    }
+
+    #[cfg(feature = "tiles")]
+    fn start_steps(&mut self) {
+        self.steps.start();
+    }
+
+    #[cfg(feature = "tiles")]
+    fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
+        Some((flash::model_area(), &mut self.kept.flash))
     }
 
     fn invert_driver_pins(&mut self, steps: u8, enable: bool) {

@@ -15,6 +15,8 @@ mod unordered;
 
 pub(super) use lines::{Collector, PageSink, move_to_front};
 pub(super) use pipeline::{Found, Pipeline};
+#[cfg(feature = "tiles")]
+pub(super) use scale::fit;
 pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, union};
 pub use strokes::{Cursor, Strokes};
 #[cfg(feature = "early-ink")]
@@ -158,6 +160,30 @@ impl<I: Index> Job<I> {
             degenerate_faces: 0,
             joined_edges: 0,
         })
+    }
+
+    /// The job of a drawing that lies at the front of the working memory, with so many segments in
+    /// the tour behind it.
+    #[cfg(feature = "tiles")]
+    pub(super) fn of(stored: Stored<I>, legs: usize, report: order::Report) -> Self {
+        Self { stored, legs, report, ..Self::default() }
+    }
+
+    /// A job without strokes, from which so many faces were left out.
+    #[cfg(feature = "tiles")]
+    pub(super) fn left_out(degenerate_faces: u32) -> Self {
+        Self { degenerate_faces, ..Self::default() }
+    }
+
+    /// Adds what the ordering of another part of the drawing has achieved.
+    #[cfg(feature = "tiles")]
+    pub(super) fn add_report(&mut self, more: &order::Report) {
+        let report = &mut self.report;
+        report.odd_points += more.odd_points;
+        report.components += more.components;
+        report.lifts += more.lifts;
+        report.pen_down += more.pen_down;
+        report.pen_up += more.pen_up;
     }
 
     /// Gives up the memory of the job. [`Job::report`] remains valid.

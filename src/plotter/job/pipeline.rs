@@ -174,6 +174,7 @@ impl<I: Index> Pipeline<'_, I> {
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn camera_view(&mut self) -> Result<(Camera, View), CommandError> {
         let Self { model, options, cancel, .. } = self;
+        let model = *model;
         cancel.enter(Stage::View);
         let camera = options.camera(model).ok_or(CommandError::NothingToPlot)?;
         cancel.check()?;

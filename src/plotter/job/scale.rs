@@ -72,7 +72,7 @@ pub(super) fn map_with_curves<I: Index>(
 
 /// Fits the view to the page. If the near plane cuts the model, only what lies within 45 degrees of
 /// the line of sight is fitted.
-pub(super) fn fit(
+pub(in crate::plotter) fn fit(
     view: &View,
     is_cut: bool,
     bounds: &Bounds,

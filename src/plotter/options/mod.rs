@@ -17,8 +17,7 @@ use crate::checksum::Crc32;
 use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
 use crate::fixed::{Decimal, Millimetres, sin_cos_degrees};
 use crate::geometry::Precision;
-use crate::index::Index;
-use crate::model::Model;
+use crate::model::Positions;
 use crate::order::{self, Effort, Method, Pace, Shape};
 use crate::protocol::{CommandError, EscapedText, number};
 use crate::view::{Camera, Direction, Pose, View};
@@ -145,7 +144,7 @@ impl PlotOptions {
 
     /// The precision of the coordinates of `model`: as the user has set it, or as derived from the
     /// model.
-    pub fn precision_of<I: Index>(&self, model: &Model<'_, I>) -> Precision {
+    pub fn precision_of(&self, model: &impl Positions) -> Precision {
         match self.precision {
             Some(chosen) => model.chosen_precision(chosen),
             None => model.precision(),
@@ -155,7 +154,7 @@ impl PlotOptions {
     /// The camera for `model`, with automatic choices for all that the user has not set. `None` if
     /// the model has no vertices.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    pub fn camera<I: Index>(&self, model: &Model<'_, I>) -> Option<Camera> {
+    pub fn camera(&self, model: &impl Positions) -> Option<Camera> {
         let lens = match self.projection {
             ProjectionChoice::Axonometric { azimuth, elevation } => {
                 return Camera::axonometric(model, azimuth, elevation, self.at, self.up);

@@ -8,11 +8,16 @@
 
 mod of_blocks;
 mod of_modules;
+#[cfg(feature = "tiles")]
+mod of_stored;
 #[cfg(any(test, feature = "host"))]
 mod samples;
 
 #[cfg(any(test, feature = "host"))]
 pub use samples::{error_entries, error_samples};
+
+#[cfg(feature = "tiles")]
+pub use of_stored::StoredModelError;
 
 use super::BlockError;
 use crate::convex::SolidError;
@@ -98,6 +103,9 @@ pub enum CommandError {
     },
     /// The model refused the change.
     Model(ModelError),
+    /// This is not done with a model that lies in flash.
+    #[cfg(feature = "tiles")]
+    Stored(StoredModelError),
     /// There is nothing to draw.
     NothingToPlot,
     /// The camera cannot show the model.
@@ -336,6 +344,8 @@ impl CommandError {
                 ),
             ),
             Self::Model(error) => explain_model(error, row),
+            #[cfg(feature = "tiles")]
+            Self::Stored(error) => of_stored::explain_stored(*error, row),
             Self::NothingToPlot => explain_view(&ViewError::NothingToSee, row),
             Self::View(error) => explain_view(error, row),
             Self::NoConvexSolids => row(

@@ -85,6 +85,13 @@ pub(super) fn explain_model(refusal: &ModelError, row: Row<'_>) {
                  send $pens=one to draw all with one"
             ),
         ),
+        #[cfg(feature = "tiles")]
+        ModelError::StoreFull { vertices, corners } => row(
+            error(190, "flash for models full"),
+            format_args!(
+                "the flash holds these {vertices} vertices and {corners} corners, and no more"
+            ),
+        ),
         ModelError::Scratch(missing) => explain_missing(missing, row),
     }
 }

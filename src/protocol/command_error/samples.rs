@@ -1,5 +1,7 @@
 //! The errors as a list, for the host: the documents and the client's words are made from it.
 
+#[cfg(feature = "tiles")]
+use super::StoredModelError;
 use super::{CommandError, ErrorEntry};
 use crate::convex::SolidError;
 use crate::curve::CurveError;
@@ -66,6 +68,8 @@ pub fn error_samples() -> Vec<CommandError> {
         NotInTheFont('→'),
         TitleTooLong { limit: 80 },
         Model(ModelError::NoPlane),
+        #[cfg(feature = "tiles")]
+        Stored(StoredModelError::Unchangeable),
         NothingToPlot,
         NoConvexSolids,
         NoHpGl,
@@ -112,7 +116,19 @@ pub fn error_samples() -> Vec<CommandError> {
         UnknownElement { part: ElementKind::Faces, number: 9, count: 8 },
         NoPlane,
         TooManyPens,
+        #[cfg(feature = "tiles")]
+        StoreFull { vertices: 9, corners: 20 },
         Scratch(MISSING),
+    );
+    #[cfg(feature = "tiles")]
+    let stored = every_variant!(StoredModelError:
+        Unchangeable,
+        NoCurves,
+        FacesOnly,
+        Drawing,
+        NotWritten,
+        Damaged,
+        TooDense,
     );
     let block = every_variant!(BlockError:
         Negative(b'F'),
@@ -190,7 +206,10 @@ pub fn error_samples() -> Vec<CommandError> {
         Conflict(LimitsError::StepsPerMillimetre),
         Busy,
     );
-    all.into_iter()
+    let samples = all.into_iter();
+    #[cfg(feature = "tiles")]
+    let samples = samples.chain(stored.map(CommandError::Stored));
+    samples
         .chain(model.map(CommandError::Model))
         .chain(curve.map(|error| CommandError::Model(ModelError::Curve(error))))
         .chain(block.map(CommandError::Block))

@@ -1,0 +1,244 @@
+//! Draws a model in flash: `$plot` prepares it and computes the first part, and the main loop the
+//! others, while the machine draws.
+
+use super::compute::{Computed, next_part, prepare};
+use super::parts::{Part, Search};
+use crate::drawing::PagePoint;
+use crate::fixed::Millimetres;
+use crate::index::Index;
+use crate::machine::{JobSize, Path, State, StrokeEnds};
+use crate::model::StoredModel;
+use crate::order;
+use crate::plotter::listener::Listener;
+use crate::plotter::reply::Reply;
+use crate::plotter::streamed::Streamed;
+use crate::plotter::{
+    BegunJob, Board, Cursor, Inner, Job, REPLY_BYTES, VisibilityMode, report, title,
+};
+use crate::protocol::{CommandError, RealTime, StoredModelError, StreamedTarget};
+use crate::stage::{Aborted, Cancel};
+
+/// How the work on a drawing in parts goes on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::plotter) enum Tended {
+    /// There is nothing to do now.
+    Idle,
+    /// A part has been computed.
+    Busy,
+    /// The user has given the job up.
+    Aborted,
+}
+
+impl<I: Index> Inner<'_, I> {
+    /// Begins to draw the model in flash.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with. Nothing moves then.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn plot_stored<B: Board>(
+        &mut self,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<(), CommandError> {
+        if self.options.see != VisibilityMode::Faces {
+            return Err(StoredModelError::FacesOnly.into());
+        }
+        let steps = self.machine.settings().page_steps();
+        title::check(&self.options, steps)?;
+        let model = self.whole_model(listener.board)?;
+        if model.is_plan() && self.options.shows_plans_flat() {
+            return Err(StoredModelError::FacesOnly.into());
+        }
+        if !model.is_sound(&mut || listener.check())? {
+            return Err(StoredModelError::Damaged.into());
+        }
+        self.copy_words = 0;
+        self.job = Job::default();
+        self.cursor = Cursor::default();
+        self.parts.end();
+        let (mut search, [least, greatest]) =
+            prepare(&model, &self.options, steps, self.words, listener)?;
+        let bounds = beyond([least, greatest], self.machine.stroke_ends(), steps);
+        for point in bounds {
+            self.machine.check_travel(0, point)?;
+        }
+        self.job = Job::left_out(search.tiles.degenerate_faces());
+        if self.machine.state() == State::Check {
+            return Ok(());
+        }
+        let (at, order) = (self.machine.end(), self.order_of_parts(&search));
+        let part = next_part(&model, &mut search, steps, order, self.words, None, listener)?;
+        let part = part.ok_or(CommandError::NothingToPlot)?;
+        self.machine.start_streamed(JobSize::default(), bounds)?;
+        self.parts.is_active = true;
+        self.parts.last.target.point = at;
+        self.streamed = Streamed::open_ended();
+        self.take_part(search, Some(part));
+        self.feed_part();
+        Reply(listener.board).line(format_args!(
+            "[MSG:computed and drawn part by part: $again and $resume do not draw this]"
+        ));
+        Ok(())
+    }
+
+    /// The options of the order of each part.
+    fn order_of_parts(&self, search: &Search) -> order::Options {
+        let settings = self.machine.settings();
+        search.options.order(settings.page_steps(), settings.pace(self.units_per_second()))
+    }
+
+    /// Notes what has been computed.
+    fn take_part(&mut self, search: Search, part: Option<Computed<I>>) {
+        self.parts.search = part.is_some().then_some(search);
+        if part.is_none() {
+            self.streamed.end_here();
+        }
+        if let Some((job, _)) = &part {
+            self.job.add_report(job.report());
+        }
+        self.parts.part = part.map(|(job, begin)| {
+            let ends = self.machine.stroke_ends();
+            let words = self.words.get_mut(begin..).unwrap_or(&mut []);
+            let mut cursor = Cursor::default();
+            let mut strokes = job.strokes(words, &mut cursor, ends);
+            let left = core::iter::from_fn(|| strokes.next_target()).count();
+            Part { job, cursor: Cursor::default(), left, begin }
+        });
+    }
+
+    /// Hands the strokes of the computed part to the machine, as far as there is room.
+    fn feed_part(&mut self) {
+        let ends = self.machine.stroke_ends();
+        let (words, machine) = (&mut *self.words, &self.machine);
+        let size = self.parts.feed(
+            (&mut self.streamed, self.cursor.leg),
+            self.model.spare_words(),
+            |part| {
+                let words = words.get_mut(part.begin..).unwrap_or(&mut []);
+                let mut strokes = part.job.strokes(words, &mut part.cursor, ends);
+                Some(StreamedTarget { target: strokes.next_target()?, pen: strokes.pen() })
+            },
+            |ends| machine.length(ends),
+        );
+        self.machine.grow_job(size);
+    }
+
+    /// Computes the next part of a drawing, or hands what is computed to the machine.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    pub(in crate::plotter) fn tend_parts<B: Board>(&mut self, board: &mut B) -> Tended {
+        if !matches!(self.machine.state(), State::Run | State::Hold { .. }) {
+            self.end_parts();
+            return Tended::Idle;
+        }
+        if self.parts.part.is_some() {
+            self.feed_part();
+            return Tended::Idle;
+        }
+        let Some(mut search) = self.parts.search else { return Tended::Idle };
+        let model = board.model_flash().and_then(|(area, _)| StoredModel::new(area));
+        let Some(model) = model else {
+            self.give_up(StoredModelError::Damaged.into(), board);
+            return Tended::Busy;
+        };
+        let steps = self.machine.settings().page_steps();
+        let order = self.order_of_parts(&search);
+        let at = Some(self.parts.last.target.point);
+        // The machine goes on meanwhile, and does not use this memory.
+        let words = core::mem::take(&mut self.words);
+        let mut server = Server { inner: self, board, is_status_due: false, ends: None };
+        let part = next_part(&model, &mut search, steps, order, words, at, &mut server);
+        let ends = server.ends;
+        self.words = words;
+        match (ends, part) {
+            (Some(Ends::ByUser), _) => return Tended::Aborted,
+            // The machine has reported why.
+            (Some(Ends::ByMachine), _) => self.end_parts(),
+            (None, Ok(part)) => {
+                self.take_part(search, part);
+                self.feed_part();
+            }
+            (None, Err(error)) => self.give_up(error, board),
+        }
+        Tended::Busy
+    }
+
+    /// Gives the job up because its next part cannot be computed.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn give_up<B: Board>(&mut self, error: CommandError, board: &mut B) {
+        Reply(board).line(format_args!("[MSG:the job is given up: {error}]"));
+        self.end_parts();
+        self.machine.abort();
+    }
+
+    /// Forgets the drawing: the machine reads no more of it.
+    fn end_parts(&mut self) {
+        self.parts.end();
+        self.streamed = Streamed::default();
+    }
+}
+
+/// Bounds that are wider by how much strokes are made longer.
+fn beyond(
+    [least, greatest]: [PagePoint; 2],
+    ends: Option<StrokeEnds>,
+    steps: [Millimetres; 2],
+) -> [PagePoint; 2] {
+    let Some(StrokeEnds { lead, trail, .. }) = ends else { return [least, greatest] };
+    let longest = u64::from(lead.max(trail).to_bits());
+    // A length is in units of 2^-18 mm, at most 10 mm.
+    let [x, y] = steps.map(|steps| {
+        let more = longest * u64::from(steps.to_bits().unsigned_abs());
+        if longest == 0 { 0 } else { (more >> 34) as i32 + 1 }
+    });
+    [
+        PagePoint { x: least.x - x, y: least.y - y },
+        PagePoint { x: greatest.x + x, y: greatest.y + y },
+    ]
+}
+
+/// Why a computation has ended early.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Ends {
+    /// The user has given the job up.
+    ByUser,
+    /// The machine draws no longer: it is in alarm.
+    ByMachine,
+}
+
+/// Keeps the machine and the serial line going while the next part is computed.
+struct Server<'s, 'm, I, B> {
+    /// The plotter, but for its working memory.
+    inner: &'s mut Inner<'m, I>,
+    /// The board.
+    board: &'s mut B,
+    /// Whether a status report was asked for and waits for room in the output.
+    is_status_due: bool,
+    /// Why the computation ends, if it does.
+    ends: Option<Ends>,
+}
+
+impl<I: Index, B: Board> Cancel for Server<'_, '_, I, B> {
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn check(&mut self) -> Result<(), Aborted> {
+        let Self { inner, board, is_status_due, ends } = self;
+        let requests = board.take_real_time();
+        report::greet_opened(inner.machine.state(), inner.resumption, *board);
+        if requests.has(RealTime::ABORT) {
+            *ends = Some(Ends::ByUser);
+            return Err(Aborted);
+        }
+        inner.act(requests);
+        inner.watch(*board);
+        inner.plan(BegunJob::default(), *board);
+        board.start_steps();
+        *is_status_due |= requests.has(RealTime::STATUS);
+        if *is_status_due && board.has_room(REPLY_BYTES) {
+            *is_status_due = false;
+            inner.report_status(*board);
+        }
+        if matches!(inner.machine.state(), State::Run | State::Hold { .. }) {
+            return Ok(());
+        }
+        *ends = Some(Ends::ByMachine);
+        Err(Aborted)
+    }
+}
