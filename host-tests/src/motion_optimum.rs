@@ -12,7 +12,7 @@ pub struct Limits {
     pub junction_deviation: f64,
     /// Whether the speed is limited in curves.
     pub centripetal: bool,
-    /// Whether the limit of a tight bend counts for all of its circle and for a stride on both sides,
+    /// Whether the limit of a tight bend counts for all of its circle and for a stride beside it,
     /// too. The planner takes care of that as far as it knows the path in time.
     pub beside_bends: bool,
     /// The length of a step in mm, the same for both axes.

@@ -98,7 +98,7 @@ pub(super) fn corner(
     }
 }
 
-/// Whether one of two lines is no chord of the curve that the other one is part of: it is four times
+/// Whether one of two lines is no chord of the curve that the other is part of: it is four times
 /// as long, and more than 32 times what rounding explains. A single step beside it says nothing,
 /// so that a curve in steps, in which lines of steps are joined, remains one.
 #[inline(always)] // As above.
