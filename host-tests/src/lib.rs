@@ -30,6 +30,7 @@ pub mod convex_any_faces;
 pub mod convex_model;
 pub mod convex_solids;
 pub mod grbl_lines;
+pub mod half_circles;
 pub mod heaviest_jobs;
 pub mod ink;
 pub mod transcript;

@@ -52,6 +52,7 @@ impl Case {
             acceleration: self.acceleration,
             junction_deviation: self.deviation,
             centripetal: true,
+            beside_bends: false,
             step: 1.0 / STEPS_PER_MM,
         }
     }

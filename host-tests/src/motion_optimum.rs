@@ -12,6 +12,9 @@ pub struct Limits {
     pub junction_deviation: f64,
     /// Whether the speed is limited in curves.
     pub centripetal: bool,
+    /// Whether the limit of a tight bend counts for all of its circle and for a stride beside it,
+    /// too. The planner takes care of that as far as it knows the path in time.
+    pub beside_bends: bool,
     /// The length of a step in mm, the same for both axes.
     pub step: f64,
 }
@@ -35,8 +38,8 @@ fn norm(a: Point) -> f64 {
 
 /// The squared maximum speed at each point of `points` (mm) and on each line between two points, by
 /// the rules of the module `motion`. Corners are limited by junction deviation. Curves are limited
-/// by the circle through points that are 1, 2, 4, … 64 apart. In both cases, what rounding to steps
-/// can explain is subtracted.
+/// by the circle through points that are 2, 4, … 64 apart. In both cases, what rounding to steps
+/// can explain is subtracted, or a quarter of it in a tight bend.
 pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) {
     let rounding = ROUNDING * limits.step;
     let mut radius = vec![f64::INFINITY; points.len()];
@@ -47,6 +50,11 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
         let shorter = norm(a).min(norm(b));
         let turn = cross(a, b).abs().atan2(a.0 * b.0 + a.1 * b.1);
         let sine = (turn / 2.0).sin() - rounding / shorter;
+        // A curve ends beside a line that is much longer than its chords.
+        let longer = norm(a).max(norm(b));
+        if longer > 32.0 * rounding && shorter > rounding && shorter < longer / 4.0 {
+            sharp.push(i);
+        }
         if sine <= 0.0 {
             continue;
         }
@@ -60,24 +68,39 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
         }
     }
     sharp.push(points.len() - 1);
+    sharp.dedup();
     if limits.centripetal {
         for ends in sharp.windows(2) {
             for stride in [2usize, 4, 8, 16, 32, 64] {
-                // The circle applies to half of its arc; at the ends of a curve it applies to all
-                // of it.
+                let mut tight_before = None;
                 let mut last = ends[0] + 2 * stride;
                 while last <= ends[1] {
                     let middle = last - stride;
                     let is_first = middle - stride == ends[0];
-                    let from = if is_first { ends[0] } else { middle - stride / 2 };
-                    let is_last = last + stride > ends[1];
-                    let to = if is_last { ends[1] } else { middle + stride / 2 };
                     let outer = (points[middle - stride], points[last]);
-                    if let Some(r) = circle(outer.0, points[middle], outer.1, limits.step) {
-                        for slot in &mut curve[from..to] {
-                            *slot = slot.min(r);
+                    let circle = circle(outer.0, points[middle], outer.1, limits.step);
+                    let is_last = last + stride > ends[1];
+                    // A tight bend has the whole circle and a stride on both sides. Another circle
+                    // applies to half of its arc; at the ends of a curve, to all of it.
+                    let (from, to) = match circle {
+                        Some((_, true)) => (last.saturating_sub(3 * stride).max(ends[0]), last),
+                        _ if tight_before.is_some() => (last - stride, last),
+                        _ if is_first => (ends[0], middle + stride / 2),
+                        _ => (middle - stride / 2, middle + stride / 2),
+                    };
+                    let radius = circle.map_or(f64::INFINITY, |circle| circle.0);
+                    let limit = tight_before.unwrap_or(f64::INFINITY).min(radius);
+                    for slot in &mut curve[from..to] {
+                        *slot = slot.min(limit);
+                    }
+                    if is_last {
+                        for slot in &mut curve[middle + stride / 2..ends[1]] {
+                            *slot = slot.min(radius);
                         }
                     }
+                    tight_before = circle
+                        .filter(|circle| limits.beside_bends && circle.1)
+                        .map(|circle| circle.0);
                     last += stride;
                 }
             }
@@ -95,7 +118,8 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
     (radius.into_iter().map(square).collect(), curve.into_iter().map(square).collect())
 }
 
-fn circle(first: Point, middle: Point, last: Point, step: f64) -> Option<f64> {
+/// The radius of the circle through three points, and whether it is that of a tight bend.
+fn circle(first: Point, middle: Point, last: Point, step: f64) -> Option<(f64, bool)> {
     // Whether a circle applies depends on a threshold, so points are rounded exactly as `motion`
     // does: a step has a whole number of units of 2^-32 mm, and a point one of 2^-12 mm.
     let unit = (2f64.powi(32) * step).floor();
@@ -106,8 +130,18 @@ fn circle(first: Point, middle: Point, last: Point, step: f64) -> Option<f64> {
     if 16.0 * norm(c) < 15.0 * norm(a).max(norm(b)) {
         return None;
     }
-    let height = cross(a, b).abs() / norm(c) - rounding;
-    (height > 0.0).then(|| norm(a) * norm(b) / (2.0 * height))
+    let height = cross(a, b).abs() / norm(c);
+    if height <= rounding {
+        return None;
+    }
+    let (across, along) = (cross(a, b).abs(), a.0 * b.0 + a.1 * b.1);
+    let is_low = height < 24.0 * rounding;
+    if !is_low && across > 2.0 * along {
+        return None;
+    }
+    let is_tight = is_low && 8.0 * across >= 3.0 * along;
+    let height = height - if is_tight { rounding / 4.0 } else { rounding };
+    Some((norm(a) * norm(b) / (2.0 * height), is_tight))
 }
 
 /// The time in seconds from rest at the first point to rest at the last one. Successive points must

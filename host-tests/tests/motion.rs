@@ -33,6 +33,7 @@ fn optimum(
             acceleration,
             junction_deviation: deviation,
             centripetal: bends,
+            beside_bends: true,
             step: 1.0 / STEPS_PER_MM,
         },
     )

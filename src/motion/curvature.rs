@@ -5,6 +5,13 @@
 //! apart say more. So each level of [`Curvature`] looks at every 2nd, 4th, 8th … point. The height
 //! of the middle point over the chord of the outer two counts less what rounding can explain;
 //! the narrowest of the circles that remain is the curve's.
+//!
+//! A tight bend is over before points are so far apart that rounding no longer matters. There the
+//! turn between the two chords, more than 21°, says that it is one, so no more than a quarter of
+//! what rounding can explain is counted less. Such a circle stands for all of its arc and for one
+//! more stride on both sides: wherever the bend begins, between its beginning and the first circle
+//! that lies in it are less points than that. Beside a line much longer than the chords, a curve
+//! begins or ends, so no circle joins the two ([`Curvature::restart`]).
 
 use super::{Limits, Lookahead, PathLength};
 use crate::drawing::PagePoint;
@@ -14,6 +21,10 @@ const LEVELS: usize = 6;
 
 /// Units of 2^-12 mm: a step is at least one, a page at most 2^26.
 const FRACTION_BITS: u32 = 12;
+
+/// A bend is tight while the height of its middle over a chord is less than so many times what
+/// rounding can explain.
+const TIGHT_HEIGHT: u64 = 24;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Place {
@@ -26,8 +37,17 @@ struct Place {
 struct Level {
     /// The last two points looked at, the later first.
     points: [Place; 2],
-    /// What the last circle allowed.
-    limit: Option<PathLength>,
+    /// The last circle.
+    circle: Circle,
+}
+
+/// What a circle through three points says of the curve.
+#[derive(Debug, Clone, Copy, Default)]
+struct Circle {
+    /// Half its radius; 0 if it slows nothing.
+    limit: PathLength,
+    /// Whether it is that of a tight bend.
+    is_tight: bool,
 }
 
 /// The path since the last sharp corner, as far as it matters.
@@ -39,8 +59,8 @@ pub(super) struct Curvature {
 }
 
 impl Curvature {
-    /// The path stops, or turns sharply, at `point`, the end of the last block of `blocks`: the
-    /// curve so far is complete, the next begins.
+    /// The path stops, turns sharply, or passes from chords to a much longer line at `point`, the
+    /// end of the last block of `blocks`: the curve so far is complete, the next begins.
     pub(super) fn restart(
         &mut self,
         limits: &Limits,
@@ -48,20 +68,23 @@ impl Curvature {
         blocks: &mut Lookahead<'_>,
     ) {
         for (number, level) in (1u32..).zip(&self.levels) {
-            if let Some(limit) = level.limit {
-                let stride = 1 << number;
-                blocks.limit_curve(1, stride / 2 + self.count % stride, limit);
+            let stride = 1 << number;
+            if level.circle.limit > 0 {
+                blocks.limit_curve(1, stride / 2 + self.count % stride, level.circle.limit);
             }
         }
         blocks.end_curve();
         self.count = 0;
         let points = [place(limits, point); 2];
-        self.levels = [Level { points, limit: None }; LEVELS];
+        self.levels = [Level { points, circle: Circle::default() }; LEVELS];
     }
 
     /// The path goes on to `point`, the end of the last block of `blocks`. Limits the blocks that
     /// lie on too narrow a curve.
-    #[inline(always)] // Where each chord is pushed: elsewhere it would drive that out of the cache.
+    // Where each chord is pushed: elsewhere it would drive that out of the Pico's cache. The
+    // LM3S6965 has none, and no flash for two of it.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
+    #[cfg_attr(feature = "lm3s6965", inline(never))]
     pub(super) fn sync_consumed(
         &mut self,
         limits: &Limits,
@@ -80,12 +103,23 @@ impl Curvature {
             if self.count < 2 * stride {
                 continue;
             }
-            level.limit = circle_limit(limits, first, middle, latest);
-            if let Some(limit) = level.limit {
+            let before =
+                core::mem::replace(&mut level.circle, circle(limits, first, middle, latest));
+            let Circle { mut limit, is_tight } = level.circle;
+            let (mut least, mut most) = (1, stride);
+            if before.is_tight && (limit == 0 || limit > before.limit) {
+                limit = before.limit;
+            }
+            if is_tight {
+                most = (3 * stride).min(self.count);
+            } else if !before.is_tight {
                 // The circle spans the last two strides. It stands for the middle half, and for the
                 // beginning of the curve.
                 let half = if self.count == 2 * stride { stride } else { stride / 2 };
-                blocks.limit_curve(stride / 2 + 1, stride + half, limit);
+                (least, most) = (stride / 2 + 1, stride + half);
+            }
+            if limit > 0 {
+                blocks.limit_curve(least, most, limit);
             }
         }
     }
@@ -101,9 +135,9 @@ fn place(limits: &Limits, point: PagePoint) -> Place {
     Place { x: along(point.x, step_x.to_bits()), y: along(point.y, step_y.to_bits()) }
 }
 
-/// Half the radius of the circle through three points, if it slows the machine at all.
+/// The circle through three points.
 #[inline(always)] // As above.
-fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Option<PathLength> {
+fn circle(limits: &Limits, first: Place, middle: Place, last: Place) -> Circle {
     // Within ±2^28, so products of two stay below 2^57.
     let (ax, ay) = (middle.x - first.x, middle.y - first.y);
     let (bx, by) = (last.x - middle.x, last.y - middle.y);
@@ -121,18 +155,13 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
     let rounding = u64::from(limits.rounding.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
     // The height over the chord is that of rounding.
     if twice_area < (rounding + 1) * c {
-        return None;
+        return Circle::default();
     }
     let ab = least(ax, ay) * least(bx, by);
-    // `c` is below 2^29, `top` below 2^26.
-    const HALF: u64 = u32::MAX as u64;
-    let is_wide = if ab <= HALF && twice_area <= HALF {
-        ab * c >= 4 * twice_area * top
-    } else {
-        u128::from(ab) * u128::from(c) >= 4 * u128::from(twice_area) * u128::from(top)
-    };
-    if is_wide {
-        return None;
+    // To 32 bits; `c` is below 2^29, `top` below 2^26.
+    let shift = 32u32.saturating_sub((ab | twice_area).leading_zeros());
+    if (ab >> shift) * c >= 4 * (twice_area >> shift) * top {
+        return Circle::default();
     }
     let squared = |x: i32, y: i32| {
         let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
@@ -141,13 +170,27 @@ fn circle_limit(limits: &Limits, first: Place, middle: Place, last: Place) -> Op
     let (a, b, c) = (squared(ax, ay), squared(bx, by), squared(cx, cy));
     // Turned so far that the chord says nothing about one curve: c below 15/16 of a or b.
     if 256 * c < 225 * a.max(b) {
-        return None;
+        return Circle::default();
     }
+    // Twice the product of the two legs' lengths and the cosine of the turn between them.
+    let along = c.cast_signed() - a.cast_signed() - b.cast_signed();
+    let across = 2 * twice_area.cast_signed();
     let (a, b, c) = (a.isqrt(), b.isqrt(), c.isqrt());
-    let height = twice_area.checked_div(c)?.saturating_sub(rounding);
-    let half_radius = (a * b).checked_div(4 * height)?;
-    (half_radius < top).then(|| {
-        let bits = half_radius << (PathLength::FRAC_NBITS - FRACTION_BITS);
-        PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
-    })
+    let height = twice_area.checked_div(c).unwrap_or(0);
+    let is_low = height < TIGHT_HEIGHT * rounding;
+    if !is_low && across > 2 * along {
+        // By more than 63°: points nearer to each other say what it is.
+        return Circle::default();
+    }
+    // By more than 21°.
+    let is_tight = is_low && 8 * across >= 3 * along;
+    let height = height.saturating_sub(if is_tight { rounding / 4 } else { rounding });
+    let limit = match (a * b).checked_div(4 * height) {
+        Some(half_radius) if half_radius < top => {
+            let bits = half_radius << (PathLength::FRAC_NBITS - FRACTION_BITS);
+            PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX).max(1))
+        }
+        _ => return Circle::default(),
+    };
+    Circle { limit, is_tight }
 }

@@ -98,6 +98,16 @@ pub(super) fn corner(
     }
 }
 
+/// Whether one of two lines is no chord of the curve that the other is part of: it is four times
+/// as long, and more than 32 times what rounding explains. A single step beside it says nothing,
+/// so that a curve in steps, in which lines of steps are joined, remains one.
+#[inline(always)] // As above.
+pub(super) fn bends_apart(limits: &Limits, one: PathLength, other: PathLength) -> bool {
+    let (shorter, longer) = (one.min(other).to_bits(), one.max(other).to_bits());
+    let rounding = limits.rounding.to_bits();
+    longer >> 5 > rounding && shorter > rounding && shorter < longer >> 2
+}
+
 /// Half the length of a vector of two parts within ±2^31, at most 2^30.
 #[inline(always)] // As above.
 fn half_length(x: i32, y: i32) -> u64 {

@@ -33,6 +33,9 @@ pub struct Block {
     pub(super) kind: BlockKind,
     /// How many chords are behind the first one, of which `dx` and `dy` tell.
     pub(super) chord_count: u8,
+    /// How many points of the path it leads to, those on a straight line included: how many moves
+    /// it was joined of.
+    pub(super) points: u8,
     /// Those chords, in front. What is behind them has no meaning.
     pub(super) chords: [Chord; MOST_CHORDS - 1],
 }
@@ -84,6 +87,7 @@ impl Block {
         offsets: [0; 2],
         kind: BlockKind::Line,
         chord_count: 0,
+        points: 1,
         chords: [Chord { dx: 0, dy: 0, length: 0 }; MOST_CHORDS - 1],
     };
 
@@ -121,8 +125,8 @@ pub struct Lookahead<'m> {
     length: u64,
     /// Of the last blocks, of which more points may show that they bend.
     open: PathLength,
-    /// How many of the blocks have chords behind their first one.
-    chorded: usize,
+    /// How many of the blocks were joined of more than one move.
+    joined: usize,
     /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow and to its
     /// `curve_limit`, so that none has to be looked for when the block before it begins.
     passes_limits_on: bool,
@@ -145,7 +149,7 @@ impl<'m> Lookahead<'m> {
             count: 0,
             length: 0,
             open: PathLength::ZERO,
-            chorded: 0,
+            joined: 0,
             passes_limits_on: true,
             lowest: PathLength::MAX,
             lowest_at: 0,
@@ -210,6 +214,7 @@ impl<'m> Lookahead<'m> {
         slot.offsets = block.offsets;
         slot.kind = block.kind;
         slot.chord_count = 0;
+        slot.points = 1;
         self.count += 1;
         self.length += u64::from(block.length.to_bits());
         self.open = self.open.saturating_add(block.length);
@@ -257,14 +262,18 @@ impl<'m> Lookahead<'m> {
         if is_long || !are_lines || block.ink != line.ink || block.length == 0 {
             return false;
         }
+        let Some(points) = block.points.checked_add(1) else {
+            return false;
+        };
         if block.chord_count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]) {
             (block.dx, block.dy) = (block.dx + line.dx, block.dy + line.dy);
         } else {
             if !block.push_chord(line.dx, line.dy, line.length) {
                 return false;
             }
-            self.chorded += usize::from(block.chord_count == 1);
         }
+        block.points = points;
+        self.joined += usize::from(points == 2);
         block.length = length;
         self.length += u64::from(line.length.to_bits());
         self.open = self.open.saturating_add(line.length);
@@ -275,9 +284,9 @@ impl<'m> Lookahead<'m> {
     /// plan.
     pub(super) fn pop<T>(&mut self, read: impl FnOnce(&Block) -> T) -> Option<T> {
         let block = self.front()?;
-        let (length, has_chords) = (block.length, block.chord_count > 0);
+        let (length, is_joined) = (block.length, block.points > 1);
         let read = read(block);
-        self.chorded -= usize::from(has_chords);
+        self.joined -= usize::from(is_joined);
         self.late = PathLength::MAX;
         self.first = self.wrapped(1);
         self.count -= 1;
@@ -296,7 +305,7 @@ impl<'m> Lookahead<'m> {
 
     pub(super) fn clear(&mut self) {
         self.count = 0;
-        self.chorded = 0;
+        self.joined = 0;
         self.length = 0;
         self.end_curve();
         self.find_lowest();
@@ -396,8 +405,8 @@ impl<'m> Lookahead<'m> {
     pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
         self.lowered = self.lowered.min(limit);
         let mut allowed = PathLength::MAX;
-        // Without chords each block ends at one point, so the first blocks need not be counted.
-        let mut points = if self.chorded == 0 { least.saturating_sub(1) } else { 0 };
+        // While none are joined each block ends at one point, and the first need not be counted.
+        let mut points = if self.joined == 0 { least.saturating_sub(1) } else { 0 };
         for back in points as usize + 1.. {
             let Some(index) = self.count.checked_sub(back) else {
                 if points < most {
@@ -410,7 +419,7 @@ impl<'m> Lookahead<'m> {
                 return;
             };
             let before = points;
-            points += 1 + u32::from(block.chord_count);
+            points += u32::from(block.points);
             if points < least {
                 continue;
             }

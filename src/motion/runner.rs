@@ -459,7 +459,10 @@ impl<'m> Runner<'m> {
             }
             _ => Corner::STOP,
         };
-        if corner.is_sharp {
+        let bends_apart = self
+            .last
+            .is_some_and(|(_, before, _)| junction::bends_apart(&self.limits, before, length));
+        if corner.is_sharp || bends_apart {
             self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);

@@ -417,6 +417,9 @@ impl Road<'_, '_> {
                 most = middle;
             }
         }
+        if least == -MOST_GROWTH && from.ramp < least * i32::from(slices) && self.is_slow(from) {
+            least = MOST_GROWTH;
+        }
         // Where it makes the next interval longer, a little less.
         if is_uneven && least > -MOST_GROWTH && (from.ramp / i32::from(slices) + least) & 1 != 0 {
             least -= 1;
@@ -433,6 +436,20 @@ impl Road<'_, '_> {
             }
         }
         Interval::new(jerk, from, least, slices)
+    }
+
+    /// Whether a limit came too late to be kept, and braking that ends now leads below it. What is
+    /// known is far more than a stop takes, so it is not that which asks for more.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    fn is_slow(&self, from: State) -> bool {
+        self.beyond.is_some_and(|blocks| {
+            let lowest = blocks.lowest_limit().min(self.curve_limit);
+            let left = blocks.stopping_distance_at((self.room + blocks.known()) >> 14, self.limits);
+            self.top > 0
+                && lowest > 0
+                && self.jerk.settled(from).pow(2) <= self.limits.squared_speed(lowest)
+                && self.jerk.braking_distance(from, 0) >> 14 < left - left / 8
+        })
     }
 
     /// How it moves after an interval of such a growth, and how fast it is when it has no ramp any

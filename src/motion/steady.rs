@@ -1,7 +1,7 @@
 //! The greatest speed that a stretch of a path can keep all along: what its narrowest bend allows.
 
 use super::curvature::Curvature;
-use super::junction::{Heading, corner};
+use super::junction::{Heading, bends_apart, corner};
 use super::{Limits, Lookahead, PathLength};
 use crate::drawing::PagePoint;
 
@@ -50,6 +50,9 @@ impl<'l> SteadySpeed<'l> {
                     return false;
                 }
                 self.lowest = self.lowest.min(corner.limit);
+                if bends_apart(self.limits, length_before, length) {
+                    self.curvature.restart(self.limits, self.at, &mut self.bends);
+                }
             }
             if self.limits.centripetal {
                 self.curvature.sync_consumed(self.limits, point, &mut self.bends);
