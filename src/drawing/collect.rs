@@ -104,6 +104,10 @@ impl PackedLine {
     }
 }
 
+/// The points and the segments of a drawing, and the memory behind them.
+#[cfg(feature = "early-ink")]
+pub type SplitMut<'a, I> = (&'a [PagePoint], &'a mut [Segment<I>], Scratch<'a>);
+
 /// The layout of a drawing in the working memory: first the segments, then the points.
 #[derive(Debug, Clone, Copy)]
 pub struct Stored<I = u16> {
@@ -157,10 +161,7 @@ impl<I: Index> Stored<I> {
     /// # Errors
     /// As [`Stored::split`].
     #[cfg(feature = "early-ink")]
-    pub fn split_mut<'a>(
-        &self,
-        words: &'a mut [u64],
-    ) -> Result<(&'a [PagePoint], &'a mut [Segment<I>], Scratch<'a>), OutOfScratch> {
+    pub fn split_mut<'a>(&self, words: &'a mut [u64]) -> Result<SplitMut<'a, I>, OutOfScratch> {
         let missing = OutOfScratch { needed: self.bytes(), available: size_of_val(words) };
         let (segments, rest) =
             words.split_at_mut_checked(self.segment_bytes() / 8).ok_or(missing)?;

@@ -15,6 +15,8 @@ mod page_map;
 mod title;
 mod window;
 
+#[cfg(feature = "early-ink")]
+pub use collect::SplitMut;
 pub use collect::{GraphError, PackedLine, Stored, build_graph};
 pub use line_type::{Dashes, LineType};
 pub use page::{Page, PageError, StepsPerMillimetre};

@@ -324,6 +324,7 @@ fn check<I: Index>(drawing: Drawing<'_, I>, tour_length: usize) -> Result<(), Or
 /// Decides in which order and direction one pen draws its segments. Writes this to `tour`, and adds
 /// its measures to `report`.
 #[inline(never)] // Inlined in its only caller, the code would be larger.
+#[allow(clippy::too_many_arguments, reason = "they are what a pen's order depends on")]
 fn order_pen<'a, I: Index>(
     drawing: Drawing<'a, I>,
     pen: u8,
