@@ -119,7 +119,7 @@ impl Machine<'_> {
     }
 
     /// The pen is raised within a stroke whose rest is late, so the stroke is not drawn yet.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     pub(super) const fn interrupt_stroke(&mut self) {
         if let Some(open) = &mut self.log.open {
             open.begin = open.begin.wrapping_add(1);
@@ -128,7 +128,7 @@ impl Machine<'_> {
     }
 
     /// What was late is no rest of the stroke: that was whole, and is still to be noted.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     pub(super) const fn complete_stroke(&mut self) {
         if let Some(open) = &mut self.log.open {
             open.begin = open.begin.wrapping_sub(1);
@@ -158,11 +158,11 @@ impl Machine<'_> {
     }
 
     /// The pen is raised within a stroke.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     pub(super) const fn interrupt_stroke(&mut self) {}
 
     /// The stroke was whole.
-    #[cfg(feature = "stream")]
+    #[cfg(any(feature = "stream", feature = "early-ink"))]
     pub(super) const fn complete_stroke(&mut self) {}
 
     /// Stops noting strokes.

@@ -1,6 +1,7 @@
 //! The list of all commands that `$` prints.
 
 use super::OPTIONS;
+use super::options::PlotOption;
 use crate::protocol::HELP;
 use core::fmt;
 
@@ -8,7 +9,22 @@ use core::fmt;
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub fn help(row: &mut dyn FnMut(&dyn fmt::Display, &'static str)) {
     let [before, after] = HELP;
-    before.iter().for_each(|(usage, meaning)| row(usage, meaning));
-    OPTIONS.iter().for_each(|option| row(&option.usage(), option.help));
-    after.iter().for_each(|(usage, meaning)| row(usage, meaning));
+    commands(before, row);
+    options(OPTIONS, row);
+    commands(after, row);
+}
+
+// The lists are arguments, because the compiler would unroll a loop over a list that it knows.
+
+#[inline(never)]
+fn commands(
+    list: &[(&'static str, &'static str)],
+    row: &mut dyn FnMut(&dyn fmt::Display, &'static str),
+) {
+    list.iter().for_each(|(usage, meaning)| row(usage, meaning));
+}
+
+#[inline(never)]
+fn options(list: &[PlotOption], row: &mut dyn FnMut(&dyn fmt::Display, &'static str)) {
+    list.iter().for_each(|option| row(&option.usage(), option.help));
 }

@@ -77,6 +77,7 @@ mod with_feature {
     /// The mark of the notes of a job that is sent while it is drawn.
     const STREAMED: u32 = u32::from_le_bytes(*b"str1");
     /// The most strokes that are noted at once.
+    #[cfg(feature = "stream")]
     const MOST_AT_ONCE: u32 = 1 << 12;
     /// Number of words before the settings: layout, version, strokes, whether the model is known,
     /// and the checksums of model and options. For a job that is sent the last three are how many
