@@ -101,10 +101,6 @@ impl<I: Index> Inner<'_, I> {
     /// job's ordering, and the size of the working memory.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn report_model<B: Board>(&mut self, board: &mut B) {
-        #[cfg(feature = "tiles")]
-        let in_flash = self.report_stored(board);
-        #[cfg(not(feature = "tiles"))]
-        let in_flash = None;
         let model = &self.model;
         let (vertices, limit) = (model.vertices().len(), model.vertex_limit());
         Reply(board).line(format_args!("[MODEL:vertices {vertices} of {limit}]"));
@@ -113,7 +109,10 @@ impl<I: Index> Inner<'_, I> {
         Reply(board).line(format_args!(
             "[MODEL:faces {faces}, bars {bars}, curves {curves}, corners {corners} of {limit}]"
         ));
-        let contents = in_flash.unwrap_or_else(|| model.checksum());
+        #[cfg(feature = "tiles")]
+        let contents = self.report_stored(board).unwrap_or_else(|| self.model.checksum());
+        #[cfg(not(feature = "tiles"))]
+        let contents = model.checksum();
         let options = self.options.checksum();
         Reply(board).line(format_args!("[MODEL:checksum {contents:08X}, options {options:08X}]"));
         let order::Report { odd_points, components, pen_down, pen_up, lifts, bound, optimal } =

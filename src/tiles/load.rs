@@ -300,11 +300,14 @@ impl<N: Index> StretchSink<u16> for Renumbered<'_, N> {
 fn sort_without_repeats(numbers: &mut [u32], cancel: &mut dyn Cancel) -> Result<usize, Aborted> {
     heap_sort_cancellable(numbers, |number| *number, cancel)?;
     let mut kept = 0;
+    let mut last = None;
     for at in 0..numbers.len() {
-        if kept == 0 || numbers[kept - 1] != numbers[at] {
-            numbers[kept] = numbers[at];
+        let next = numbers.get(at).copied();
+        if let (true, Some(slot), Some(number)) = (last != next, numbers.get_mut(kept), next) {
+            *slot = number;
             kept += 1;
         }
+        last = next;
     }
     Ok(kept)
 }
