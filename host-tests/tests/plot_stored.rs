@@ -1,6 +1,11 @@
 //! A model that does not fit in memory goes to flash by itself, is drawn part by part as it would
 //! be drawn as a whole, and stays through a loss of power.
-#![allow(clippy::expect_used, clippy::unwrap_used, reason = "a test fails by panicking")]
+#![allow(
+    clippy::expect_used,
+    clippy::unwrap_used,
+    clippy::panic,
+    reason = "a test fails by panicking"
+)]
 
 use penup::boards::host::{CutArea, lend_memory_of};
 use penup::machine::State;

@@ -290,8 +290,8 @@ fn judge(code: Option<i32>, said: &str, path: &str) -> Fate {
     if let Some(panic) = said.lines().find(|line| line.contains("panicked at")) {
         return Fate::Panicked(panic.to_owned());
     }
-    let told = said.lines().filter_map(|line| line.strip_prefix("penup: "));
-    let refusal = told.filter(|told| !told.starts_with("note: ")).next_back();
+    let mut told = said.lines().filter_map(|line| line.strip_prefix("penup: "));
+    let refusal = told.rfind(|told| !told.starts_with("note: "));
     match (code, refusal) {
         // A panic of the client is 101; no code is a signal, such as that of a full stack.
         (None | Some(101), _) => Fate::Panicked(said.lines().last().unwrap_or("").to_owned()),
