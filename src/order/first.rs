@@ -180,7 +180,7 @@ fn milliseconds_to_order<I: Index>(
 
 /// Chooses strokes that are drawn first, orders them, and puts their segments to the front of
 /// `segments`, in the order and the directions in which they are drawn. The others may change
-/// places. No stroke is chosen where that does not pay: see the [module](self).
+/// places. No stroke is chosen where that does not pay: see the module.
 ///
 /// # Errors
 /// [`OrderError::Aborted`].
