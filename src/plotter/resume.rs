@@ -226,7 +226,7 @@ mod with_feature {
         /// Keeps that so many strokes have been drawn.
         #[inline(never)] // Inlined, it would take room in the main loop.
         fn note_stroke<B: Board>(&mut self, strokes: u32, board: &mut B) {
-            let at_once = self.resumption.more_at_once + 1;
+            let at_once = self.resumption.more_at_once.saturating_add(1);
             let strokes = strokes.saturating_add(self.resumption.drawn_before);
             let is_end = self.resumption.progress.is_some_and(|[_, all]| strokes == all);
             // The last few strokes count as soon as all of them are drawn.
@@ -395,8 +395,8 @@ mod with_feature {
             if records::save_streamed(id, board).is_err() {
                 return refuse(board);
             }
-            let mut at_once = 1;
-            while at_once <= MOST_AT_ONCE {
+            for power in 0..=MOST_AT_ONCE.ilog2() {
+                let at_once = 1 << power;
                 let more = [at_once, id, 0];
                 let notes = begin_notes(self.machine.settings(), STREAMED, strokes, more);
                 let parts = strokes.div_ceil(at_once);
@@ -406,7 +406,6 @@ mod with_feature {
                     self.resumption.progress = Some([0, strokes]);
                     return;
                 }
-                at_once *= 2;
             }
             refuse(board);
         }
