@@ -17,8 +17,8 @@
 //! until it is the same twice.
 //!
 //! What becomes known of a state only later can be [added](Slots::add) behind it, without erasing
-//! anything, if [room was left](Writer::leave_room). It begins with a page of its own, with a header
-//! as that of a slot, in whose second word stands the checksum of the state.
+//! anything, if [room was left](Writer::leave_room). It begins with a page of its own, with a
+//! header as that of a slot, in whose second word stands the checksum of the state.
 //!
 //! How far the work that a state describes has come can be kept beside it, in a [`Log`].
 
@@ -431,8 +431,8 @@ impl<F: NorFlash> Writer<'_, F> {
         Ok(())
     }
 
-    /// Leaves room behind the state for so many bytes that will be [added](Slots::add) to it: erases
-    /// it. Call it when all of the state is written, before [`Writer::finish`].
+    /// Leaves room behind the state for so many bytes that will be [added](Slots::add) to it:
+    /// erases it. Call it when all of the state is written, before [`Writer::finish`].
     ///
     /// # Errors
     /// See [`StorageError`]; the latest state is still the previous one.

@@ -268,7 +268,12 @@ pub struct PlotArgs {
     pub from: u32,
     /// Go on with this drawing where a loss of power or a reset has stopped it while this computer
     /// sent it, with the same options; the machine is homed before, by `penup home`
-    #[arg(long, requires = "port", conflicts_with_all = ["from", "multipass"], help_heading = "Plotter")]
+    #[arg(
+        long,
+        requires = "port",
+        conflicts_with_all = ["from", "multipass"],
+        help_heading = "Plotter"
+    )]
     pub resume: bool,
     /// The pen has been put at the origin of the page by hand, for machines that cannot be homed
     #[arg(long, requires = "resume", help_heading = "Plotter")]

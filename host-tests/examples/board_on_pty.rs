@@ -4,9 +4,10 @@
 //! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is
 //! the name of the terminal, which comes when the board has greeted: a program that opens the
 //! terminal meets a board that runs, however slowly it has started. The greeting can be read there.
-//! Then each line of the input is answered by one line: `forget` forgets the ink so far; `judge SLACK FILE` compares the ink since then with the lines of FILE, each of
-//! which is a polyline of points `x,y` in steps, and answers `same` or what differs; `heard` prints
-//! what the board has been sent since the last call, escaped. It ends with its input.
+//! Then each line of the input is answered by one line: `forget` forgets the ink so far; `judge
+//! SLACK FILE` compares the ink since then with the lines of FILE, each of which is a polyline of
+//! points `x,y` in steps, and answers `same` or what differs; `heard` prints what the board has
+//! been sent since the last call, escaped. It ends with its input.
 
 use std::error::Error;
 use std::io::{BufRead as _, Read as _, Write as _};

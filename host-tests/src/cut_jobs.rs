@@ -103,8 +103,9 @@ pub fn switch_on(
     switch_on_early::<16384>(flash, None, work)
 }
 
-/// Does the same with a board that has so many `WORDS` of working memory, and whose pen begins while
-/// the order is computed, if `work_ticks` are given: so many pass in a millisecond of computing.
+/// Does the same with a board that has so many `WORDS` of working memory, and whose pen begins
+/// while the order is computed, if `work_ticks` are given: so many pass in a millisecond of
+/// computing.
 ///
 /// # Panics
 /// As [`switch_on`].

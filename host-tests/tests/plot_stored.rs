@@ -37,7 +37,8 @@ fn order(bench: &mut Bench, lines: &[String]) -> String {
     all
 }
 
-/// Runs until nothing moves any more, and puts in each pen that the machine asks for. Returns these.
+/// Runs until nothing moves any more, and puts in each pen that the machine asks for. Returns
+/// these.
 fn finish(bench: &mut Bench) -> Vec<u8> {
     let mut pens = Vec::new();
     bench.finish();

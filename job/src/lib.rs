@@ -4,8 +4,8 @@
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
 //! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a
 //! user wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes
-//! what the plotter must then contain, and [`room`] the memory that takes. [`machine_settings`] makes the machine that a
-//! computer simulates. [`streamed`] makes lines
+//! what the plotter must then contain, and [`room`] the memory that takes. [`machine_settings`]
+//! makes the machine that a computer simulates. [`streamed`] makes lines
 //! of what this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], whose
 //! steps [`straight`] makes lines of, and of which [`sampled`] keeps what a page shows. [`strokes`]
 //! and [`results`] tell what was drawn, [`picture`] shows it, and [`export`] writes it for other

@@ -188,8 +188,8 @@ impl StreamedJob {
         self.header.id
     }
 
-    /// Gives the drawing another number, by which a plotter knows the whole of which it is the rest.
-    /// As G-code it has none.
+    /// Gives the drawing another number, by which a plotter knows the whole of which it is the
+    /// rest. As G-code it has none.
     pub fn set_id(&mut self, id: u32) {
         let (Form::Strokes, Some(&(end, _))) = (self.form, self.begins.get(1)) else { return };
         self.header.id = id;

@@ -792,8 +792,8 @@ test("speeds, heights and a square by hand, and a job that has stopped", async (
   await page.click("#give-up");
   await state("Given up");
   await page.waitForFunction(() => window.penup.plotting.phase === "ready");
-  // The emulated plotter of the page keeps no jobs, so the status of one that does is said here. The
-  // next status of the emulated one takes its place, so what is shown is read at once.
+  // The emulated plotter of the page keeps no jobs, so the status of one that does is said here.
+  // The next status of the emulated one takes its place, so what is shown is read at once.
   const said = await page.evaluate(() => {
     const { plotting } = window.penup;
     plotting.follow({ state: "Idle", position: [], percent: 100, stopped: [4, 9] });
@@ -817,7 +817,9 @@ test("whoever wants less motion sees none", async () => {
   assert.ok((await moving()) > 0, "buttons change softly");
   await page.emulateMedia({ reducedMotion: "reduce" });
   assert.equal(await moving(), 0);
-  const scrolls = await page.evaluate(() => getComputedStyle(document.documentElement).scrollBehavior);
+  const scrolls = await page.evaluate(
+    () => getComputedStyle(document.documentElement).scrollBehavior,
+  );
   assert.equal(scrolls, "auto");
 });
 

@@ -59,7 +59,10 @@ export function command(file, pairs, isSwitch) {
   const flags = pairs.flatMap(([name, value]) => {
     if (isSwitch(name)) return `--${name}`;
     // The program takes one setting at a time.
-    if (name === "set") return value.split(/[\s,;]+/).filter(Boolean).map((own) => `--set ${word(own)}`);
+    if (name === "set") {
+      const settings = value.split(/[\s,;]+/).filter(Boolean);
+      return settings.map((own) => `--set ${word(own)}`);
+    }
     return value.startsWith("-") ? `--${name}=${word(value)}` : `--${name} ${word(value)}`;
   });
   // The program refuses this option if it writes no file that it concerns.

@@ -395,8 +395,8 @@ impl<'q> HostBoard<'q> {
         self.work_ticks = ticks;
     }
 
-    /// Gives the board flash for a model that is too large for the memory, or takes it away. Returns
-    /// what it had before.
+    /// Gives the board flash for a model that is too large for the memory, or takes it away.
+    /// Returns what it had before.
     #[cfg(feature = "tiles")]
     pub fn set_model_flash(&mut self, flash: Option<CutArea>) -> Option<CutArea> {
         core::mem::replace(&mut self.model_flash, flash)

@@ -235,8 +235,8 @@ impl Interpreter {
         self.fail(ErrorNumber::Locked);
     }
 
-    /// Takes the first error since the last call or the last `OE`. A file's reader, which no one can
-    /// ask by `OE`, tells it.
+    /// Takes the first error since the last call or the last `OE`. A file's reader, which no one
+    /// can ask by `OE`, tells it.
     pub fn take_error(&mut self) -> Option<ErrorNumber> {
         let number = core::mem::take(&mut self.error);
         ErrorNumber::ALL.into_iter().find(|error| *error as u8 == number)

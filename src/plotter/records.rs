@@ -165,8 +165,8 @@ pub(super) fn save_job<B: Board, I: Index>(
     board.save(Record::Job, &[header.as_flattened(), bytemuck::cast_slice(memory)])
 }
 
-/// Keeps, in place of the last job, that one was sent while it was drawn, by the number by which its
-/// sender knows it. Its strokes are not kept.
+/// Keeps, in place of the last job, that one was sent while it was drawn, by the number by which
+/// its sender knows it. Its strokes are not kept.
 ///
 /// # Errors
 /// [`NotStored`]: the previous job is still kept.

@@ -28,8 +28,8 @@ const MARK: u32 = u32::from_le_bytes(*b"mod1");
 const EMPTY: u32 = u32::MAX;
 /// The number of words of a page.
 const PAGE_WORDS: usize = PAGE_BYTES / size_of::<u32>();
-/// A record has, beside its owner's words, the mark, the lengths and checksums of both contents, and
-/// its own checksum at its end.
+/// A record has, beside its owner's words, the mark, the lengths and checksums of both contents,
+/// and its own checksum at its end.
 const _: () = assert!(RECORD_WORDS + 6 == PAGE_WORDS);
 
 /// The error that the flash does not hold what was written to it, or did not take it.

@@ -17,11 +17,11 @@
 //! index says which parts of it lie where on the page.
 //!
 //! # Memory
-//! A search can be paused between two tiles ([`Tiles::pause`]); only its index then stays in memory.
-//! A sixteenth of the memory at most is the index of the blocks; another KiB counts the elements on
-//! each part of the page. A small scene takes 8 bytes for each element, 32 for each vertex (20 if
-//! no positions are known), 2 for each corner, and what the search takes. The fewest elements for
-//! which there must be room are those that meet a single edge.
+//! A search can be paused between two tiles ([`Tiles::pause`]); only its index then stays in
+//! memory. A sixteenth of the memory at most is the index of the blocks; another KiB counts the
+//! elements on each part of the page. A small scene takes 8 bytes for each element, 32 for each
+//! vertex (20 if no positions are known), 2 for each corner, and what the search takes. The fewest
+//! elements for which there must be room are those that meet a single edge.
 //!
 //! # Limits
 //! Refused are an edge that meets more elements than fit into the memory, and a point at which more

@@ -9,9 +9,10 @@
 //!
 //! The blocks touch in the model, but in the view each corner was rounded separately. Therefore the
 //! tests "in one plane" and "on one line" use the positions of the model. They leave room for the
-//! precision of the model, so which of several faces is the nearest may depend on the order in which
-//! they are asked. They are asked in the order of their ranks, and those that do not meet the edge
-//! within the error of both do not count, so the result does not depend on the grid of the search.
+//! precision of the model, so which of several faces is the nearest may depend on the order in
+//! which they are asked. They are asked in the order of their ranks, and those that do not meet the
+//! edge within the error of both do not count, so the result does not depend on the grid of the
+//! search.
 
 use super::coarse_projection::CoarseProjection;
 use super::edge_query::{CrossedPolygon, EdgeQuery};

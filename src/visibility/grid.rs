@@ -158,9 +158,9 @@ impl<'a, I: Index> Grid<'a, I> {
         }
     }
 
-    /// Returns the cells on the path of an edge from `p` to `q`, and those that are at most `margin`
-    /// units of the coarse grid beside it. No point of the edge is nearer than the coarse depth
-    /// `near`.
+    /// Returns the cells on the path of an edge from `p` to `q`, and those that are at most
+    /// `margin` units of the coarse grid beside it. No point of the edge is nearer than the coarse
+    /// depth `near`.
     pub fn cells_along(
         &self,
         p: CoarsePoint,

@@ -9,8 +9,10 @@ use anyhow::{Context, Result, bail};
 use crate::command::{cargo, run};
 
 /// The scene of README's picture, and the options with which it is drawn.
-const GEARS: [&str; 9] = [
+const GEARS: [&str; 11] = [
     "scenes/gears.obj",
+    "--board",
+    "pico",
     "--eye=-22.3,-118.7,88.9",
     "--at=0,-3,4",
     "--crease",

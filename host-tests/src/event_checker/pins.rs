@@ -35,8 +35,8 @@ pub struct Drawn {
 /// # Panics
 /// Panics at the first change that violates a rule. The rules forbid: a pulse, or a pause between
 /// pulses, shorter than the pulse width, a change of direction during a pulse or too shortly before
-/// one, a step with the drivers off, a step before the pen's dwell is over but for what the settings
-/// let overlap, a pen that is lowered before it was up, a step that leaves the
+/// one, a step with the drivers off, a step before the pen's dwell is over but for what the
+/// settings let overlap, a pen that is lowered before it was up, a step that leaves the
 /// soft limits or leads further beyond them (the origin is where the pins began), a motor that
 /// takes up its backlash while the other one moves the pen, and a step while the pen's motor moves
 /// or is not at the pen's height.

@@ -6,7 +6,8 @@ use crate::storage::area::{Area, AreaFlash, NotWritten, SECTOR_BYTES};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::vec::Vec;
 
-/// Flash for models. It refuses to clear a bit that is clear already, which is stricter than a chip.
+/// Flash for models. It refuses to clear a bit that is clear already, which is stricter than a
+/// chip.
 #[derive(Debug)]
 pub struct CutArea {
     /// The contents. They are leaked, so they last as long as the process.

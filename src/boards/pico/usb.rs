@@ -8,10 +8,10 @@
 //! Sent bytes wait in a queue. If the host takes nothing for [`HOST_TIMEOUT`] although the queue is
 //! full, it counts as gone. Then bytes to be sent are discarded until it takes something again,
 //! because nothing may delay the steps; lines are discarded as a whole, and when the host takes
-//! bytes again, it is told with the next packet: see [`MISSED`]. The same holds after a program has closed the port (DTR has
-//! fallen): replies that it has not taken are discarded, and so is the rest of a line that it has
-//! not ended, but nobody is told. A program that opens the port (DTR rises) gets a greeting, which goes only to it: see
-//! [`take_opened`].
+//! bytes again, it is told with the next packet: see [`MISSED`]. The same holds after a program has
+//! closed the port (DTR has fallen): replies that it has not taken are discarded, and so is the
+//! rest of a line that it has not ended, but nobody is told. A program that opens the port (DTR
+//! rises) gets a greeting, which goes only to it: see [`take_opened`].
 //!
 //! Two of the chip's errata are worked around: see [`connection`] for E5, which takes GPIO 15 for a
 //! millisecond when a host resets the bus, and [`frame`] for E15.

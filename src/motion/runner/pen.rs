@@ -91,9 +91,9 @@ impl PenTiming {
 }
 
 impl Runner<'_> {
-    /// How long the travels behind the piece in work are until the machine is at rest, 2^-18 mm, and
-    /// how long it takes after that until a stroke begins: motors may have slack to take up there.
-    /// `None` if no stroke is known, or if the machine may be slower in between.
+    /// How long the travels behind the piece in work are until the machine is at rest, 2^-18 mm,
+    /// and how long it takes after that until a stroke begins: motors may have slack to take up
+    /// there. `None` if no stroke is known, or if the machine may be slower in between.
     fn way_to_stroke(&self) -> Option<(u64, u64)> {
         if self.course.as_ref().is_some_and(|course| !course.is_last_piece()) {
             return Some((0, 0));
