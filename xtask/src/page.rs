@@ -67,27 +67,12 @@ pub fn test(arguments: &TestArguments) -> Result<()> {
     // The page is joined to this board by the client.
     set_up::emulator(&LM3S6965)?;
     firmware::check(&LM3S6965, &firmware::build(&LM3S6965)?)?;
-    let mut node = if arguments.measure { node(&[], "measure.mjs")? } else { tests()? };
+    let mut node =
+        if arguments.measure { node(&[], "measure.mjs")? } else { node(&["--test"], "tests.mjs")? };
     if arguments.pictures {
         node.env("PENUP_PICTURES", crate::root().join("docs"));
     }
     run(&mut node)
-}
-
-/// What [`tests`] returns, or nothing, said on the terminal, if the compiler cannot build for a
-/// browser, as Debian's cannot.
-pub fn tests_if_possible() -> Result<Option<Command>> {
-    if let Err(error) = set_up::target(TARGET) {
-        say!("penup: the page is NOT tested: {error:#}")?;
-        return Ok(None);
-    }
-    tests().map(Some)
-}
-
-/// Builds the page and the client. Returns the command that tests them in Chromium, and that needs
-/// the firmware of the LM3S6965.
-fn tests() -> Result<Command> {
-    node(&["--test"], "tests.mjs")
 }
 
 /// Builds the page and the client. Returns the command that runs a program of the page's tests by

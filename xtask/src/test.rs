@@ -6,7 +6,6 @@ use anyhow::Result;
 
 use crate::command::{cargo, describe, run};
 use crate::firmware;
-use crate::page;
 use crate::set_up::{self, Toolchain};
 use crate::side_by_side;
 use crate::table::{BOARDS, BoardRow, PICO};
@@ -46,10 +45,6 @@ pub fn everything() -> Result<()> {
     let mut doctests = workspace("test");
     doctests.args(["--workspace", "--doc"]).args(EMULATOR);
     tests.push(doctests);
-    // They wait more than they compute.
-    if let Some(page) = page::tests_if_possible()? {
-        tests.insert(0, page);
-    }
     side_by_side::run(tests)
 }
 
