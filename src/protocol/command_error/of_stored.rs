@@ -45,7 +45,10 @@ pub(super) fn explain_stored(refusal: StoredModelError, row: Row<'_>) {
             format_args!("a model in flash takes $see=faces, and is no flat plan"),
         ),
         StoredModelError::Drawing => row(
-            error(194, "the model in flash is being drawn"),
+            error(194, "the model in flash is being drawn").client(
+                "the plotter draws the model in its flash: wait until that is done, or give the \
+                 job up by `penup abort`",
+            ),
             format_args!("wait until the model in flash is drawn, or send ctrl-X"),
         ),
         StoredModelError::NotWritten => row(
