@@ -339,7 +339,8 @@ impl Machine<'_> {
     }
 
     /// Begins to measure a path that starts at the machine's present position.
-    #[cfg_attr(not(feature = "early-ink"), inline(always))] // It has one caller then, as the others.
+    // Without the feature it has one caller, as the others.
+    #[cfg_attr(not(feature = "early-ink"), inline(always))]
     #[cfg_attr(feature = "early-ink", inline(never))]
     pub fn begin_measuring(&self) -> Measured {
         Measured {
