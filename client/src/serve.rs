@@ -3,11 +3,15 @@
 //! The server listens on the loopback address alone, and every address of the page begins with a
 //! random token, which only the person who started it knows. A request for another host, as a page
 //! of the web could cause by its own name server, or from another origin, is refused. Nothing but
-//! the files of the page, and the file to draw, can be read. If there is a [`Bridge`], the page may
-//! ask for a WebSocket to the plotter, for which it must say its origin.
+//! the files of the page, and the file to draw, can be read from the disk. The page may hand over
+//! a file to be read in the fonts of this computer ([`read`]). If there is a [`Bridge`], it may ask
+//! for a WebSocket to the plotter. For both it must say its origin.
+
+mod read;
 
 use crate::bridge::Bridge;
 use crate::error::Error;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Read as _, Write as _};
 use std::net::{Ipv4Addr, Shutdown, TcpListener, TcpStream};
@@ -32,6 +36,8 @@ const LONGEST_HEAD: usize = 16 << 10;
 const LARGEST_FILE: u64 = 64 << 20;
 /// The path of the WebSocket to the plotter.
 const PLOTTER: &str = "plotter";
+/// The path to which the page posts a file that is to be read.
+const READ: &str = "read";
 
 /// A served page.
 #[derive(Debug)]
@@ -56,10 +62,17 @@ struct Request<'a> {
     origin: Option<&'a str>,
     /// The key with which it asks for a WebSocket.
     key: Option<&'a str>,
+    /// The number of bytes behind its head.
+    length: Option<u64>,
 }
 
 /// An answer: the status, the type of the content, and the content.
-type Answer<'a> = (u16, &'static str, &'a [u8]);
+type Answer<'a> = (u16, &'static str, Cow<'a, [u8]>);
+
+/// A refusal in words.
+const fn refused(status: u16, said: &'static str) -> Answer<'static> {
+    (status, TEXT, Cow::Borrowed(said.as_bytes()))
+}
 
 impl PageServer {
     /// Reads the page from `folder`, and the file to draw, and begins to listen at `port`, or at
@@ -137,7 +150,7 @@ impl PageServer {
         connection.set_read_timeout(Some(PATIENCE))?;
         connection.set_write_timeout(Some(PATIENCE))?;
         let mut head = Vec::new();
-        let (status, kind, content, with_content) = loop {
+        let (answer, with_content) = loop {
             let mut part = [0; 4096];
             let count = connection.read(&mut part)?;
             head.extend_from_slice(part.get(..count).unwrap_or_default());
@@ -157,12 +170,16 @@ impl PageServer {
                         )?;
                         return bridge.serve(connection, tail);
                     }
-                    let (status, kind, content) = self.answer(&request);
-                    break (status, kind, content, request.method != "HEAD");
+                    if let Some(size) = self.size_to_read(&request) {
+                        let begun = head.get(length..).unwrap_or_default().to_vec();
+                        break (self.read(&mut connection, begun, size)?, true);
+                    }
+                    break (self.answer(&request), request.method != "HEAD");
                 }
-                _ => break (400, TEXT, b"This is no request.\n".as_slice(), true),
+                _ => break (refused(400, "This is no request.\n"), true),
             }
         };
+        let (status, kind, content) = answer;
         let length = content.len();
         write!(
             connection,
@@ -172,7 +189,7 @@ impl PageServer {
              Referrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\n\r\n"
         )?;
         if with_content {
-            connection.write_all(content)?;
+            connection.write_all(&content)?;
         }
         // What is still coming is read, so that closing does not take the answer away.
         connection.shutdown(Shutdown::Write)?;
@@ -185,7 +202,8 @@ impl PageServer {
         let bridge = self.bridge.as_ref()?;
         // A browser always says the origin of a WebSocket.
         let is_own = request.origin.is_some() && self.refusal(request).is_none();
-        let is_plotter = is_own && self.name_of(request) == Some(PLOTTER);
+        let is_plotter =
+            is_own && request.method == "GET" && self.name_of(request) == Some(PLOTTER);
         Some((bridge, request.key.filter(|_| is_plotter)?))
     }
 
@@ -193,19 +211,16 @@ impl PageServer {
     fn refusal(&self, request: &Request<'_>) -> Option<Answer<'_>> {
         let is_own = |host: &str| self.hosts.iter().any(|own| own == host);
         if !request.host.is_some_and(is_own) {
-            let said = b"This server answers to the address that penup printed alone.\n";
-            return Some((403, TEXT, said));
+            let said = "This server answers to the address that penup printed alone.\n";
+            return Some(refused(403, said));
         }
         let from_own = |origin: &str| origin.strip_prefix("http://").is_some_and(is_own);
         if request.origin.is_some_and(|origin| !from_own(origin)) {
-            return Some((403, TEXT, b"Pages from elsewhere may not use this server.\n"));
-        }
-        if !matches!(request.method, "GET" | "HEAD") {
-            return Some((405, TEXT, b"This server only shows a page.\n"));
+            return Some(refused(403, "Pages from elsewhere may not use this server.\n"));
         }
         if self.name_of(request).is_none() {
-            let said = b"The address lacks its token: open the one that penup printed.\n";
-            return Some((403, TEXT, said));
+            let said = "The address lacks its token: open the one that penup printed.\n";
+            return Some(refused(403, said));
         }
         None
     }
@@ -221,11 +236,14 @@ impl PageServer {
         if let Some(refusal) = self.refusal(request) {
             return refusal;
         }
+        if !matches!(request.method, "GET" | "HEAD") {
+            return refused(405, "This server only shows a page, and reads files for it.\n");
+        }
         let name = self.name_of(request).unwrap_or_default();
         let name = if name.is_empty() { "index.html" } else { name };
         match self.files.get(name) {
-            Some(content) => (200, kind_of(name), content),
-            None => (404, TEXT, b"The page has no such file.\n"),
+            Some(content) => (200, kind_of(name), Cow::Borrowed(content)),
+            None => refused(404, "The page has no such file.\n"),
         }
     }
 }
@@ -244,6 +262,7 @@ impl<'a> Request<'a> {
             host: value("Host"),
             origin: value("Origin"),
             key: value("Sec-WebSocket-Key"),
+            length: value("Content-Length").and_then(|length| length.parse().ok()),
         }
     }
 }
@@ -290,7 +309,7 @@ fn percent_encoded(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn server() -> PageServer {
+    pub(super) fn server() -> PageServer {
         let folder = tempfile::tempdir().expect("a folder");
         std::fs::write(folder.path().join("index.html"), "the page").expect("written");
         std::fs::write(folder.path().join("a b.obj"), "v 0 0 0").expect("written");
@@ -314,7 +333,7 @@ mod tests {
         let own = format!("http://{host}");
         let answer = |method: &str, url: &str, host: Option<&str>, origin: Option<&str>| {
             let (status, _, content) =
-                server.answer(&Request { method, url, host, origin, key: None });
+                server.answer(&Request { method, url, host, origin, key: None, length: None });
             (status, content.to_vec())
         };
         let status = |method: &str, url: &str, host: Option<&str>, origin: Option<&str>| {

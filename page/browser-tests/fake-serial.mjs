@@ -50,7 +50,7 @@ export function fakeSerial() {
       }
       control.counts.parts++;
       reading.enqueue(part);
-      if (control.damageEvery && count % 1999 < part.length && control.counts.errors < 3) {
+      if (control.damageEvery && count % 499 < part.length && control.counts.errors < 3) {
         control.counts.errors++;
         reading.error(new DOMException("a frame was wrong", "FramingError"));
         port.open_reading();

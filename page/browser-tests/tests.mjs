@@ -399,6 +399,36 @@ test("penup page serves the file to its owner alone", async () => {
   await assert.rejects(program(huge), /200 MB/);
 });
 
+test("penup page draws the texts of an SVG in the fonts of the computer", async () => {
+  const svg = join(folder, "letter.svg");
+  await writeFile(
+    svg,
+    `<svg xmlns="http://www.w3.org/2000/svg" width="80mm" height="60mm" viewBox="0 0 80 60">
+    <rect x="5" y="5" width="70" height="50" fill="none" stroke="black"/>
+    <text x="10" y="40" font-size="20">penup</text></svg>`,
+  );
+  const own = await program(svg);
+  try {
+    await fresh(own.hash, { address: own.folder });
+    await page.waitForFunction(() => /^letter/.test(document.getElementById("file-name").textContent));
+    const drawn = await computed();
+    const expected = await preview(svg);
+    assert.ok(drawn.strokes.length > 5, "the rectangle, and letters");
+    assert.deepEqual(drawn.strokes, expected.strokes);
+    assert.equal(drawn.svg, expected.svg);
+    // What is wrong is said, with the names of the controls.
+    await page.fill("#option-hatch", "0,x");
+    await page.press("#option-hatch", "Enter");
+    await page.waitForSelector("#option-hatch-problem:not([hidden])");
+    assert.deepEqual(problems, []);
+    own.end();
+    await page.setInputFiles("#file", svg);
+    await page.waitForFunction(() => /start/.test(document.querySelector("#error p").textContent));
+  } finally {
+    own.end();
+  }
+});
+
 test("through the client: turn, dash, plot, hold, resume; the ink is the preview's", async () => {
   const own = await program(scene("lattice3"), "--board", "lm3s6965");
   try {

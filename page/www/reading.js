@@ -1,6 +1,7 @@
 // Has files read that the program of the page does not read itself.
 
 import { needs_readers } from "./penup_page.js";
+import { isServedByProgram } from "./socket.js";
 import { Helper } from "./workers.js";
 
 /** The reader, from the first file that needs it. */
@@ -12,6 +13,8 @@ let reader = null;
  */
 export async function handed(name, bytes, options) {
   if (!needs_readers(name, options)) return { bytes, isRead: false };
+  if (isServedByProgram())
+    return { bytes: await readByProgram(name, bytes, options), isRead: true };
   let broke = "";
   reader ??= new Helper(({ text }) => (broke = text), "reader.js");
   try {
@@ -26,6 +29,16 @@ export async function handed(name, bytes, options) {
       "(the program penup reads it)."
     );
   }
+}
+
+/** Has the program read a file, for it has the fonts of this computer for texts. */
+async function readByProgram(name, bytes, options) {
+  const asked = JSON.stringify({ name, options: JSON.parse(options) });
+  const body = new Blob([asked, "\n", bytes]);
+  const answer = await fetch("read", { method: "POST", body }).catch(() => null);
+  if (!answer) throw "The program penup does not answer any more: start “penup page” again.";
+  if (answer.headers.get("Content-Type") !== "application/json") throw inWords(await answer.text());
+  return new Uint8Array(await answer.arrayBuffer());
 }
 
 /** Names the controls of the page where the messages of the readers name flags. */

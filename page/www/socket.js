@@ -3,10 +3,12 @@
 /** The code with which a connection is closed that nobody refused. */
 const NORMAL = 1000;
 
+/** Whether the program penup serves this page: nothing else serves it behind a token. */
+export const isServedByProgram = () => /^\/[0-9a-f]{32}\//.test(location.pathname);
+
 /** The name of the plotter that the program has joined; empty if there is none. */
 export async function joined() {
-  // Only the program serves the page behind a token.
-  if (!/^\/[0-9a-f]{32}\//.test(location.pathname)) return "";
+  if (!isServedByProgram()) return "";
   const answer = await fetch("plotter.json");
   return (answer.ok && (await answer.json()).plotter) || "";
 }

@@ -67,21 +67,29 @@ pub fn test(arguments: &TestArguments) -> Result<()> {
     // The page is joined to this board by the client.
     set_up::emulator(&LM3S6965)?;
     firmware::check(&LM3S6965, &firmware::build(&LM3S6965)?)?;
-    let mut node =
-        if arguments.measure { node(&[], "measure.mjs")? } else { node(&["--test"], "tests.mjs")? };
+    build()?;
+    run(cargo().current_dir(crate::root()).args([
+        "build",
+        "--quiet",
+        "--package",
+        "penup-client",
+    ]))?;
+    let mut node = if arguments.measure { node(&[], "measure.mjs")? } else { tests()? };
     if arguments.pictures {
         node.env("PENUP_PICTURES", crate::root().join("docs"));
     }
     run(&mut node)
 }
 
-/// Builds the page and the client. Returns the command that runs a program of the page's tests by
-/// Node with these options.
+/// The command that tests the page. The page, the client and the image of the LM3S6965 are built.
+pub fn tests() -> Result<Command> {
+    node(&["--test"], "tests.mjs")
+}
+
+/// The command that runs a program of the page's tests by Node with these options.
 fn node(options: &[&str], program: &str) -> Result<Command> {
     let installed = set_up::browser()?;
-    build()?;
     let root = crate::root();
-    run(cargo().current_dir(&root).args(["build", "--quiet", "--package", "penup-client"]))?;
     let mut node = Command::new("node");
     node.args(options).arg(root.join("page/browser-tests").join(program));
     let penup = root.join("target/debug/penup").with_extension(env::consts::EXE_EXTENSION);

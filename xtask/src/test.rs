@@ -6,6 +6,7 @@ use anyhow::Result;
 
 use crate::command::{cargo, describe, run};
 use crate::firmware;
+use crate::page;
 use crate::set_up::{self, Toolchain};
 use crate::side_by_side;
 use crate::table::{BOARDS, BoardRow, PICO};
@@ -16,6 +17,7 @@ pub fn everything() -> Result<()> {
     for board in BOARDS {
         set_up::emulator(board)?;
     }
+    set_up::browser()?;
 
     step(workspace("fmt").args(["--all", "--check"]))?;
     for board in BOARDS {
@@ -45,6 +47,10 @@ pub fn everything() -> Result<()> {
     let mut doctests = workspace("test");
     doctests.args(["--workspace", "--doc"]).args(EMULATOR);
     tests.push(doctests);
+    // The tests above have built the client and the images.
+    say!("penup: building the page, which takes a minute or more the first time")?;
+    page::build()?;
+    tests.insert(0, page::tests()?);
     side_by_side::run(tests)
 }
 

@@ -1,8 +1,7 @@
 //! Reads files and arranges plans, by the readers that the client uses.
 
-use crate::Reading;
-use penup_readers::page::Page;
-use penup_readers::{Arrangement, PLAN_OPTIONS, SourceFile, Turn};
+use crate::{Reading, arrangement};
+use penup_readers::SourceFile;
 use wasm_bindgen::prelude::wasm_bindgen;
 
 /// Reads a file that the user calls `name`, and arranges its plan by `options`, a JSON array of
@@ -33,38 +32,10 @@ pub fn file_extensions() -> String {
     dotted.collect::<Vec<_>>().join(",")
 }
 
-/// What `options` say about a plan.
-///
-/// # Errors
-/// A value is refused.
-fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> {
-    let given = |name: &str| {
-        let option = options.iter().rfind(|(own, _)| own == name);
-        option.map(|(_, value)| value.trim())
-    };
-    let page = given("page").and_then(|page| {
-        let (width, height) = page.split_once(['x', 'X'])?;
-        Some(Page { width: width.parse().ok()?, height: height.parse().ok()? })
-    });
-    let turn = match given("landscape") {
-        None => Turn::AsItIs,
-        Some("auto") => Turn::Automatic,
-        Some(_) => Turn::Landscape,
-    };
-    let margin = given("margin").and_then(|margin| margin.parse().ok());
-    let mut arrangement = Arrangement::on(page, turn, margin);
-    for option in PLAN_OPTIONS {
-        if let Some(value) = given(option.name) {
-            let refused = |reason| format!("--{}: {reason}", option.name);
-            arrangement.set(option.name, value).map_err(refused)?;
-        }
-    }
-    Ok(arrangement)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use penup_readers::Arrangement;
     use penup_readers::lines::Lines as _;
 
     const SVG: &[u8] = b"<svg xmlns='http://www.w3.org/2000/svg' width='40mm' height='30mm' \

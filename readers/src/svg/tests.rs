@@ -388,7 +388,8 @@ fn what_is_not_drawn_is_counted() {
     assert_eq!(
         read(&svg).expect("an SVG").notes(),
         [
-            "2 texts are not read: convert text to paths (the first in line 2)",
+            "2 texts are not drawn, because a page has no fonts: open the file with penup page \
+             (the first in line 2)",
             "1 image is not drawn (line 3)",
             "1 path is not drawn as a whole: there is an error in the data, and the rest is left \
              out (line 4)",
@@ -459,7 +460,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
         ("<svg".to_owned(), "this is not a well-formed SVG"),
         ("<html/>".to_owned(), "this is not a well-formed SVG"),
         (in_mm(""), "there is nothing to draw in this SVG"),
-        (in_mm("<text>a</text>"), "nothing to draw in this SVG; 1 text is not read"),
+        (in_mm("<text>a</text>"), "nothing to draw in this SVG; 1 text is not drawn"),
         (in_mm("<path fill='none' d='M0 0H9'/>"), "1 path has neither a stroke nor a fill"),
         (in_mm("").replace("100mm", "0"), "the SVG has no size"),
         (in_mm("").replace("100mm", "NaN"), "nothing to draw"),

@@ -1,0 +1,33 @@
+//! The options of the page that arrange plans.
+
+use penup_readers::page::Page;
+use penup_readers::{Arrangement, PLAN_OPTIONS, Turn};
+
+/// What `options`, pairs of name and value, say about a plan.
+///
+/// # Errors
+/// A value is refused; the sentence names its option.
+pub fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> {
+    let given = |name: &str| {
+        let option = options.iter().rfind(|(own, _)| own == name);
+        option.map(|(_, value)| value.trim())
+    };
+    let page = given("page").and_then(|page| {
+        let (width, height) = page.split_once(['x', 'X'])?;
+        Some(Page { width: width.parse().ok()?, height: height.parse().ok()? })
+    });
+    let turn = match given("landscape") {
+        None => Turn::AsItIs,
+        Some("auto") => Turn::Automatic,
+        Some(_) => Turn::Landscape,
+    };
+    let margin = given("margin").and_then(|margin| margin.parse().ok());
+    let mut arrangement = Arrangement::on(page, turn, margin);
+    for option in PLAN_OPTIONS {
+        if let Some(value) = given(option.name) {
+            let refused = |reason| format!("--{}: {reason}", option.name);
+            arrangement.set(option.name, value).map_err(refused)?;
+        }
+    }
+    Ok(arrangement)
+}
