@@ -278,10 +278,10 @@ pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
 /// flash, and more time if the quotient is short.
 #[inline(never)] // The code of a 128-bit division is long.
 pub fn divide(dividend: u128, divisor: u128) -> u128 {
-    if let (Ok(dividend), Ok(divisor)) = (u64::try_from(dividend), u64::try_from(divisor)) {
-        return u128::from(dividend / divisor);
-    }
     debug_assert_ne!(divisor, 0);
+    if let (Ok(dividend), Ok(divisor)) = (u64::try_from(dividend), u64::try_from(divisor)) {
+        return u128::from(dividend.checked_div(divisor).unwrap_or(u64::MAX));
+    }
     let shift = divisor.leading_zeros().saturating_sub(dividend.leading_zeros());
     let (mut rest, mut part, mut quotient) = (dividend, divisor << shift, 0);
     for _ in 0..=shift {
@@ -415,6 +415,8 @@ impl fmt::Display for SixDecimals {
             millionths /= 10;
             width -= 1;
         }
+        // The mask tells the compiler that there are few.
+        let width = width & 7;
         if millionths > 0 { write!(formatter, ".{millionths:0width$}") } else { Ok(()) }
     }
 }
@@ -436,13 +438,18 @@ impl fmt::Display for Length {
         let units = i64::from(self.0.to_bits());
         let magnitude = units.abs();
         let tells_it = |decimals: &u32| {
-            let power = 10i64.pow(*decimals);
+            let power = units_in_one(*decimals).cast_signed();
             let digits = (magnitude * power + (1 << 15)) >> 16;
-            ((digits << 16) + power / 2) / power == magnitude
+            ((digits << 16) + power / 2).checked_div(power) == Some(magnitude)
         };
         let decimals = (0..5).find(tells_it).unwrap_or(5);
         BinaryFraction { units, fraction_bits: 16, decimals }.fmt(formatter)
     }
+}
+
+/// How many units with so many decimals, at most 9, there are in 1.
+fn units_in_one(decimals: u32) -> u64 {
+    (0..decimals).fold(1, |units, _| units * 10)
 }
 
 /// Formats `units` × 2^-`fraction_bits` with `decimals` decimals, rounded half away from zero.
@@ -465,14 +472,15 @@ pub struct BinaryFraction {
 impl fmt::Display for BinaryFraction {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let decimals = self.decimals.min(9);
-        let scale = 10u64.pow(decimals);
+        let scale = units_in_one(decimals);
         let bits = self.fraction_bits.min(60);
         let magnitude = self.units.unsigned_abs();
         let below_one = u128::from(magnitude & ((1 << bits) - 1)) * u128::from(scale); // below 2^90
         let half = if bits == 0 { 0 } else { 1 << (bits - 1) };
         let fraction = ((below_one + half) >> bits) as u64; // at most `scale`
-        let whole = (magnitude >> bits) + fraction / scale;
-        let fraction = fraction % scale;
+        let carries = fraction >= scale;
+        let whole = (magnitude >> bits) + u64::from(carries);
+        let fraction = if carries { 0 } else { fraction };
         if self.units < 0 && (whole, fraction) != (0, 0) {
             formatter.write_str("-")?;
         }

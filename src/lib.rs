@@ -43,6 +43,7 @@ extern crate std;
 
 pub mod array;
 pub mod board_table;
+pub mod byte_queue;
 pub mod checksum;
 pub mod fixed;
 pub mod host_only;

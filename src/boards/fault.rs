@@ -55,6 +55,23 @@ fn panic(info: &PanicInfo) -> ! {
     })
 }
 
+/// The value of what is made once, at the start of the board. If it was made before, which is a
+/// programming error, the program ends as by a fault.
+#[inline]
+pub fn once<T>(made: Option<T>) -> T {
+    made.unwrap_or_else(|| stop("a part of the board was set up twice"))
+}
+
+/// Makes the machine safe and reports the cause: the board cannot go on.
+#[cold]
+#[inline(never)]
+pub fn stop(cause: &str) -> ! {
+    end(|| {
+        defmt::error!("{=str}", cause);
+        ThisBoard::report(format_args!("{cause}"));
+    })
+}
+
 unsafe extern "C" {
     /// Where the stack begins. It grows down from there.
     static _stack_start: u32;

@@ -9,9 +9,11 @@
 
 use core::sync::atomic::{AtomicU16, AtomicU32, Ordering};
 
-use heapless::spsc::{Consumer, Queue};
+use penup::byte_queue::{ByteQueue, Consumer};
 use penup::protocol::{RealTime, Receiver};
 use static_cell::StaticCell;
+
+use super::fault::once;
 
 /// The number of slots in the queue of received bytes, one of which stays empty. A sender may have
 /// up to 240 unanswered bytes.
@@ -26,7 +28,7 @@ static REQUESTED: AtomicU16 = AtomicU16::new(0);
 /// What the receive interrupt and the main loop share of one serial port.
 pub struct Shared {
     /// The queue in which received bytes wait for the main loop.
-    queue: StaticCell<Queue<u8, RECEIVED_PLACES>>,
+    queue: StaticCell<ByteQueue<RECEIVED_PLACES>>,
     /// The number of bytes that had been queued when the last abort came.
     count_at_abort: AtomicU32,
 }
@@ -34,7 +36,7 @@ pub struct Shared {
 /// The main loop's side of one serial port, from which it reads bytes.
 pub struct Line {
     /// Where the received bytes wait.
-    bytes: Consumer<'static, u8>,
+    bytes: Consumer<'static>,
     /// The number of bytes that had been queued when the last abort came.
     count_at_abort: &'static AtomicU32,
     /// The number of bytes taken since the start, modulo 2^32.
@@ -57,10 +59,9 @@ impl Shared {
 
     /// Creates both ends of the port.
     ///
-    /// # Panics
-    /// When it is called a second time.
+    /// A second call is a fault: see [`once`].
     pub fn ends(&'static self) -> (ReceiveMerge, Line) {
-        let (producer, consumer) = self.queue.init(Queue::new()).split();
+        let (producer, consumer) = once(self.queue.try_init(ByteQueue::new())).split();
         let count_at_abort = &self.count_at_abort;
         (
             ReceiveMerge { receiver: Receiver::new(producer), count_at_abort },

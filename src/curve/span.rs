@@ -120,7 +120,7 @@ impl Span {
     /// Returns the Bézier points. The first and the last are on the curve; the others pull it
     /// towards them.
     pub(super) fn points(&self) -> &[[i64; 3]] {
-        &self.points[..=self.degree]
+        self.points.get(..=self.degree).unwrap_or(&self.points)
     }
 
     /// Returns the point at the position `local` × 2^-20 of the polynomial (de Casteljau).
@@ -181,6 +181,8 @@ fn along(p: [i64; 3], q: [i64; 3], local: u32) -> [i64; 3] {
 
 /// Divides and rounds half away from zero. `divisor` must be positive.
 fn divide_rounding(dividend: i64, divisor: i64) -> i64 {
-    let half = divisor / 2;
-    if dividend < 0 { -((half - dividend) / divisor) } else { (dividend + half) / divisor }
+    let divisor = divisor.unsigned_abs();
+    let rounded = (dividend.unsigned_abs() + divisor / 2).checked_div(divisor);
+    let rounded = rounded.unwrap_or(0).cast_signed();
+    if dividend < 0 { -rounded } else { rounded }
 }

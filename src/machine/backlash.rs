@@ -50,7 +50,7 @@ impl Backlash {
     /// Adapts the state to a change of the slack from `before` to `after` steps.
     fn resize(&mut self, before: [i32; 2], after: [i32; 2]) {
         for ((ahead, before), after) in self.ahead.iter_mut().zip(before).zip(after) {
-            *ahead = ahead.map(|now| if now == before { after } else { now.clamp(0, after) });
+            *ahead = ahead.map(|now| if now == before { after } else { now.min(after).max(0) });
         }
     }
 

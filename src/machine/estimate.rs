@@ -18,6 +18,7 @@ pub(super) fn even_milliseconds(settings: &Settings, size: JobSize) -> u64 {
 /// The time, in milliseconds, of a move from rest to rest over a `distance` (2^-16 mm). `speed`
 /// is the greatest speed (2^-16 mm/s, above 0), and `acceleration` is in 2^-16 mm/s².
 pub(super) fn rest_to_rest(distance: u64, speed: u64, acceleration: u64) -> u64 {
+    let (speed, acceleration) = (speed.max(1), acceleration.max(1));
     // This is the distance in which the speed is reached and lost again.
     if distance >= speed * speed / acceleration {
         distance.saturating_mul(1000) / speed + speed * 1000 / acceleration

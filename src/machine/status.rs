@@ -64,7 +64,7 @@ impl Machine<'_> {
         let time = job.milliseconds.max(all);
         // The times stay below 2^30 milliseconds, which is several days.
         let left = (time.min(1 << 31) * even(left).min(1 << 31)).checked_div(all).unwrap_or(0);
-        u32::try_from(left / 10 / u64::from(self.percent)).unwrap_or(u32::MAX)
+        u32::try_from(left / 10 / u64::from(self.percent.max(1))).unwrap_or(u32::MAX)
     }
 
     /// The speed that is planned, in mm/min; 0 while the machine stands.

@@ -12,7 +12,7 @@ impl Settings {
         let beyond = |at: i32, travel: i32| {
             let (least, most) =
                 if is_limited { (0, travel.min(PAGE_LIMIT)) } else { (-PAGE_LIMIT, PAGE_LIMIT) };
-            at.saturating_sub(at.clamp(least, most))
+            at.saturating_sub(at.min(most).max(least))
         };
         self.millimetres(PagePoint { x: beyond(point.x, travel.x), y: beyond(point.y, travel.y) })
     }

@@ -161,7 +161,8 @@ impl Limits {
         let exponent = (0..MAX_EXPONENT).find(|k| !too_long(k)).unwrap_or(MAX_EXPONENT);
         let reciprocal = (1u64 << 59).checked_div(braking << (2 * exponent)).unwrap_or(1);
         // Below 2^46 units of 2^-32 mm: 16 m.
-        let stop = (u64::from(self.top.to_bits()) * acceleration / braking) << 14;
+        let top = u64::from(self.top.to_bits()) * acceleration;
+        let stop = top.checked_div(braking).unwrap_or(0) << 14;
         let top = (u128::from(stop) * u128::from(reciprocal)) >> RECIPROCAL_BITS;
         BrakeRule { exponent, reciprocal, top: top.min(1 << 30) as u32 }
     }

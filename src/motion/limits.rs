@@ -129,7 +129,8 @@ impl Limits {
                 return Err(LimitsError::StepsPerMillimetre);
             }
             // 2^32 / (bits / 2^16), at most 2^31.
-            let bits = (1u64 << 48) / u64::from(steps_per_mm.to_bits().unsigned_abs());
+            let bits = (1u64 << 48).checked_div(steps_per_mm.to_bits().unsigned_abs().into());
+            let bits = bits.ok_or(LimitsError::StepsPerMillimetre)?;
             Ok(SliceSpeed::from_bits(bits as u32))
         };
         let [x, y] = settings.steps_per_mm;
@@ -189,7 +190,7 @@ impl Limits {
 
     fn check_step_rate(&self) -> Result<(), LimitsError> {
         let asked = self.step_rate(self.draw_speed.max(self.travel_speed));
-        let possible = TICKS_PER_SECOND / self.least_interval();
+        let possible = TICKS_PER_SECOND.checked_div(self.least_interval()).unwrap_or(u32::MAX);
         if asked > u64::from(possible) {
             return Err(LimitsError::TooManySteps {
                 asked: u32::try_from(asked).unwrap_or(u32::MAX),
@@ -202,7 +203,8 @@ impl Limits {
     /// The most steps a second at a speed.
     pub(super) fn step_rate(&self, speed: SliceSpeed) -> u64 {
         let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
-        u64::from(speed.to_bits()) * slices_per_second / u64::from(self.least_move.to_bits()).max(1)
+        let rate = u64::from(speed.to_bits()) * slices_per_second;
+        rate.checked_div(self.least_move.to_bits().into()).unwrap_or(u64::MAX)
     }
 
     /// The least time between two events that pulse the same axis: the pulse and as long a pause.
@@ -228,7 +230,8 @@ impl Limits {
     pub(super) fn stopping_distance(&self, speed: SliceSpeed) -> PathLength {
         let squared = u64::from(speed.to_bits()) * u64::from(speed.to_bits());
         // 2^-64 mm² over 2^-32 mm is 2^-32 mm; 14 bits more than a length has.
-        let bits = (squared / (2 * u64::from(self.acceleration.to_bits()))) >> 14;
+        let twice = 2 * u64::from(self.acceleration.to_bits());
+        let bits = squared.checked_div(twice).unwrap_or(u64::MAX) >> 14;
         PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
     }
 
@@ -276,6 +279,12 @@ fn rounding([x, y]: [SliceSpeed; 2]) -> PathLength {
     PathLength::from_bits(((x.max(y).to_bits() >> 14) * 23).div_ceil(16))
 }
 
+/// The square of a number below 2^32. `pow` would be a call, with a loop.
+#[inline(always)]
+pub(super) fn square(number: u64) -> u64 {
+    number * number
+}
+
 /// √(x² + y²) of numbers below 2^62, to 31 significant bits.
 pub(super) fn hypotenuse(x: u64, y: u64) -> u64 {
     if x == 0 || y == 0 {
@@ -309,7 +318,7 @@ pub(super) fn mm_per_min(speed: SliceSpeed) -> Millimetres {
 fn slice_acceleration(mm_per_s2: Millimetres) -> SliceSpeed {
     // 2^-16 mm/s² to 2^-32 mm/slice²: bits * 2^16 * 2^24 / (2^6 * 5^8)², the twos cancelled.
     let bits = u64::from(mm_per_s2.to_bits().unsigned_abs());
-    SliceSpeed::from_bits(((bits << 28) / 5u64.pow(16)) as u32)
+    SliceSpeed::from_bits(((bits << 28) / const { 5u64.pow(16) }) as u32)
 }
 
 #[cfg(test)]

@@ -12,7 +12,7 @@ use super::curvature::Curvature;
 use super::emitter::{Kinds, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
-use super::limits::mm_per_min;
+use super::limits::{mm_per_min, square};
 use super::lookahead::BlockKind;
 use super::profile::{FRACTION_BITS, Pace, Profile};
 use super::smooth::{Interval, Road, State};
@@ -273,7 +273,7 @@ impl<'m> Runner<'m> {
         let greatest = self.limits.draw_speed.max(self.limits.travel_speed);
         let scaled = |speed: SliceSpeed, percent: u64| {
             let bits = u64::from(speed.to_bits()) * percent / 100;
-            let bits = bits.clamp(1, greatest.to_bits().into());
+            let bits = bits.min(greatest.to_bits().into()).max(1);
             Pace::of_speed(&self.limits, SliceSpeed::from_bits(bits as u32))
         };
         let draw = scaled(self.limits.draw_speed, percent);
@@ -547,7 +547,7 @@ impl<'m> Runner<'m> {
 
     /// Slows down for bends that are known only now: on the piece in work, or behind a cruise that
     /// would pass one too fast.
-    #[inline]
+    #[inline(never)] // Inlined, it would only fill the cache.
     fn heed_bends(&mut self) {
         let late = self.lookahead.late_limit();
         if let Some(course) = &mut self.course
@@ -562,7 +562,7 @@ impl<'m> Runner<'m> {
         if limit < PathLength::MAX
             && let Some(Plan::Interval(interval)) = &self.plan
             && interval.is_cruise()
-            && u64::from(interval.state().speed).pow(2) > self.limits.squared_speed(limit)
+            && square(interval.state().speed.into()) > self.limits.squared_speed(limit)
         {
             self.give_plan_up();
         }

@@ -16,6 +16,7 @@
 //! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
 //! slices, negative for braking. Then all changes are polynomials in whole numbers.
 
+use super::limits::square;
 use super::profile::Slice;
 use super::{Limits, Lookahead, PathLength, SliceSpeed};
 use crate::fixed::Millimetres;
@@ -57,13 +58,15 @@ impl JerkLimit {
         let bits = u64::from(jerk_m_per_s3.to_bits().unsigned_abs());
         // 2^-16 m/s³ to 2^-40 mm/slice³: bits * 1000 * 2^24 * (2^12 / 5^8 / 2^6)³, the twos
         // cancelled.
-        let jerk = (((bits << 36) / 5u64.pow(10)) << 9) / 5u64.pow(11);
+        let jerk = (((bits << 36) / const { 5u64.pow(10) }) << 9) / const { 5u64.pow(11) };
         let jerk = jerk * 16 / u64::from(MOST_GROWTH.unsigned_abs());
         let (acceleration, fastest) =
             (u64::from(acceleration.to_bits()), u64::from(fastest.to_bits()));
         // A jerk that builds all up within less than the shortest ramp is of no use.
         let most = (acceleration << 12) / u64::from(Self::SHORTEST);
-        let jerk = jerk.min(most).min((fastest << 16) / u64::from(Self::SHORTEST).pow(2));
+        let jerk = jerk
+            .min(most)
+            .min((fastest << 16) / const { Self::SHORTEST as u64 * Self::SHORTEST as u64 });
         let limit = NonZeroU32::new(u32::try_from(jerk).unwrap_or(u32::MAX))?;
         let by_acceleration = (acceleration << 12) / jerk;
         let by_speed = ((fastest << 16) / jerk).isqrt();
@@ -104,7 +107,7 @@ impl JerkLimit {
 
     /// The speed that is shed while a ramp of braking ends.
     fn speed_shed(self, ramp: u32) -> u64 {
-        (u64::from(self.jerk.get()) * u64::from(ramp).pow(2)) >> 17
+        (u64::from(self.jerk.get()) * square(ramp.into())) >> 17
     }
 
     fn jerk(self) -> i64 {
@@ -114,7 +117,7 @@ impl JerkLimit {
     /// The ramp after so many slices in which it grows from `ramp` by `growth` a slice, until it is
     /// as long as it may be.
     fn grown(self, ramp: i32, growth: i32, slices: u16) -> i32 {
-        (ramp + growth * i32::from(slices)).clamp(-self.longest, self.longest)
+        (ramp + growth * i32::from(slices)).min(self.longest).max(-self.longest)
     }
 
     /// What such a ramp adds to the speed.
@@ -147,7 +150,7 @@ impl JerkLimit {
     fn sums(self, ramp: i32, growth: i32, slices: i32) -> RampSums {
         let mut sums = RampSums::default();
         let longest = self.longest * growth.signum();
-        let whole = (longest - ramp).checked_div(growth).unwrap_or(0).clamp(0, slices - 1);
+        let whole = (longest - ramp).checked_div(growth).unwrap_or(0).min(slices - 1).max(0);
         let last = ramp + growth * whole;
         sums.add(ramp, last, whole);
         sums.add(last, longest, 1);
@@ -405,7 +408,8 @@ impl Road<'_, '_> {
         let (mut slices, is_uneven) = jerk.slices_from(from);
         // The hardest braking is as hard as it may be, as soon as it can.
         let mut least = if from.ramp > -jerk.longest { -MOST_GROWTH } else { 0 };
-        let mut most = MOST_GROWTH.min((jerk.longest - from.ramp) / i32::from(slices));
+        let room = (jerk.longest - from.ramp).checked_div(slices.into()).unwrap_or(0);
+        let mut most = MOST_GROWTH.min(room);
         if self.allows(from, most, slices) {
             least = most;
         }
@@ -421,12 +425,15 @@ impl Road<'_, '_> {
             least = MOST_GROWTH;
         }
         // Where it makes the next interval longer, a little less.
-        if is_uneven && least > -MOST_GROWTH && (from.ramp / i32::from(slices) + least) & 1 != 0 {
+        if is_uneven
+            && least > -MOST_GROWTH
+            && (from.ramp.checked_div(slices.into()).unwrap_or(0) + least) & 1 != 0
+        {
             least -= 1;
         }
         if from.speed == 0 && least <= 0 {
             let way = jerk.gained_way(0, 1, slices).unsigned_abs();
-            let speed = (way / u64::from(slices)).max(1) as u32;
+            let speed = way.checked_div(slices.into()).unwrap_or(0).max(1) as u32;
             return Interval::new(jerk, State { speed, ramp: 0 }, 0, slices);
         }
         // As fast as it may be at all: nothing that comes can change that.
@@ -447,7 +454,7 @@ impl Road<'_, '_> {
             let left = blocks.stopping_distance_at((self.room + blocks.known()) >> 14, self.limits);
             self.top > 0
                 && lowest > 0
-                && self.jerk.settled(from).pow(2) <= self.limits.squared_speed(lowest)
+                && square(self.jerk.settled(from)) <= self.limits.squared_speed(lowest)
                 && self.jerk.braking_distance(from, 0) >> 14 < left - left / 8
         })
     }

@@ -28,7 +28,7 @@ pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
             let _ = values.push((u16::from_le_bytes([a, b]), value));
         }
     });
-    Settings::restored(values)
+    Settings::restored(values.iter().copied())
 }
 
 /// Keeps the settings in the board's flash.

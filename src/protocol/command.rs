@@ -255,9 +255,8 @@ impl<'a> Command<'a> {
             return command;
         }
         // A `#` begins a comment where a space stands before it.
-        let comment = text.match_indices('#').map(|(at, _)| at);
-        let mut comment = comment.filter(|at| text.as_bytes()[..*at].ends_with(b" "));
-        let text = trim(text.get(..comment.next().unwrap_or(text.len())).unwrap_or(text));
+        let comment = text.as_bytes().windows(2).position(|pair| pair == b" #");
+        let text = trim(comment.and_then(|at| text.get(..at)).unwrap_or(text));
         if let Some((name, value)) = text.split_once('=') {
             let (name, value) = (trim(name), trim(value));
             if name == "resume" {

@@ -63,13 +63,13 @@ impl<'a> GCode<'a> {
     /// }
     /// ```
     pub fn begins(line: &str) -> bool {
-        let mut bytes = line.bytes().skip_while(|byte| *byte == b' ' || *byte == b'\t').peekable();
+        let mut bytes = line.bytes().skip_while(|byte| *byte == b' ' || *byte == b'\t');
         match bytes.next() {
             Some(b'A'..=b'Z' | b'(' | b';' | b'%' | b'/') => true,
             Some(letter @ b'a'..=b'z') => {
                 let may_be_obj = matches!(letter, b'f' | b'g' | b'l' | b'o' | b's' | b'v');
-                while !may_be_obj && bytes.next_if(|byte| byte.is_ascii_whitespace()).is_some() {}
-                matches!(bytes.next(), Some(b'0'..=b'9' | b'+' | b'-' | b'.' | b'('))
+                let after = bytes.find(|byte| may_be_obj || !byte.is_ascii_whitespace());
+                matches!(after, Some(b'0'..=b'9' | b'+' | b'-' | b'.' | b'('))
             }
             _ => false,
         }

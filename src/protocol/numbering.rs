@@ -245,7 +245,8 @@ impl<'a> Checked<'a> {
 
 /// The text before the last `*`, and the checksum after it.
 fn split_checksum(line: &str) -> Option<(&str, Checksum, u16)> {
-    let (head, tail) = line.rsplit_once('*')?;
+    let (head, tail) = line.split_at_checked(line.bytes().rposition(|byte| byte == b'*')?)?;
+    let tail = tail.get(1..)?;
     let is_hexadecimal = |byte: u8| matches!(byte, b'0'..=b'9' | b'A'..=b'F');
     if tail.len() == 4 && tail.bytes().all(is_hexadecimal) {
         return Some((head, Checksum::Crc, u16::from_str_radix(tail, 16).ok()?));

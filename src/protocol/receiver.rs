@@ -13,8 +13,8 @@
 //! never causes a reply.
 
 use super::{RealTime, Sorter};
+use crate::byte_queue::Producer;
 use core::fmt;
-use heapless::spsc::Producer;
 
 /// Marks the place among received bytes where bytes were lost or damaged. UTF-8 never contains it.
 /// If a sender itself sends this byte, it counts as damage, too.
@@ -29,7 +29,7 @@ const BYTES_WERE_LOST: u32 = 1 << 11;
 /// The part of a serial port that its receive interrupt uses.
 pub struct Receiver<'q> {
     /// Where ordinary bytes wait for the main loop.
-    queue: Producer<'q, u8>,
+    queue: Producer<'q>,
     /// Tells the bytes that act at once from those of lines.
     sorter: Sorter,
     /// The number of bytes put into the queue since the start, modulo 2^32.
@@ -61,7 +61,7 @@ impl fmt::Debug for Receiver<'_> {
 
 impl<'q> Receiver<'q> {
     /// A receiver that puts ordinary bytes into `queue`.
-    pub const fn new(queue: Producer<'q, u8>) -> Self {
+    pub const fn new(queue: Producer<'q>) -> Self {
         let sorter = Sorter::new();
         Self { queue, sorter, count: 0, has_heard: false, damage: Damage::None }
     }
@@ -180,7 +180,7 @@ impl<'q> Receiver<'q> {
 mod tests {
     use super::super::{CommandError, LineReader};
     use super::*;
-    use heapless::spsc::{Consumer, Queue};
+    use crate::byte_queue::{ByteQueue, Consumer};
     use std::string::{String, ToString};
     use std::vec::Vec;
 
@@ -192,7 +192,7 @@ mod tests {
     /// The lines that a reader makes from the bytes in the queue.
     fn lines(
         reader: &mut LineReader,
-        queue: &mut Consumer<'_, u8>,
+        queue: &mut Consumer<'_>,
     ) -> Vec<Result<String, CommandError>> {
         let mut lines = Vec::new();
         while let Some(byte) = queue.dequeue() {
@@ -203,7 +203,7 @@ mod tests {
 
     /// The lines that result from the values of a PL011's data register.
     fn lines_of(data: impl IntoIterator<Item = u32>) -> Vec<Result<String, CommandError>> {
-        let (mut queue, mut reader) = (Queue::<u8, 256>::new(), LineReader::default());
+        let (mut queue, mut reader) = (ByteQueue::<256>::new(), LineReader::default());
         let (producer, mut consumer) = queue.split();
         let mut receiver = Receiver::new(producer);
         for data in data {
@@ -273,7 +273,7 @@ mod tests {
 
     #[test]
     fn a_full_queue_is_marked_before_any_later_byte() {
-        let (mut queue, mut reader) = (Queue::<u8, 8>::new(), LineReader::default());
+        let (mut queue, mut reader) = (ByteQueue::<8>::new(), LineReader::default());
         let (producer, mut consumer) = queue.split();
         let mut receiver = Receiver::new(producer);
         for byte in *b"$I\n$100=80\n" {
@@ -290,7 +290,7 @@ mod tests {
 
     #[test]
     fn real_time_bytes_act_however_full_the_queue_is() {
-        let mut queue = Queue::<u8, 2>::new();
+        let mut queue = ByteQueue::<2>::new();
         let (producer, _consumer) = queue.split();
         let mut receiver = Receiver::new(producer);
         for byte in *b"v 1" {
@@ -302,7 +302,7 @@ mod tests {
 
     #[test]
     fn an_abort_voids_what_was_lost_before_it() {
-        let (mut queue, mut reader) = (Queue::<u8, 16>::new(), LineReader::default());
+        let (mut queue, mut reader) = (ByteQueue::<16>::new(), LineReader::default());
         let (producer, mut consumer) = queue.split();
         let mut receiver = Receiver::new(producer);
         for byte in *b"$100=80" {
@@ -321,7 +321,7 @@ mod tests {
 
     #[test]
     fn a_stray_first_byte_of_a_letter_on_one_port_leaves_the_others_real_time_bytes() {
-        let (mut first, mut second) = (Queue::<u8, 8>::new(), Queue::<u8, 8>::new());
+        let (mut first, mut second) = (ByteQueue::<8>::new(), ByteQueue::<8>::new());
         let (mut first, mut second) =
             (Receiver::new(first.split().0), Receiver::new(second.split().0));
         first.receive(0xF0);

@@ -157,9 +157,8 @@ impl Arc {
         arc.find_corner();
         arc.position = arc.position_of(from);
         let ahead = (arc.position_of(to) - arc.position) * i32::from(arc.step);
-        let whole = 2 * (arc.moves_of(0) + arc.moves_of(1));
-        let moves = ahead.rem_euclid(whole);
-        arc.remaining = if from == to { whole } else { moves }.unsigned_abs().max(1);
+        arc.remaining =
+            if from == to { arc.whole() } else { arc.around(ahead) }.unsigned_abs().max(1);
         Ok(arc)
     }
 
@@ -170,10 +169,10 @@ impl Arc {
         // This estimates the point at which the circle is equally steep along both axes; the loops
         // below correct it to the exact step.
         let position = |mine: i64, others: i64| {
-            let (mine, others) = (mine.unsigned_abs(), others.unsigned_abs());
+            let (mine, others) = (mine.unsigned_abs().max(1), others.unsigned_abs());
             // This is the square of the position, at most `radius` / 4 over the square of the
             // axis's weight.
-            let square = self.radius / 4 / (mine + others) * others / mine;
+            let square = self.radius / 4 / (mine + others).max(1) * others / mine;
             square.isqrt() as i32 + 1
         };
         let mut half = [position(y, x), position(x, y)];
@@ -197,6 +196,16 @@ impl Arc {
         (2 * self.half[side] + i32::from(!self.corner_is_shared)).max(1)
     }
 
+    /// The number of moves along the whole circle; at least 4.
+    fn whole(&self) -> i32 {
+        2 * (self.moves_of(0) + self.moves_of(1))
+    }
+
+    /// A position on the circle or beyond it, counted from 0 up to below [`Arc::whole`].
+    fn around(&self, position: i32) -> i32 {
+        position.checked_rem_euclid(self.whole()).unwrap_or(0)
+    }
+
     /// The least and the greatest coordinates of the points that are still to come.
     ///
     /// ```
@@ -218,10 +227,9 @@ impl Arc {
             include(self.point_at(self.position + step));
         }
         // In the middle of each side the circle is farthest out.
-        let half_turn = self.moves_of(0) + self.moves_of(1);
         for side in 0..4 {
             let middle = self.begin_of(side) + self.half[side % 2];
-            let ahead = ((middle - self.position) * step).rem_euclid(2 * half_turn);
+            let ahead = self.around((middle - self.position) * step);
             if ahead.unsigned_abs() < self.remaining {
                 include(self.point_at(middle));
             }
@@ -249,13 +257,12 @@ impl Arc {
             (3, x)
         };
         let half = self.half[side % 2];
-        self.begin_of(side) + along.clamp(-half, half) + half
+        self.begin_of(side) + along.min(half).max(-half) + half
     }
 
     /// Returns the point at a position on the circle.
     fn point_at(&self, position: i32) -> PagePoint {
-        let [mut position, half_turn] = [position, self.moves_of(0) + self.moves_of(1)];
-        position = position.rem_euclid(2 * half_turn);
+        let (mut position, half_turn) = (self.around(position), self.whole() / 2);
         let is_second = position >= half_turn;
         position -= if is_second { half_turn } else { 0 };
         let side = usize::from(position >= self.moves_of(0));
@@ -269,7 +276,7 @@ impl Arc {
     /// The distance from the centre, rounded to whole steps, at which the circle crosses the offset
     /// `along` of a side.
     fn across(&self, side: usize, along: i32) -> i32 {
-        let out = u32::from(self.weights[side]);
+        let out = u32::from(self.weights[side]).max(1);
         let along = u64::from(along.unsigned_abs()) * u64::from(self.weights[1 - side]);
         // The number has at most 63 bits, so its root fits.
         let doubled = self.radius.saturating_sub(4 * along * along).isqrt() as u32;

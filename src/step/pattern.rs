@@ -60,15 +60,19 @@ impl Pattern {
             return self.moves;
         }
         let Dashes { lengths, period, .. } = self.line_type.dashes();
+        let Some(first) = lengths.first() else { return self.moves };
         let (count, period) = (lengths.len() as u32, period as u32);
         let mut dots = piece / count * period;
-        let (mut at, before) = (0, piece % count);
-        while at <= before {
-            dots += lengths[at as usize] as u32;
-            at += 1;
+        let (mut rest, mut left) = (lengths, piece % count + 1);
+        while left > 0
+            && let [length, behind @ ..] = rest
+        {
+            dots += *length as u32;
+            (rest, left) = (behind, left - 1);
         }
         let dots = dots as u64;
-        let all = (self.repeats * period + lengths[0] as u32) as u64;
+        let all = (self.repeats * period + *first as u32) as u64;
+        let all = if all == 0 { 1 } else { all };
         // The result is rounded to the nearest number. There is no tie, because a line is an odd
         // number of dots long, which never divides at half a move.
         ((2 * dots * self.moves as u64 + all) / (2 * all)) as u32

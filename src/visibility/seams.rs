@@ -99,7 +99,10 @@ fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
 /// Returns the pair whose two points are farthest apart.
 fn farthest(pairs: [(Vertex, Vertex); 3]) -> (Vertex, Vertex) {
     let distance = |(p, q): &(Vertex, Vertex)| {
-        let square = |a: i32, b: i32| (i64::from(a) - i64::from(b)).pow(2);
+        let square = |a: i32, b: i32| {
+            let difference = i64::from(a) - i64::from(b);
+            difference * difference
+        };
         square(p.x, q.x) + square(p.y, q.y) + square(p.z, q.z)
     };
     let [first, rest @ ..] = pairs;

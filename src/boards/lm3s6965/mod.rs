@@ -50,6 +50,8 @@ use penup::plotter::{Board, Memory, MemorySlices};
 use penup::protocol::RealTime;
 use static_cell::{ConstStaticCell, StaticCell};
 
+use super::fault::once;
+
 /// Whether an interrupt has come since [`Board::wait`] last returned. It replaces the Cortex-M
 /// event register in software, because QEMU's `wfe` does not sleep.
 static HAPPENED: AtomicBool = AtomicBool::new(false);
@@ -76,17 +78,9 @@ pub struct Lm3s6965 {
 }
 
 /// Sets up the clock, the pins, the serial line and the timers. Afterwards the drivers are off, the
-/// pen is up and nothing moves.
-///
-/// # Panics
-/// When the board was taken before.
+/// pen is up and nothing moves. To take the board twice is a fault: see [`once`].
 pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
-    let Some(mut core) = Peripherals::take() else {
-        #[allow(clippy::panic, reason = "a programming error, found at the first start")]
-        {
-            panic!("the board was taken twice")
-        }
-    };
+    let mut core = once(Peripherals::take());
     let clock = clock::start(core.SYST, &mut core.SCB);
     let pins = pins::set_up();
     contacts::set_up(&mut core.NVIC);
@@ -95,7 +89,8 @@ pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
     defmt::info!("lm3s6965 at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<BoardMemory> = ConstStaticCell::new(BoardMemory::new());
     static BLOCKS: StaticCell<[Block; ROW.memory.blocks]> = StaticCell::new();
-    let memory = MEMORY.take().lend(BLOCKS.init([Block::EMPTY; ROW.memory.blocks]));
+    let blocks = once(BLOCKS.try_init([Block::EMPTY; ROW.memory.blocks]));
+    let memory = once(MEMORY.try_take()).lend(blocks);
     (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
 }
 

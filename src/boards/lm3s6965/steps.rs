@@ -22,6 +22,7 @@ use static_cell::ConstStaticCell;
 use super::pins::{AxisPins, MotorPins, PenPin};
 use super::registers::{SYSTEM_CONTROL, TIMER1, TIMER2};
 use super::{HAPPENED, clock, critical};
+use crate::boards::fault::once;
 use crate::boards::handler::Owned;
 use penup::board_table::LM3S6965;
 
@@ -120,7 +121,8 @@ pub fn set_up(pins: MotorPins, nvic: &mut NVIC) -> Steps {
         timer.write(offset::INTERRUPT_MASK, TIMED_OUT);
     }
 
-    let (pulser, events) = Pulser::new(pins.axes, Solenoid(pins.pen), RING.take(), &STATE);
+    let (pulser, events) =
+        Pulser::new(pins.axes, Solenoid(pins.pen), once(RING.try_take()), &STATE);
     let stepper = Stepper { pulser, due: 0 };
     // SAFETY: the interrupts are masked since reset, and this runs once (the ring's cell ensures
     // it).

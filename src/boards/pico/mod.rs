@@ -56,6 +56,7 @@ use static_cell::{ConstStaticCell, StaticCell};
 
 use self::emergency::Start;
 use self::ports::Ports;
+use super::fault::{self, once};
 
 /// The second-stage boot loader, which the boot ROM runs to set up the flash.
 #[unsafe(link_section = ".boot2")]
@@ -89,15 +90,10 @@ pub struct Pico {
 }
 
 /// Sets up the clock, the pins, the serial lines, the state machine and the timer. Afterwards the
-/// drivers are off, the pen is up and nothing moves.
-///
-/// # Panics
-/// When the board was taken before, or when its crystal does not oscillate.
-#[allow(clippy::panic, reason = "without clocks the program cannot continue")]
+/// drivers are off, the pen is up and nothing moves. It is a fault if the board was taken before,
+/// or if its crystal does not oscillate.
 pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
-    let (Some(mut core), Some(mut chip)) = (Core::take(), Peripherals::take()) else {
-        panic!("the board was taken twice")
-    };
+    let (mut core, mut chip) = (once(Core::take()), once(Peripherals::take()));
     critical::move_vectors_to_ram();
     let start = emergency::start();
     let mut watchdog = Watchdog::new(chip.WATCHDOG);
@@ -110,7 +106,7 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
         &mut chip.RESETS,
         &mut watchdog,
     );
-    let Ok(clocks) = clocks else { panic!("the clocks do not start") };
+    let Ok(clocks) = clocks else { fault::stop("the clocks do not start") };
     registers::restart(registers::reset::TIMER);
     let sio = Sio::new(chip.SIO);
     // It takes the pins out of reset.
@@ -123,7 +119,7 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let uart = serial::set_up(&mut core.NVIC);
     let controller = (chip.USBCTRL_REGS, chip.USBCTRL_DPRAM);
     static NUMBER: StaticCell<heapless::String<16>> = StaticCell::new();
-    let number = NUMBER.init(flash.number());
+    let number = once(NUMBER.try_init(flash.number()));
     let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS, number);
     let ports = Ports::new(lines, uart, usb);
     pins::hand_over();
@@ -140,7 +136,8 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
         Start::AfterFault(cause) => Some(cause),
         Start::Rescue(cause) => rescue::run(ports, &cause),
     };
-    let memory = MEMORY.take().lend(BLOCKS.take());
+    let blocks = once(BLOCKS.try_take());
+    let memory = once(MEMORY.try_take()).lend(blocks);
     let kept = Kept::new(flash, flash::LAYOUT);
     let board = Pico { ports, steps, kept, fault };
     (board, memory, &steps::STATE)

@@ -128,7 +128,7 @@ impl Ports {
     /// reading a port until nothing waits there or its line ends, then it is the other port's turn.
     pub fn read_byte(&mut self) -> Option<(usize, u8)> {
         for _ in 0..COUNT {
-            let port = self.last;
+            let port = self.last % COUNT;
             if let Some(byte) = self.lines[port].read_byte() {
                 if byte == b'\n' {
                     self.last = (port + 1) % COUNT;

@@ -16,7 +16,7 @@
 use core::sync::atomic::{AtomicU16, Ordering};
 
 use cortex_m::peripheral::NVIC;
-use heapless::spsc::{Consumer, Producer, Queue};
+use penup::byte_queue::{ByteQueue, Consumer, Producer};
 use rp2040_hal::pac::dma::CH;
 use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
@@ -24,6 +24,7 @@ use static_cell::StaticCell;
 use super::ports::{self, Inlets, Port};
 use super::registers::{self, DMA, Get, Put, UART0, reset};
 use super::{clock, critical, divider};
+use crate::boards::fault::once;
 use crate::boards::handler::Owned;
 
 /// The number of slots in the queue of bytes to send, one of which stays empty.
@@ -46,9 +47,9 @@ const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 static RING: Ring = Ring([const { AtomicU16::new(0) }; RING_SLOTS as usize]);
 
 /// The queue of bytes to send.
-static QUEUE: StaticCell<Queue<u8, SENT_SLOTS>> = StaticCell::new();
+static QUEUE: StaticCell<ByteQueue<SENT_SLOTS>> = StaticCell::new();
 /// The handler's end of the queue of bytes to send.
-static SENDER: Owned<Consumer<'static, u8>> = Owned::empty();
+static SENDER: Owned<Consumer<'static>> = Owned::empty();
 /// The number of bytes of the ring that have been read, modulo two turns.
 static READ_COUNT: Owned<u32> = Owned::empty();
 
@@ -71,7 +72,7 @@ mod control {
 }
 
 /// Sends bytes by UART0: the main loop's side of the queue of bytes to send.
-pub struct Sender(Producer<'static, u8>);
+pub struct Sender(Producer<'static>);
 
 /// Sets up the port; [`open`] opens it. Both `ports` and `steps` must be set up before, because
 /// `steps` resets the DMA.
@@ -80,7 +81,7 @@ pub fn set_up(nvic: &mut NVIC) -> Sender {
     UART0.set_up(clock::HERTZ);
     UART0.receive_by_dma(true);
 
-    let (sent, to_send) = QUEUE.init(Queue::new()).split();
+    let (sent, to_send) = once(QUEUE.try_init(ByteQueue::new())).split();
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
     // it).
     unsafe {
@@ -148,7 +149,7 @@ fn read_ring(inlets: &mut Inlets) {
 impl Sender {
     /// Whether there is room at once for this many bytes.
     pub fn has_room(&self, bytes: usize) -> bool {
-        self.0.capacity() - self.0.len() >= bytes
+        self.0.room() >= bytes
     }
 
     /// Sends `bytes`. It waits only while the queue is full.

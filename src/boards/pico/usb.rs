@@ -22,8 +22,8 @@ mod frame;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m::peripheral::NVIC;
-use heapless::spsc::{Consumer, Producer, Queue};
 use heapless::{Deque, Vec};
+use penup::byte_queue::{ByteQueue, Consumer, Producer};
 use penup::protocol::{DAMAGED, RealTime};
 use rp2040_hal::clocks::UsbClock;
 use rp2040_hal::pac::{Interrupt, RESETS, USBCTRL_DPRAM, USBCTRL_REGS, interrupt};
@@ -41,6 +41,7 @@ pub use self::frame::forget as forget_frame;
 use super::ports::{self, Inlets, Port};
 use super::registers::{Get, Put, USB, USB_MEMORY};
 use super::{clock, critical, divider};
+use crate::boards::fault::once;
 use crate::boards::handler::Owned;
 
 /// The USB number for tests and for projects without a number of their own:
@@ -86,7 +87,7 @@ mod buffer {
 /// The USB bus of the driver, which its other parts borrow.
 static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
 /// The queue of bytes to send.
-static QUEUE: StaticCell<Queue<u8, SENT_SLOTS>> = StaticCell::new();
+static QUEUE: StaticCell<ByteQueue<SENT_SLOTS>> = StaticCell::new();
 /// The device, which belongs to the USB handler.
 static DEVICE: Owned<Device> = Owned::empty();
 
@@ -126,7 +127,7 @@ struct Device {
     /// The value of [`Inlets::aborts`] when it was last read.
     aborts: u32,
     /// The bytes to send, as the handler takes them from the queue.
-    to_send: Consumer<'static, u8>,
+    to_send: Consumer<'static>,
     /// The bytes of the next packet, which the controller has not taken yet.
     packet: Vec<u8, SENT_PACKET>,
 }
@@ -134,7 +135,7 @@ struct Device {
 /// Sends bytes by USB: the main loop's side of the queue of bytes to send.
 pub struct Sender {
     /// Where the main loop puts the bytes to send.
-    bytes: Producer<'static, u8>,
+    bytes: Producer<'static>,
     /// The time since which there has been no room, in microseconds, and the number of bytes that
     /// waited then.
     full: Option<(u32, usize)>,
@@ -155,13 +156,14 @@ pub fn set_up(
     number: &'static str,
 ) -> Sender {
     const POWERED: bool = true; // USB powers the Pico; the pin that would show it is in use.
-    let bus: &UsbBusAllocator<_> = BUS.init(UsbBusAllocator::new(UsbBus::new(
+    let bus = once(BUS.try_init(UsbBusAllocator::new(UsbBus::new(
         controller.0,
         controller.1,
         clock,
         POWERED,
         resets,
-    )));
+    ))));
+    let bus: &UsbBusAllocator<_> = bus;
     let class = CdcAcmClass::new(bus, PACKET as u16);
     let strings = StringDescriptors::default()
         .manufacturer("penup")
@@ -169,7 +171,7 @@ pub fn set_up(
         .serial_number(number);
     let builder = UsbDeviceBuilder::new(bus, VENDOR_AND_PRODUCT).device_class(USB_CLASS_CDC);
     let builder = builder.strings(&[strings]).and_then(|builder| builder.max_packet_size_0(64));
-    let (sent, to_send) = QUEUE.init(Queue::new()).split();
+    let (sent, to_send) = once(QUEUE.try_init(ByteQueue::new())).split();
     if let Ok(builder) = builder {
         let device = Device {
             device: builder.build(),
@@ -198,7 +200,7 @@ impl Sender {
     /// nothing for [`HOST_TIMEOUT`], the host counts as gone.
     pub fn has_room(&mut self, bytes: usize) -> bool {
         let waiting = self.bytes.len();
-        if HOST_IS_GONE.load(Ordering::Relaxed) || self.bytes.capacity() - waiting >= bytes {
+        if HOST_IS_GONE.load(Ordering::Relaxed) || self.bytes.room() >= bytes {
             self.full = None;
             return true;
         }
@@ -362,7 +364,7 @@ impl Device {
     /// Takes back a packet that the controller holds for the host, unless the host is taking it
     /// just now.
     fn take_packet_back(&mut self) {
-        let endpoint = self.class.write_ep().address().index();
+        let endpoint = self.class.write_ep().address().index() & 0xF; // the bits of its number
         let endpoint_buffer = USB_MEMORY.ep_buffer_control(2 * endpoint);
         let control = endpoint_buffer.get();
         if control & buffer::AVAILABLE == 0 {

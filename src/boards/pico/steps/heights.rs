@@ -1,7 +1,7 @@
 //! The heights of the pen and the steps of its motor, which wait in a queue of their own beside the
 //! words.
 
-use heapless::spsc::{Consumer, Queue};
+use penup::byte_queue::{ByteQueue, Consumer};
 use rp2040_hal::pac::interrupt;
 use static_cell::StaticCell;
 
@@ -25,9 +25,9 @@ pub mod z_axis_levels {
 }
 
 /// The heights of the pen, and the levels of its motor's pins, that wait for their time.
-pub static HEIGHT_QUEUE: StaticCell<Queue<u8, HEIGHTS>> = StaticCell::new();
+pub static HEIGHT_QUEUE: StaticCell<ByteQueue<HEIGHTS>> = StaticCell::new();
 /// The end of that queue from which the handler takes what is due.
-pub static HEIGHTS_DUE: Owned<Consumer<'static, u8>> = Owned::empty();
+pub static HEIGHTS_DUE: Owned<Consumer<'static>> = Owned::empty();
 
 /// Processes the entries that are left in the queue. If two heights come faster than the interrupt,
 /// one is left over, and the last one counts. Steps of the pen's motor are left over only where

@@ -29,21 +29,22 @@ mod word_ring;
 use core::sync::atomic::{Ordering, compiler_fence};
 
 use cortex_m::peripheral::NVIC;
-use heapless::spsc::{Producer, Queue};
 use penup::board_table::PICO;
+use penup::byte_queue::{ByteQueue, Producer};
 use penup::machine::PulserState;
 use penup::motion::{Brake, Runner, StepEvent, StepLength, TICKS_PER_SECOND};
 use rp2040_hal::pac::Interrupt;
 
 use super::registers::{DMA, Get, PIO0, Put};
 use super::{clock, critical, pen, words};
+use crate::boards::fault::once;
 pub use engine::release;
 use engine::{
     LEVEL, LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, RELEASED, STALLED, TARGETS, WAIT_TICKS, begin,
     order, set_pins, target,
 };
 use feed::{ABANDONED, BRAKE, FEEDING, HANDED_OVER, WRITTEN, taken};
-use heights::{HEIGHT_QUEUE, HEIGHTS, HEIGHTS_DUE, drain_heights};
+use heights::{HEIGHT_QUEUE, HEIGHTS_DUE, drain_heights};
 use word_ring::{WORDS, row, slot};
 
 pub(super) use target::PULSE;
@@ -67,7 +68,7 @@ pub static STATE: PulserState = PulserState::new();
 /// The main loop's side of the steps: it writes words to the ring and counts those that were taken.
 pub struct Steps {
     /// The queue of the heights of the pen and the steps of its motor.
-    heights: Producer<'static, u8>,
+    heights: Producer<'static>,
     /// The lengths of the steps that will be appended, which the brake needs.
     step_length: StepLength,
     /// The number of words put into the ring; it wraps. It is the same as [`WRITTEN`].
@@ -112,7 +113,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
     word_ring::clear();
     engine::set_up();
 
-    let (heights, due) = HEIGHT_QUEUE.init(Queue::new()).split();
+    let (heights, due) = once(HEIGHT_QUEUE.try_init(ByteQueue::new())).split();
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
     // it).
     unsafe {
@@ -202,7 +203,7 @@ impl Steps {
         STATE.report(self.steps, self.ticks, self.drained);
         let waiting = self.written.wrapping_sub(self.taken);
         let words = (WORDS - RESERVED).saturating_sub(waiting);
-        self.room = words.min((HEIGHTS - 1 - self.heights.len()) as u32);
+        self.room = words.min(self.heights.room() as u32);
     }
 
     /// Adopts the settings, which change only while nothing moves.

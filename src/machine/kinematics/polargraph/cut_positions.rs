@@ -101,7 +101,7 @@ impl CutPositions {
             if distance < even {
                 (2 * distance).unsigned_abs().isqrt() as i32
             } else {
-                longest + (distance - even) / longest
+                longest + (distance - even).checked_div(longest).unwrap_or(0)
             }
         };
         let cut = |k: i32| {

@@ -120,7 +120,7 @@ impl Anchors {
             // more than half a step.
             let step = 1 << line.bits;
             let offset = line.other_belt(exact, steps, major) - (others << line.bits);
-            let units = offset.clamp(-step, step) * Line::OFFSET_UNIT;
+            let units = offset.min(step).max(-step) * Line::OFFSET_UNIT;
             rounded(units, line.bits).clamp(-GREATEST, GREATEST) as i16
         });
         let [x, down] = end.position.map_each(|fine| rounded(fine, line.bits));
