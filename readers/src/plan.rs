@@ -3,6 +3,7 @@
 use crate::format::{Body, Contents};
 use crate::lines::{JobLine, Lines, Origin};
 use crate::page::Page;
+use crate::region::Regions;
 use penup::protocol::LINE_LIMIT;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -34,10 +35,12 @@ impl Stroke {
 }
 
 /// An area that may be hatched: what an odd number of its outlines surround.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) struct Area {
     /// The outlines. The side from the last point to the first belongs to each.
     pub(crate) outlines: Vec<Vec<Point>>,
+    /// What cuts its lines off.
+    pub(crate) within: Regions,
     /// The pen that hatches it, counted from 1.
     pub(crate) pen: u32,
     /// The number of its layer.
