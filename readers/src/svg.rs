@@ -6,7 +6,8 @@
 //! writes the lines that are sent. [`unread`] knows what all of this does not read.
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
-//! a shape that is only filled is drawn as its outline. What has neither is not drawn. Texts are
+//! a dot with round or
+//! square ends is a very short line; a shape that is only filled is drawn as its outline. What has neither is not drawn. Texts are
 //! drawn as the outlines of their letters, if the caller knows fonts. Clip paths cut lines off, and
 //! are a part of the outline of what is only filled. Images, masks, filters and patterns are
 //! counted, and the user is told.
@@ -32,6 +33,7 @@ use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::{Area, Plan};
 use crate::page::Page;
+use crate::region::length;
 use drawing::{Drawing, PIXEL};
 use markup::Markup;
 use text::TextFonts;
@@ -126,7 +128,11 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
         plan.begin(line, text);
         for polyline in &shape.polylines {
-            plan.draw_on(polyline.points.iter().map(|it| [it.x, it.y]), Some(size), pen, layer);
+            let points = polyline.positions();
+            match points.first().filter(|_| shape.has_dots && length(&points) == 0.0) {
+                Some(dot) => plan.draw_dot(*dot, Some(size), pen, layer),
+                None => plan.draw_on(points, Some(size), pen, layer),
+            }
         }
         if !shape.outlines.is_empty() {
             let (outlines, within) = (shape.outlines.clone(), shape.within.clone());

@@ -12,7 +12,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use usvg::roxmltree::NodeId;
 use usvg::tiny_skia_path::StrokeDash;
-use usvg::{ClipPath, FillRule, Group, Node, Paint, Path, Text, Transform, Tree};
+use usvg::{ClipPath, FillRule, Group, LineCap, Node, Paint, Path, Text, Transform, Tree};
 
 /// The length of a pixel of CSS in mm: there are 96 in an inch.
 pub(super) const PIXEL: f64 = 25.4 / 96.0;
@@ -33,6 +33,8 @@ pub(super) struct Shape {
     pub(super) marks: Marks,
     /// What is drawn, in mm, with y upward from the lower left corner of the page.
     pub(super) polylines: Vec<Polyline>,
+    /// Whether a line without a length is a dot, because its ends are round or square.
+    pub(super) has_dots: bool,
     /// The outlines of what is filled within the page, in the same way; empty if nothing is, or if
     /// nobody asks.
     pub(super) outlines: Vec<Vec<[f64; 2]>>,
@@ -285,10 +287,12 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         };
         let (mut parts, mut is_cut) = (Vec::new(), false);
         for polyline in &polylines {
-            is_cut |= self.page.cut(polyline, SLACK, &mut parts);
-        }
-        if is_cut {
-            parts.retain(|part| length(&part.positions()) > 2.0 * SLACK);
+            let mut own = Vec::new();
+            if self.page.cut(polyline, SLACK, &mut own) {
+                is_cut = true;
+                own.retain(|part| length(&part.positions()) > 2.0 * SLACK);
+            }
+            parts.extend(own);
         }
         if stroke.is_none() && self.is_background(&whole, areas, &parts) {
             self.backgrounds += 1;
@@ -310,7 +314,15 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let marks = Marks { layer, colour };
         if !parts.is_empty() || !outlines.is_empty() {
             let within = context.areas.clone();
-            self.shapes.push(Shape { element, marks, polylines: parts, outlines, within });
+            let has_dots = stroke.is_some_and(|stroke| stroke.linecap() != LineCap::Butt);
+            self.shapes.push(Shape {
+                element,
+                marks,
+                polylines: parts,
+                has_dots,
+                outlines,
+                within,
+            });
         }
         Ok(())
     }
@@ -326,7 +338,11 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
     ) -> Result<Vec<Polyline>, TooManyPoints> {
         let mut parts = Vec::new();
         for polyline in polylines {
-            parts.extend(areas.cut(&polyline.positions(), &mut self.budget)?);
+            let points = polyline.positions();
+            match points.first().filter(|_| length(&points) == 0.0) {
+                Some(dot) => parts.extend(areas.contain(*dot).then_some(points)),
+                None => parts.extend(areas.cut(&points, &mut self.budget)?),
+            }
         }
         if is_only_filled {
             let mut shape = Region::default();
