@@ -79,7 +79,12 @@ fn by_usb_the_host_waits_and_nothing_is_lost() -> TestResult {
     line.emulator.send(b"OE;")?;
     assert_eq!(answer(&mut *line.emulator)?, "0");
     // The chords of the client's plan of a circle are up to 0.4 steps off.
-    ink::assert_same_ink("spiral", &inked(&mut line)?, &ink::plan(&file), 0.4);
+    ink::assert_same_ink(
+        "spiral",
+        &inked(&mut line)?,
+        &ink::plan(&file).expect("a valid file"),
+        0.4,
+    );
     Ok(())
 }
 
@@ -100,6 +105,11 @@ fn by_the_uart_a_sender_asks_for_room() -> TestResult {
     line.emulator.send(b"OE;\x1B.E")?;
     let answers = [answer(&mut *line.emulator)?, answer(&mut *line.emulator)?];
     assert_eq!(answers, ["0", "0"]);
-    ink::assert_same_ink("spiral", &inked(&mut line)?, &ink::plan(&file), 0.4);
+    ink::assert_same_ink(
+        "spiral",
+        &inked(&mut line)?,
+        &ink::plan(&file).expect("a valid file"),
+        0.4,
+    );
     Ok(())
 }

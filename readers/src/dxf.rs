@@ -1,11 +1,12 @@
 //! Reads the text form of DXF as plans: lines, polylines with bulges, arcs, circles, ellipses and
-//! splines, also in blocks, as they are seen from above.
+//! splines, points, level faces and dimensions, also in blocks, as they are seen from above.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
 //! refuses the binary form, and a file that does not consist of pairs of a code and a value.
 
 mod curves;
+mod document;
 
 use super::arrange::Arrangement;
 use super::counted;
@@ -14,6 +15,7 @@ use super::format::{Contents, Format};
 use super::plan::{Plan, Point, number_in};
 use crate::lines::Origin;
 use curves::{Affine, Curve, Spline};
+use document::{Document, Entity, Refusal, document, number, pairs};
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The format itself.
@@ -40,164 +42,6 @@ const UNITS: [(i64, f64); 11] = [
     (13, 0.001),
     (14, 100.0),
 ];
-
-/// A code and its value, and the line of the file in which the value stands.
-#[derive(Debug, Clone, Copy)]
-struct Pair<'a> {
-    code: i32,
-    value: &'a str,
-    line: usize,
-}
-
-/// An entity of a drawing, such as a line.
-#[derive(Debug, Clone, Default)]
-struct Entity<'a> {
-    kind: &'a str,
-    line: usize,
-    pairs: Vec<Pair<'a>>,
-}
-
-/// A reason for a refusal, and the line.
-type Refusal = (usize, String);
-
-impl<'a> Entity<'a> {
-    fn text(&self, code: i32) -> Option<&'a str> {
-        self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.value)
-    }
-
-    /// All numbers with this code.
-    fn numbers(&self, code: i32) -> Result<Vec<f64>, Refusal> {
-        self.pairs.iter().filter(|pair| pair.code == code).map(|pair| number(*pair)).collect()
-    }
-
-    fn number(&self, code: i32, default: f64) -> Result<f64, Refusal> {
-        Ok(self.numbers(code)?.first().copied().unwrap_or(default))
-    }
-
-    fn point(&self, code: i32) -> Result<Point, Refusal> {
-        Ok([self.number(code, 0.0)?, self.number(code + 10, 0.0)?])
-    }
-
-    fn points(&self, code: i32) -> Result<Vec<Point>, Refusal> {
-        let (x, y) = (self.numbers(code)?, self.numbers(code + 10)?);
-        if x.len() != y.len() {
-            return Err((self.line, format!("{} has points without x or y", self.kind)));
-        }
-        Ok(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect())
-    }
-
-    fn flags(&self) -> Result<i64, Refusal> {
-        Ok(self.number(70, 0.0)? as i64)
-    }
-
-    fn layer(&self) -> &'a str {
-        self.text(8).unwrap_or("0")
-    }
-}
-
-fn number(pair: Pair<'_>) -> Result<f64, Refusal> {
-    match pair.value.trim().parse::<f64>() {
-        Ok(value) if value.is_finite() && value.abs() < 1e12 => Ok(value),
-        _ => Err((pair.line, "this is no number that can be drawn".to_owned())),
-    }
-}
-
-/// What a file says.
-#[derive(Debug, Default)]
-struct Document<'a> {
-    unit: Option<i64>,
-    /// The layers that are not drawn.
-    hidden: HashSet<&'a str>,
-    /// The blocks with their base points.
-    blocks: HashMap<&'a str, (Point, Vec<Entity<'a>>)>,
-    entities: Vec<Entity<'a>>,
-}
-
-/// The pairs of a file.
-fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
-    let mut lines = text.lines().enumerate();
-    let mut pairs = Vec::new();
-    while let Some((index, code)) = lines.next() {
-        let Ok(code) = code.trim().parse() else {
-            if code.trim().is_empty() && lines.clone().all(|(_, line)| line.trim().is_empty()) {
-                break;
-            }
-            return Err((index + 1, "there should be a code of DXF, a whole number".to_owned()));
-        };
-        let Some((index, value)) = lines.next() else {
-            return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
-        };
-        pairs.push(Pair { code, value: value.trim(), line: index + 1 });
-    }
-    Ok(pairs)
-}
-
-/// Divides pairs into entities, each of which begins with code 0.
-fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
-    let mut entities: Vec<Entity<'a>> = Vec::new();
-    for pair in pairs {
-        if pair.code == 0 {
-            entities.push(Entity { kind: pair.value, line: pair.line, pairs: Vec::new() });
-        } else if let Some(entity) = entities.last_mut() {
-            entity.pairs.push(*pair);
-        }
-    }
-    entities
-}
-
-fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> {
-    let mut document = Document::default();
-    let starts: Vec<usize> = (0..pairs.len())
-        .filter(|&at| pairs[at].code == 0 && pairs[at].value == "SECTION")
-        .collect();
-    for (number, &start) in starts.iter().enumerate() {
-        let end = starts.get(number + 1).copied().unwrap_or(pairs.len());
-        let section = &pairs[start..end];
-        match section.get(1).map(|pair| pair.value) {
-            Some("HEADER") => {
-                let mut after = section.iter().skip_while(|pair| pair.value != "$INSUNITS");
-                let unit = after.nth(1).filter(|pair| pair.code == 70);
-                document.unit = unit.map(|pair| number_of(*pair)).transpose()?;
-            }
-            Some("TABLES") => {
-                for layer in entities(section).iter().filter(|it| it.kind == "LAYER") {
-                    let is_hidden = layer.number(62, 7.0)? < 0.0 || layer.flags()? & 1 == 1;
-                    document.hidden.extend(layer.text(2).filter(|_| is_hidden));
-                }
-            }
-            Some("BLOCKS") => {
-                let mut block: Option<&str> = None;
-                for entity in entities(section) {
-                    match (entity.kind, block) {
-                        ("BLOCK", _) => {
-                            let name = entity.text(2).unwrap_or_default();
-                            let base = entity.point(10)?;
-                            document.blocks.insert(name, (base, Vec::new()));
-                            block = Some(name);
-                        }
-                        ("ENDBLK" | "ENDSEC" | "SECTION", _) => block = None,
-                        (_, Some(name)) => {
-                            if let Some((_, entities)) = document.blocks.get_mut(name) {
-                                entities.push(entity);
-                            }
-                        }
-                        _ => {}
-                    }
-                }
-            }
-            Some("ENTITIES") => {
-                let is_own = |it: &Entity<'_>| !matches!(it.kind, "SECTION" | "ENDSEC" | "EOF");
-                document.entities = entities(section).into_iter().filter(is_own).collect();
-            }
-            _ => {}
-        }
-    }
-    Ok(document)
-}
-
-fn number_of(pair: Pair<'_>) -> Result<i64, Refusal> {
-    Ok(number(pair)? as i64)
-}
 
 /// What is drawn, and what is not.
 struct Drawing<'d, 'a> {
@@ -313,7 +157,20 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 let wrong = || (entity.line, "the knots of the spline do not fit it".to_owned());
                 Curve::spline(spline).ok_or_else(wrong)?
             }
+            "POINT" => Curve::polyline(&[entity.point(10)?]),
+            "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {
+                Some(outline) => Curve::polyline(&outline),
+                None => {
+                    self.skip(&format!("{}, not level", entity.kind), entity.line);
+                    return Ok(());
+                }
+            },
             "INSERT" => return self.insert(entity, to_page, layer, depth),
+            // What shows a dimension is a block of its own, at its place.
+            "DIMENSION" if self.block(entity).is_some() => {
+                let Some((_, entities)) = self.block(entity) else { return Ok(()) };
+                return self.nested(entity, entities, to_page, layer, depth);
+            }
             "VERTEX" | "SEQEND" => return Ok(()),
             kind => {
                 self.skip(kind, entity.line);
@@ -335,15 +192,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
         layer: &'a str,
         depth: usize,
     ) -> Result<(), Refusal> {
-        let name = entity.text(2).unwrap_or_default();
-        let document = self.document;
-        let Some((base, entities)) = document.blocks.get(name) else {
+        let Some((base, entities)) = self.block(entity) else {
             self.skip("INSERT of an unknown block", entity.line);
             return Ok(());
         };
-        if depth >= MOST_NESTED {
-            return Err((entity.line, "the blocks are nested too deeply".to_owned()));
-        }
         let [x, y] = entity.point(10)?;
         let scale = [entity.number(41, 1.0)?, entity.number(42, 1.0)?];
         let (sine, cosine) = entity.number(50, 0.0)?.to_radians().sin_cos();
@@ -360,15 +212,56 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
                 let place = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
                 let inner = to_page.after(turned).after(place).after(scaled);
-                self.points += 1;
-                if self.points >= MOST_POINTS {
-                    return Err((entity.line, "the blocks are inserted too often".to_owned()));
-                }
-                self.all(entities, inner, Some(layer), depth + 1)?;
+                self.nested(entity, entities, inner, layer, depth)?;
             }
         }
         Ok(())
     }
+
+    /// The block that an entity names: its base point and its entities.
+    fn block(&self, entity: &Entity<'_>) -> Option<&'d (Point, Vec<Entity<'a>>)> {
+        self.document.blocks.get(entity.text(2).unwrap_or_default())
+    }
+
+    /// Draws the entities of a block.
+    fn nested(
+        &mut self,
+        entity: &Entity<'a>,
+        entities: &'d [Entity<'a>],
+        to_page: Affine,
+        layer: &'a str,
+        depth: usize,
+    ) -> Result<(), Refusal> {
+        if depth >= MOST_NESTED {
+            return Err((entity.line, "the blocks are nested too deeply".to_owned()));
+        }
+        self.points += 1;
+        if self.points >= MOST_POINTS {
+            return Err((entity.line, "the blocks are inserted too often".to_owned()));
+        }
+        self.all(entities, to_page, Some(layer), depth + 1)
+    }
+}
+
+/// The closed outline of a face or of a filled triangle or quadrilateral, whose corners stand
+/// crosswise except in a face; `None` if it is not level.
+fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Point>>, Refusal> {
+    let order: [i32; 5] = match entity.kind {
+        "3DFACE" => [10, 11, 12, 13, 10],
+        _ => [10, 11, 13, 12, 10],
+    };
+    let last = if entity.text(13).is_some() { 13 } else { 12 };
+    let mut corners = Vec::new();
+    for code in order {
+        let code = code.min(last);
+        let height = entity.number(code + 20, 0.0)?;
+        if (height - entity.number(30, 0.0)?).abs() > 1e-9 {
+            return Ok(None);
+        }
+        corners.push(entity.point(code)?);
+    }
+    corners.dedup();
+    Ok(Some(corners))
 }
 
 /// The corners of a polyline of the new form, each with the bulge of the side that follows.
@@ -479,7 +372,10 @@ impl Format for Dxf {
         for (line, kind, layer, points) in drawing.strokes {
             let (pen, number) = pens.get(layer).copied().unwrap_or((1, 0));
             plan.begin(line, kind.to_owned());
-            plan.draw_on(points, None, pen, number);
+            match points.as_slice() {
+                [dot] => plan.draw_dot(*dot, None, pen, number),
+                _ => plan.draw_on(points, None, pen, number),
+            }
         }
         plan.layers = layers.into_iter().map(str::to_owned).collect();
         let mut notes: Vec<String> = drawing

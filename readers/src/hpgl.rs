@@ -55,6 +55,8 @@ struct Reader {
     points: usize,
     /// The instructions that were not obeyed, with their count.
     unknown: BTreeMap<String, usize>,
+    /// The byte where the label begins that the file does not end.
+    endless: Option<usize>,
 }
 
 impl Reader {
@@ -70,6 +72,7 @@ impl Reader {
             strokes: Vec::new(),
             points: 0,
             unknown: BTreeMap::new(),
+            endless: None,
         }
     }
 
@@ -193,6 +196,7 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
     for (at, &byte) in bytes.iter().chain(b";").enumerate() {
         // What ends the file ends its last instruction, but is no letter of a label.
         if at == bytes.len() && dialect.is_in_text() && !dialect.is_in_data() {
+            reader.endless = Some(instruction.begin);
             break;
         }
         let token = dialect.take(byte);
@@ -256,7 +260,12 @@ impl Format for HpGl {
             line += bytes[counted_to..begin].iter().filter(|byte| **byte == b'\n').count();
             counted_to = begin;
             plan.begin(line, text_at(begin));
-            plan.draw(points, None, pen);
+            match points.split_first() {
+                Some((dot, rest)) if rest.iter().all(|point| point == dot) => {
+                    plan.draw_dot(*dot, None, pen, pen);
+                }
+                _ => plan.draw(points, None, pen),
+            }
         }
         let mut notes: Vec<String> = Vec::new();
         for (name, count) in &reader.unknown {
@@ -264,6 +273,13 @@ impl Format for HpGl {
                 1 => format!("1 instruction {name} is not obeyed"),
                 count => format!("{count} instructions {name} are not obeyed"),
             });
+        }
+        if let Some(begin) = reader.endless {
+            notes.push(format!(
+                "the label that begins in line {} has no end (the byte 3): all that follows it is \
+                 drawn as text",
+                line_of(begin)
+            ));
         }
         if plan.is_empty() {
             let mut reason = "there is nothing to draw in this HP-GL".to_owned();

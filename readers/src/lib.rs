@@ -28,6 +28,7 @@ pub mod page;
 mod plan;
 #[cfg(feature = "ply")]
 mod ply;
+mod region;
 mod stl;
 #[cfg(feature = "svg")]
 mod svg;

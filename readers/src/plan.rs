@@ -3,6 +3,7 @@
 use crate::format::{Body, Contents};
 use crate::lines::{JobLine, Lines, Origin};
 use crate::page::Page;
+use crate::region::Regions;
 use penup::protocol::LINE_LIMIT;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -12,6 +13,9 @@ pub(crate) type Point = [f64; 2];
 
 /// The number of thousandths of a millimetre in one, in which coordinates are written.
 const PER_MM: f64 = 1000.0;
+
+/// The length in mm of the line that is drawn for a dot: more than a motor step.
+const DOT: f64 = 0.02;
 
 /// A polyline that the pen draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,10 +38,12 @@ impl Stroke {
 }
 
 /// An area that may be hatched: what an odd number of its outlines surround.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub(crate) struct Area {
     /// The outlines. The side from the last point to the first belongs to each.
     pub(crate) outlines: Vec<Vec<Point>>,
+    /// What cuts its lines off.
+    pub(crate) within: Regions,
     /// The pen that hatches it, counted from 1.
     pub(crate) pen: u32,
     /// The number of its layer.
@@ -115,6 +121,14 @@ impl Plan {
         }
         let element = self.element();
         self.strokes.push(Stroke { points, pen, layer, element });
+    }
+
+    /// Draws a dot on a layer, as a line of [`DOT`] to the right, or to the left at the right end of
+    /// the page.
+    pub(crate) fn draw_dot(&mut self, [x, y]: Point, page: Option<[f64; 2]>, pen: u32, layer: u32) {
+        let is_at_end = page.is_some_and(|page| x + DOT > page[0]);
+        let beside = if is_at_end { x - DOT } else { x + DOT };
+        self.draw_on([[x, y], [beside, y]], page, pen, layer);
     }
 
     /// The name of a layer.

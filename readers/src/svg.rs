@@ -1,13 +1,16 @@
 //! Reads SVG files as plans: what they show is drawn at true size, at its place on the page.
 //!
 //! `usvg` resolves styles, units (96 pixels in an inch), the viewBox, references and transforms.
-//! [`flatten`] makes polylines of the paths, [`clip`] cuts them at the page and at clip paths,
-//! [`pens`] chooses pens by layers or colours, and [`Plan`] writes the lines that are sent.
+//! [`flatten`] makes polylines of the paths, [`clip`] cuts them at the page and
+//! [`region`](crate::region) at clip paths, [`pens`] chooses pens by layers or colours, and [`Plan`]
+//! writes the lines that are sent. [`unread`] knows what all of this does not read.
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
-//! a shape that is only filled is drawn as its outline. What has neither is not drawn. Texts are
-//! drawn as the outlines of their letters, if the caller knows fonts. Images, masks, filters and
-//! clip paths that are not convex are counted, and the user is told.
+//! a dot with round or
+//! square ends is a very short line; a shape that is only filled is drawn as its outline. What has neither is not drawn. Texts are
+//! drawn as the outlines of their letters, if the caller knows fonts. Clip paths cut lines off, and
+//! are a part of the outline of what is only filled. Images, masks, filters and patterns are
+//! counted, and the user is told.
 //!
 //! The names of layers may hold the codes of AxiDraw ([`axidraw`]).
 //!
@@ -22,6 +25,7 @@ mod markup;
 mod pens;
 #[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
 mod text;
+mod unread;
 
 use super::arrange::Arrangement;
 use super::counted;
@@ -29,6 +33,7 @@ use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::{Area, Plan};
 use crate::page::Page;
+use crate::region::length;
 use drawing::{Drawing, PIXEL};
 use markup::Markup;
 use text::TextFonts;
@@ -113,7 +118,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let markup = Markup::new(&document);
     let with_areas = arrangement.hatch.is_some();
     let drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
-        "the SVG has too many points, or a curve of kilometres: leave it out".to_owned()
+        "the SVG has too many points, too large clip paths, or a curve of kilometres: leave it out".to_owned()
     })?;
     let mut plan = Plan::new(file.to_owned());
     let mut areas = Vec::new();
@@ -123,11 +128,15 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
         plan.begin(line, text);
         for polyline in &shape.polylines {
-            plan.draw_on(polyline.points.iter().map(|it| [it.x, it.y]), Some(size), pen, layer);
+            let points = polyline.positions();
+            match points.first().filter(|_| shape.has_dots && length(&points) == 0.0) {
+                Some(dot) => plan.draw_dot(*dot, Some(size), pen, layer),
+                None => plan.draw_on(points, Some(size), pen, layer),
+            }
         }
         if !shape.outlines.is_empty() {
-            let (outlines, element) = (shape.outlines.clone(), plan.element());
-            areas.push(Area { outlines, pen, layer, element });
+            let (outlines, within) = (shape.outlines.clone(), shape.within.clone());
+            areas.push(Area { outlines, within, pen, layer, element: plan.element() });
         }
     }
     plan.layers = chosen.layers;
@@ -166,12 +175,22 @@ fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
             "beyond the page of the SVG: the rest is cut off",
         ),
         (
-            drawing.clips,
-            ["clip path is", "clip paths are"],
-            "not applied, because only one convex shape can clip: what it hides is drawn",
+            drawing.backgrounds,
+            ["filled shape covers", "filled shapes cover"],
+            "the whole page, as a background does: its outline is not drawn",
+        ),
+        (
+            drawing.patterns,
+            ["path has", "paths have"],
+            "a pattern, which is not drawn: only the path is",
         ),
         (drawing.masks, ["mask is", "masks are"], "not applied: what it hides is drawn"),
         (drawing.filters, ["filter is", "filters are"], "not applied"),
+        (
+            drawing.strokeless,
+            ["path is", "paths are"],
+            "not drawn: the stroke has no width, or a paint that is not read",
+        ),
         (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
     ]
     .into_iter()

@@ -27,8 +27,11 @@ struct Corpus {
     extensions: &'static [&'static str],
 }
 
+/// The extensions of HP-GL.
+const HPGL: &[&str] = &["hpg", "hpgl", "plt"];
+
 /// The collections.
-const CORPORA: [Corpus; 7] = [
+const CORPORA: [Corpus; 14] = [
     Corpus {
         name: "resvg",
         repository: "linebender/resvg",
@@ -52,6 +55,48 @@ const CORPORA: [Corpus; 7] = [
         repository: "skymakerolof/dxf",
         commit: "9895f4f23dbda0ce504dc7b5cc1715a3c66f5ba8",
         extensions: &["dxf"],
+    },
+    Corpus {
+        name: "hpgl-plotter",
+        repository: "VK2BEA/HPGL-Plotter",
+        commit: "9189b0342abff627fe88d2c0005e17cbcaf94bc6",
+        extensions: HPGL,
+    },
+    Corpus {
+        name: "hpgl-viewer",
+        repository: "bblanchon/HpglViewer",
+        commit: "cf8146f2da49cd5fac019172bd3a52ef96dd43a5",
+        extensions: HPGL,
+    },
+    Corpus {
+        name: "chiplotle",
+        repository: "drepetto/chiplotle",
+        commit: "c3b9faacd316bae1039da06f316f3bf9a79c1f54",
+        extensions: HPGL,
+    },
+    Corpus {
+        name: "hpgl2ps",
+        repository: "jwilk-archive/hpgl2ps",
+        commit: "68f42d158eb5c4a24f6e2b5cf5742be965a23a28",
+        extensions: HPGL,
+    },
+    Corpus {
+        name: "monoplots",
+        repository: "h42i/monoplots",
+        commit: "faa7a598a07c21a4ec097da400e380da706b413a",
+        extensions: HPGL,
+    },
+    Corpus {
+        name: "kicad-hpgl",
+        repository: "DylanVanAssche/java-hpgl2gcode",
+        commit: "7fda3f97736acf756707f60d3b2d8a131fcbc305",
+        extensions: HPGL,
+    },
+    Corpus {
+        name: "kicad-laser",
+        repository: "temagrin/KicadHPGL2Gcode",
+        commit: "fedd2c40eac161f1768f20ee07255367a0b14b87",
+        extensions: HPGL,
     },
     Corpus {
         name: "tinyobjloader",

@@ -28,9 +28,12 @@ pub fn units(bench: &Bench) -> [[i32; 2]; 2] {
 }
 
 /// The strokes that the client's reader of HP-GL finds in a file.
-pub fn plan(bytes: &[u8]) -> Vec<Segment> {
+///
+/// # Errors
+/// The reader refuses the file, for this reason.
+pub fn plan(bytes: &[u8]) -> Result<Vec<Segment>, String> {
     let file = parse("file.hpgl".to_owned(), bytes.to_vec(), &Arrangement::default());
-    let file = file.expect("a valid file");
+    let file = file.map_err(|error| error.to_string())?;
     let (mut vertices, mut segments) = (Vec::new(), Vec::new());
     for index in 0.. {
         let Some(line) = file.line(index) else { break };
@@ -58,7 +61,20 @@ pub fn plan(bytes: &[u8]) -> Vec<Segment> {
         }
     }
     assert!(!segments.is_empty());
-    segments
+    Ok(segments)
+}
+
+/// The places of ink along segments, half a step from one to the next.
+pub fn places(segments: &[Segment]) -> Vec<[f64; 2]> {
+    let mut places = Vec::new();
+    for [from, to] in segments {
+        let count = ((to[0] - from[0]).hypot(to[1] - from[1]) * 2.0).ceil().max(1.0);
+        let place = |number: u32| {
+            [0, 1].map(|axis| from[axis] + (to[axis] - from[axis]) * f64::from(number) / count)
+        };
+        places.extend((0..=count as u32).map(place));
+    }
+    places
 }
 
 /// The strokes of a text such as `0,0 10,0; 5,5`, in plotter units. A single point is a dot.

@@ -115,7 +115,7 @@ fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
         let mut bench = Bench::small();
         let heard = draw(&mut bench, &bytes);
         assert!(!heard.contains("ok") && !heard.contains("error"), "{name}: {heard}");
-        assert_same_ink(name, &inked(&bench), &plan(&bytes), slack(name));
+        assert_same_ink(name, &inked(&bench), &plan(&bytes).expect("a valid file"), slack(name));
     }
 }
 
@@ -216,7 +216,7 @@ fn the_other_port_watches_and_cannot_interrupt() {
 #[test]
 fn damaged_bytes_leave_a_part_out_and_ink_nothing_else() {
     let bytes = inkscape();
-    let whole = plan(&bytes);
+    let whole = plan(&bytes).expect("a valid file");
     for damaged in (18..bytes.len() - 10).step_by(7) {
         let mut bench = Bench::small();
         let mut spoilt = bytes.clone();

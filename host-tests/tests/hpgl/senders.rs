@@ -100,7 +100,12 @@ fn a_sender_that_asks_for_room_loses_nothing() {
         b"OE;\x1B.E".iter().for_each(|byte| port.send(*byte));
         let answers = [port.answer(), port.answer()];
         assert!(answers.iter().all(|answer| answer == "0"), "{answers:?}");
-        assert_same_ink(name, &inked(&port.bench), &plan(&file), slack(name));
+        assert_same_ink(
+            name,
+            &inked(&port.bench),
+            &plan(&file).expect("a valid file"),
+            slack(name),
+        );
     }
 }
 
@@ -128,6 +133,11 @@ fn a_sender_that_obeys_xon_and_xoff_loses_nothing() {
         }
         assert!(stops > 0, "{name}: the sender was never stopped");
         port.finish();
-        assert_same_ink(name, &inked(&port.bench), &plan(&file), slack(name));
+        assert_same_ink(
+            name,
+            &inked(&port.bench),
+            &plan(&file).expect("a valid file"),
+            slack(name),
+        );
     }
 }

@@ -2,10 +2,14 @@
 
 use super::{Hatch, sine_cosine};
 use crate::plan::{Area, Plan, Point, Stroke};
+use crate::region::Regions;
 use std::collections::BTreeMap;
 
 /// The most lines that hatch a drawing. They take some 100 MB.
 const MOST_LINES: usize = 1_000_000;
+
+/// The most tests of the sides of clip paths, in units of some points.
+const MOST_WORK: usize = 10_000_000;
 
 /// The length in mm below which a line is left out: it would be a dot.
 const SHORTEST: f64 = 0.002;
@@ -23,14 +27,19 @@ pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
     if areas.is_empty() {
         return Err("there is no closed, filled shape to hatch".to_owned());
     }
-    let mut lines = 0;
+    let (mut lines, mut budget) = (0, MOST_WORK);
     for area in areas {
-        let Area { outlines, pen, layer, element } = area;
+        let Area { outlines, within, pen, layer, element } = area;
         let too_many = || format!("--hatch {} makes more than a million lines", hatch.spacing);
         let hatched = lines_within(&outlines, hatch, MOST_LINES - lines).ok_or_else(too_many)?;
         lines += hatched.len();
-        let stroke = |ends: [Point; 2]| Stroke { points: ends.to_vec(), pen, layer, element };
-        plan.strokes.extend(hatched.into_iter().map(stroke));
+        for line in hatched {
+            let parts = within.cut(&line, &mut budget).map_err(|_| {
+                "the clip paths of the drawing have too many sides for --hatch".to_owned()
+            })?;
+            let stroke = |points| Stroke { points, pen, layer, element };
+            plan.strokes.extend(parts.into_iter().map(stroke));
+        }
     }
     Ok(())
 }
@@ -40,7 +49,8 @@ fn closed(plan: &Plan) -> Vec<Area> {
     let mut areas: BTreeMap<u32, Area> = BTreeMap::new();
     for stroke in plan.strokes.iter().filter(|stroke| stroke.is_closed()) {
         let Stroke { pen, layer, element, .. } = *stroke;
-        let area = || Area { outlines: Vec::new(), pen, layer, element };
+        let within = Regions::default();
+        let area = || Area { outlines: Vec::new(), within, pen, layer, element };
         areas.entry(pen).or_insert_with(area).outlines.push(stroke.points.clone());
     }
     areas.into_values().collect()

@@ -190,3 +190,38 @@ fn damaged_files_are_refused_with_their_line() {
         let _ = sent("a.dxf", &whole.as_bytes()[..end]);
     }
 }
+
+#[test]
+fn points_faces_and_dimensions_are_drawn() {
+    let one = |entities: &str| {
+        let [(_, points)] = &strokes(&dxf("4", "", entities))[..] else { panic!("{entities}") };
+        points.clone()
+    };
+    assert_eq!(one("0 POINT 8 0 10 3 20 4 30 0"), [[3.0, 4.0], [3.02, 4.0]]);
+    let corners = "10 0 20 0 30 1 11 4 21 0 31 1 12 4 22 2 32 1 13 0 23 2 33 1";
+    let face = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0], [0.0, 0.0]];
+    assert_eq!(one(&format!("0 3DFACE 8 0 {corners}")), face);
+    let crosswise = "10 0 20 0 11 4 21 0 12 0 22 2 13 4 23 2";
+    assert_eq!(one(&format!("0 SOLID 8 0 {crosswise}")), face);
+    let three = "0 SOLID 8 0 10 0 20 0 11 4 21 0 12 4 22 2";
+    assert_eq!(one(three), [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 0.0]]);
+    let tilted =
+        dxf("4", "", &format!("0 LINE 11 5 0 3DFACE 8 0 {corners} 32 0").replace("32 1", "32 2"));
+    assert_eq!(notes("a.dxf", tilted.as_bytes()), ["1 3DFACE, not level is not drawn (line 20)"]);
+    // A dimension is drawn by the block that it names, where that block is.
+    let block = "0 SECTION 2 BLOCKS 0 BLOCK 2 *D1 10 0 20 0 0 LINE 8 0 10 1 20 1 11 9 21 1 \
+                 0 MTEXT 8 0 1 8 0 ENDBLK 0 ENDSEC";
+    let dimension = dxf("4", block, "0 DIMENSION 8 5 2 *D1 10 7 20 7");
+    assert_eq!(strokes(&dimension), [("pen5".to_owned(), vec![[1.0, 1.0], [9.0, 1.0]])]);
+    let said = notes("a.dxf", dimension.as_bytes());
+    assert!(
+        matches!(said.as_slice(), [note] if note.starts_with("1 MTEXT is not drawn")),
+        "{said:?}"
+    );
+    let unknown = dxf("4", "", "0 LINE 11 5 0 DIMENSION 8 5 2 *D9");
+    let said = notes("a.dxf", unknown.as_bytes());
+    assert!(
+        matches!(said.as_slice(), [note] if note.starts_with("1 DIMENSION is not")),
+        "{said:?}"
+    );
+}

@@ -71,6 +71,25 @@ fn labels_and_fills_are_drawn_as_a_plotter_draws_them() {
 }
 
 #[test]
+fn dots_are_drawn_as_very_short_lines() {
+    let expected = ["usemtl pen1", "v 1 1 0", "v 1.02 1 0", "l 1 2"];
+    for text in ["IN;PU40,40;PD;PU;", "IN;PU40,40;PD40,40;PU;", "IN;PA40,40;PD;PD;SP0;"] {
+        assert_eq!(lines(text), expected, "{text}");
+        assert!(notes("a.plt", text.as_bytes()).is_empty(), "{text}");
+    }
+    // Where a line goes on there is no dot.
+    assert_eq!(lines("PU40,40;PD;PD80,40;PU;")[1..], ["v 1 1 0", "v 2 1 0", "l 1 2"]);
+}
+
+#[test]
+fn a_label_without_an_end_is_told() {
+    let told = "the label that begins in line 2 has no end (the byte 3): all that follows it is \
+                drawn as text";
+    assert_eq!(notes("a.plt", b"IN;PU0,0;\nLBa;PU0,0;PD40,0;"), [told]);
+    assert!(notes("a.plt", b"IN;PU0,0;LBa\x03;").is_empty());
+}
+
+#[test]
 fn what_is_not_drawn_is_counted_or_refused() {
     assert_eq!(
         notes("a.plt", b"IN;PD40,0;UC1,2;BLx\x03UC;FT9;"),
@@ -79,10 +98,6 @@ fn what_is_not_drawn_is_counted_or_refused() {
             "1 instruction FT is not obeyed",
             "2 instructions UC are not obeyed"
         ]
-    );
-    assert_eq!(
-        notes("a.plt", b"IN;PD40,0;PU80,0;PD;PU;"),
-        ["1 line is not drawn, because a dot has no length"]
     );
     let points = "0,40,40,0,".repeat(140);
     let polygon = format!("PU0,0;PM0;\nPD{points}0,0;PM2;FP;");

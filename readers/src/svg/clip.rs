@@ -1,4 +1,4 @@
-//! Cuts polylines at the border of a convex area: the page, or a clip path.
+//! Cuts polylines at the border of a convex area, the page.
 
 use super::flatten::Polyline;
 use kurbo::{Point, Vec2};
@@ -86,6 +86,19 @@ impl ConvexArea {
             .iter()
             .map(|(point, inward)| ([point.x, point.y], [inward.x, inward.y]))
             .collect()
+    }
+
+    /// A point inside: the middle of the corners.
+    pub(super) fn middle(&self) -> [f64; 2] {
+        let corners = self.sides.iter().map(|(corner, _)| corner.to_vec2());
+        let middle = corners.fold(Vec2::ZERO, |sum, corner| sum + corner) / self.sides.len() as f64;
+        [middle.x, middle.y]
+    }
+
+    /// How far inside of the area a point lies; below 0 if it is outside.
+    pub(super) fn depth(&self, at: Point) -> f64 {
+        let depths = self.sides.iter().map(|&(point, inward)| (at - point).dot(inward));
+        depths.fold(f64::INFINITY, f64::min)
     }
 
     /// The range of the segment's parameter, 0 to 1, in which it is inside; `None` if it is

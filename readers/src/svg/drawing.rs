@@ -5,11 +5,14 @@ use super::flatten::{Arcs, Polyline, TooManyPoints, flatten};
 use super::markup::Markup;
 use super::pens::Marks;
 use crate::arrange::clip_outline;
+use crate::region::{Region, Regions, length};
 use kurbo::{Affine, Point};
+use std::borrow::Cow;
 use std::collections::HashSet;
+use std::sync::Arc;
 use usvg::roxmltree::NodeId;
 use usvg::tiny_skia_path::StrokeDash;
-use usvg::{Group, Node, Paint, Path, Text, Transform, Tree};
+use usvg::{ClipPath, FillRule, Group, LineCap, Node, Paint, Path, Text, Transform, Tree};
 
 /// The length of a pixel of CSS in mm: there are 96 in an inch.
 pub(super) const PIXEL: f64 = 25.4 / 96.0;
@@ -17,9 +20,6 @@ pub(super) const PIXEL: f64 = 25.4 / 96.0;
 /// How far outside of the page a line may lie without being cut, in mm. Single precision, in which
 /// `usvg` computes, is no better on a large page.
 const SLACK: f64 = 0.01;
-
-/// How far outside of a clip path a line may lie without being cut, in mm: less than is written.
-const CLIP_SLACK: f64 = 1e-4;
 
 /// The most points before points are left out. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
@@ -33,9 +33,13 @@ pub(super) struct Shape {
     pub(super) marks: Marks,
     /// What is drawn, in mm, with y upward from the lower left corner of the page.
     pub(super) polylines: Vec<Polyline>,
+    /// Whether a line without a length is a dot, because its ends are round or square.
+    pub(super) has_dots: bool,
     /// The outlines of what is filled within the page, in the same way; empty if nothing is, or if
     /// nobody asks.
     pub(super) outlines: Vec<Vec<[f64; 2]>>,
+    /// The clip paths, which cut off what fills these outlines.
+    pub(super) within: Regions,
 }
 
 /// All paths of an SVG, and what could not be drawn as the file says.
@@ -51,12 +55,16 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) seen: HashSet<NodeId>,
     /// The number of paths that have neither stroke nor fill, or are transparent.
     pub(super) invisible: usize,
+    /// The number of paths that ask for a stroke and have none, nor a fill.
+    pub(super) strokeless: usize,
     /// The number of paths in layers that are not plotted.
     pub(super) documentation: usize,
     /// The number of paths that reach beyond the page and are cut there.
     pub(super) cut: usize,
-    /// The number of clip paths that are not applied.
-    pub(super) clips: usize,
+    /// The number of filled shapes whose outline is that of the page.
+    pub(super) backgrounds: usize,
+    /// The number of paths with a pattern, which is not drawn.
+    pub(super) patterns: usize,
     /// The number of masks that are not applied.
     pub(super) masks: usize,
     /// The number of filters that are not applied.
@@ -71,7 +79,7 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
 #[derive(Debug, Clone)]
 struct Context {
     to_page: Affine,
-    areas: Vec<ConvexArea>,
+    areas: Regions,
     /// The innermost group or text that is an element of the file.
     element: Option<NodeId>,
     /// Whether it is the outline of letters.
@@ -100,16 +108,18 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             shapes: Vec::new(),
             seen: HashSet::new(),
             invisible: 0,
+            strokeless: 0,
             documentation: 0,
             cut: 0,
-            clips: 0,
+            backgrounds: 0,
+            patterns: 0,
             masks: 0,
             filters: 0,
             undashed: 0,
             texts: Vec::new(),
         };
         let to_page = Affine::new([PIXEL, 0.0, 0.0, -PIXEL, 0.0, height]);
-        let context = Context { to_page, areas: Vec::new(), element: None, is_text: false };
+        let context = Context { to_page, areas: Regions::default(), element: None, is_text: false };
         drawing.group(tree.root(), &context)?;
         Ok(drawing)
     }
@@ -128,18 +138,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         }
         self.filters += group.filters().len();
         self.masks += usize::from(group.mask().is_some());
-        let mut clip = group.clip_path();
-        while let Some(path) = clip {
-            let to_page = context.to_page * affine(path.transform());
-            match only_path(path.root(), to_page) {
-                Some((path, to_page)) => match self.area(path, to_page)? {
-                    Some(area) => context.areas.push(area),
-                    None => self.clips += 1,
-                },
-                None => self.clips += 1,
-            }
-            clip = path.clip_path();
-        }
+        self.clip(group.clip_path(), context.to_page, &mut context.areas)?;
         for node in group.children() {
             match node {
                 Node::Group(group) => self.group(group, &context)?,
@@ -173,11 +172,47 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         }
     }
 
-    /// The convex area that is the inside of `path`; `None` if it is not convex.
-    fn area(&mut self, path: &Path, to_page: Affine) -> Result<Option<ConvexArea>, TooManyPoints> {
-        let outlines = flatten(path.data(), to_page, Arcs::Quarters, &mut self.budget)?;
-        let [outline] = outlines.as_slice() else { return Ok(None) };
-        Ok(ConvexArea::new(&outline.points))
+    /// Appends what a clip path leaves, and those that clip it.
+    fn clip(
+        &mut self,
+        mut clip: Option<&ClipPath>,
+        to_page: Affine,
+        areas: &mut Regions,
+    ) -> Result<(), TooManyPoints> {
+        while let Some(path) = clip {
+            let mut region = Region::default();
+            let to_path = to_page * affine(path.transform());
+            self.region(path.root(), to_path, &Regions::default(), &mut region)?;
+            areas.0.push(Arc::new(region));
+            clip = path.clip_path();
+        }
+        Ok(())
+    }
+
+    /// Adds the shapes of a group in a clip path to the region that it leaves.
+    fn region(
+        &mut self,
+        group: &Group,
+        to_page: Affine,
+        within: &Regions,
+        region: &mut Region,
+    ) -> Result<(), TooManyPoints> {
+        let to_page = to_page * affine(group.transform());
+        let mut within = within.clone();
+        self.clip(group.clip_path(), to_page, &mut within)?;
+        for node in group.children() {
+            match node {
+                Node::Group(group) => self.region(group, to_page, &within, region)?,
+                Node::Text(text) => self.region(text.flattened(), to_page, &within, region)?,
+                Node::Path(path) if path.is_visible() => {
+                    let outlines = flatten(path.data(), to_page, Arcs::Quarters, &mut self.budget)?;
+                    let outlines = outlines.iter().map(Polyline::positions).collect();
+                    region.add(outlines, is_even_odd(path), within.0.clone());
+                }
+                Node::Path(_) | Node::Image(_) => {}
+            }
+        }
+        Ok(())
     }
 
     fn path(&mut self, path: &Path, context: &Context) -> Result<(), TooManyPoints> {
@@ -192,6 +227,10 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         };
         let Some(paint) = paint else {
             self.invisible += 1;
+            let element = own.or(context.element).filter(|it| !self.markup.is_hidden(*it));
+            let is_asked = |element| self.markup.asks_for_stroke(element);
+            self.strokeless +=
+                usize::from(path.stroke().is_none() && element.is_some_and(is_asked));
             return Ok(());
         };
         let element = own.or(context.element);
@@ -201,13 +240,21 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             return Ok(());
         }
         let dashes = stroke.and_then(|stroke| Some((stroke.dasharray()?, stroke.dashoffset())));
+        // Dashes of a fixed length are measured on the page, and others in the file.
+        let is_fixed = element.is_some_and(|element| self.markup.has_fixed_stroke(element));
+        let on_page = || path.data().clone().transform(single(context.to_page));
+        let (path_data, to_page, unit) = match dashes.filter(|_| is_fixed).and_then(|_| on_page()) {
+            Some(data) => (Cow::Owned(data), Affine::IDENTITY, PIXEL as f32),
+            None => (Cow::Borrowed(path.data()), context.to_page, 1.0),
+        };
         let dashed = match dashes {
             None => None,
             Some((lengths, offset)) => {
                 // Lengths along a curve are measured to within a small part of a motor step.
-                let scale = context.to_page.determinant().abs().sqrt() * 100.0;
-                let dash = StrokeDash::new(lengths.to_vec(), offset);
-                let dashed = dash.and_then(|dash| path.data().dash(&dash, scale as f32));
+                let scale = to_page.determinant().abs().sqrt() * 100.0;
+                let lengths = lengths.iter().map(|length| length * unit).collect();
+                let dash = StrokeDash::new(lengths, offset * unit);
+                let dashed = dash.and_then(|dash| path_data.dash(&dash, scale as f32));
                 self.undashed += usize::from(dashed.is_none());
                 dashed
             }
@@ -218,8 +265,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             false => self.markup.arcs(own),
         };
         let arcs_drawn = if dashed.is_some() { Arcs::None } else { arcs };
-        let data = dashed.as_ref().unwrap_or(path.data());
-        let mut polylines = flatten(data, context.to_page, arcs_drawn, &mut self.budget)?;
+        let data = dashed.as_ref().unwrap_or(&path_data);
+        let mut polylines = flatten(data, to_page, arcs_drawn, &mut self.budget)?;
         if stroke.is_none() {
             // A filled area has a side between the ends of an open path, too.
             polylines.iter_mut().for_each(Polyline::close);
@@ -227,28 +274,37 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let outlines = match fill.map(|fill| fill.paint()) {
             Some(paint) if self.with_areas && !is_white(paint) => {
                 let whole = flatten(path.data(), context.to_page, arcs, &mut self.budget)?;
-                let areas = context.areas.iter().chain([&self.page]);
-                let sides: Vec<_> = areas.flat_map(ConvexArea::sides).collect();
-                let outline = |polyline: &Polyline| -> Vec<[f64; 2]> {
-                    polyline.points.iter().map(|point| [point.x, point.y]).collect()
-                };
-                let outlines = whole.iter().map(|it| clip_outline(&outline(it), &sides));
+                let sides = self.page.sides();
+                let outlines = whole.iter().map(|it| clip_outline(&it.positions(), &sides));
                 outlines.filter(|outline| outline.len() > 2).collect()
             }
             _ => Vec::new(),
         };
-        for area in &context.areas {
-            let mut parts = Vec::new();
-            for polyline in &polylines {
-                area.cut(polyline, CLIP_SLACK, &mut parts);
-            }
-            polylines = parts;
-        }
+        let (whole, areas) = (polylines, &context.areas);
+        let polylines = match areas.0.is_empty() {
+            true => whole.clone(),
+            false => self.clipped(&whole, path, stroke.is_none(), areas)?,
+        };
         let (mut parts, mut is_cut) = (Vec::new(), false);
         for polyline in &polylines {
-            is_cut |= self.page.cut(polyline, SLACK, &mut parts);
+            let mut own = Vec::new();
+            if self.page.cut(polyline, SLACK, &mut own) {
+                is_cut = true;
+                own.retain(|part| length(&part.positions()) > 2.0 * SLACK);
+            }
+            parts.extend(own);
         }
-        self.cut += usize::from(is_cut);
+        if stroke.is_none() && self.is_background(&whole, areas, &parts) {
+            self.backgrounds += 1;
+            parts.clear();
+        } else {
+            self.cut += usize::from(is_cut);
+        }
+        self.patterns += usize::from(
+            [stroke.map(|it| it.paint()), fill.map(|it| it.paint())]
+                .iter()
+                .any(|paint| matches!(paint, Some(Paint::Pattern(_)))),
+        );
         let colour = match paint {
             Paint::Color(colour) => Some([colour.red, colour.green, colour.blue]),
             _ => None,
@@ -257,10 +313,71 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let layer = context.element.or(own).and_then(|element| self.markup.layer(element));
         let marks = Marks { layer, colour };
         if !parts.is_empty() || !outlines.is_empty() {
-            self.shapes.push(Shape { element, marks, polylines: parts, outlines });
+            let within = context.areas.clone();
+            let has_dots = stroke.is_some_and(|stroke| stroke.linecap() != LineCap::Butt);
+            self.shapes.push(Shape {
+                element,
+                marks,
+                polylines: parts,
+                has_dots,
+                outlines,
+                within,
+            });
         }
         Ok(())
     }
+
+    /// What clip paths leave of the lines of a path. Of one that is only filled, their borders
+    /// within it are a part of its outline.
+    fn clipped(
+        &mut self,
+        polylines: &[Polyline],
+        path: &Path,
+        is_only_filled: bool,
+        areas: &Regions,
+    ) -> Result<Vec<Polyline>, TooManyPoints> {
+        let mut parts = Vec::new();
+        for polyline in polylines {
+            let points = polyline.positions();
+            match points.first().filter(|_| length(&points) == 0.0) {
+                Some(dot) => parts.extend(areas.contain(*dot).then_some(points)),
+                None => parts.extend(areas.cut(&points, &mut self.budget)?),
+            }
+        }
+        if is_only_filled {
+            let mut shape = Region::default();
+            let outlines = polylines.iter().map(Polyline::positions).collect();
+            shape.add(outlines, is_even_odd(path), Vec::new());
+            let page = &self.page;
+            let is_beyond = |[x, y]: [f64; 2]| page.depth(Point::new(x, y)) < SLACK;
+            parts.extend(areas.borders_within(&Arc::new(shape), is_beyond, &mut self.budget)?);
+        }
+        let of_points = |points: Vec<[f64; 2]>| {
+            let points = points.into_iter().map(|[x, y]| Point::new(x, y)).collect();
+            Polyline { points }
+        };
+        Ok(parts.into_iter().map(of_points).collect())
+    }
+
+    /// Whether the page lies within these outlines, as it does in those of a background, and what is
+    /// left of them is on its border at most.
+    fn is_background(&self, outlines: &[Polyline], areas: &Regions, parts: &[Polyline]) -> bool {
+        let is_on_border = |part: &Polyline| {
+            let mut lines = part.points.iter().zip(part.points.iter().skip(1));
+            lines.all(|(from, to)| {
+                [*from, from.midpoint(*to), *to].iter().all(|it| self.page.depth(*it) <= SLACK)
+            })
+        };
+        let mut shape = Region::default();
+        shape.add(outlines.iter().map(Polyline::positions).collect(), false, Vec::new());
+        let middle = self.page.middle();
+        parts.iter().all(is_on_border) && shape.contains(middle) && areas.contain(middle)
+    }
+}
+
+/// Whether what a path fills is decided by the number of outlines around it.
+fn is_even_odd(path: &Path) -> bool {
+    path.fill().is_some_and(|fill| fill.rule() == FillRule::EvenOdd)
 }
 
 /// Whether a fill is that of the paper, which is not hatched.
@@ -268,18 +385,13 @@ fn is_white(paint: &Paint) -> bool {
     matches!(paint, Paint::Color(colour) if [colour.red, colour.green, colour.blue] == [255; 3])
 }
 
-/// The only path in `group`, and its way to the page; `None` if there is none, or there are
-/// several.
-fn only_path(group: &Group, to_page: Affine) -> Option<(&Path, Affine)> {
-    let to_page = to_page * affine(group.transform());
-    match group.children() {
-        [Node::Path(path)] => Some((path, to_page)),
-        [Node::Group(group)] if group.clip_path().is_none() => only_path(group, to_page),
-        _ => None,
-    }
-}
-
 fn affine(transform: Transform) -> Affine {
     let Transform { sx, kx, ky, sy, tx, ty } = transform;
     Affine::new([sx, ky, kx, sy, tx, ty].map(f64::from))
+}
+
+/// A transform in the numbers of `usvg`.
+fn single(transform: Affine) -> Transform {
+    let [sx, ky, kx, sy, tx, ty] = transform.as_coeffs().map(|number| number as f32);
+    Transform { sx, kx, ky, sy, tx, ty }
 }

@@ -6,6 +6,7 @@
 //! `usvg` writes each arc as cubic Béziers, which may be several hundredths of a millimetre off on
 //! a large page. Where the source has an arc, the ellipse is computed from the Bézier again.
 
+use crate::region::TooMuch;
 use kurbo::{Affine, BezPath, PathEl, Point};
 use usvg::tiny_skia_path::{Path, PathSegment};
 
@@ -28,6 +29,11 @@ pub(super) struct Polyline {
 }
 
 impl Polyline {
+    /// Its points.
+    pub(super) fn positions(&self) -> Vec<[f64; 2]> {
+        self.points.iter().map(|point| [point.x, point.y]).collect()
+    }
+
     /// Goes on to where it began, if it is no straight line.
     pub(super) fn close(&mut self) {
         if let [first, _, .., last] = *self.points
@@ -38,9 +44,16 @@ impl Polyline {
     }
 }
 
-/// A file has more points than fit in memory, or a curve that is too large.
+/// A file has more points than fit in memory, a curve that is too large, or clip paths of too many
+/// sides.
 #[derive(Debug)]
 pub(super) struct TooManyPoints;
+
+impl From<TooMuch> for TooManyPoints {
+    fn from(_: TooMuch) -> Self {
+        Self
+    }
+}
 
 /// Which cubic Béziers of a path are arcs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

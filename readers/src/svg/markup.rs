@@ -6,14 +6,16 @@
 use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
+use super::unread;
 use std::collections::{HashMap, HashSet};
 use usvg::roxmltree::{Document, Error, Node, NodeId, ParsingOptions};
 
 /// The elements that are drawn as paths.
-const SHAPES: [&str; 7] = ["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"];
+pub(super) const SHAPES: [&str; 7] =
+    ["path", "rect", "circle", "ellipse", "line", "polyline", "polygon"];
 
 /// The elements whose contents are drawn only where something refers to them, or never.
-const NOT_DRAWN: [&str; 11] = [
+const NOT_DRAWN: [&str; 13] = [
     "defs",
     "symbol",
     "clipPath",
@@ -23,6 +25,8 @@ const NOT_DRAWN: [&str; 11] = [
     "linearGradient",
     "radialGradient",
     "filter",
+    "flowRoot",
+    "hatch",
     "switch",
     "metadata",
 ];
@@ -38,14 +42,15 @@ pub(super) fn parsed(text: &str) -> Result<Document<'_>, Error> {
 }
 
 /// Whether `node` is an element of SVG with one of these names.
-fn is_one_of(node: Node<'_, '_>, names: &[&str]) -> bool {
+pub(super) fn is_one_of(node: Node<'_, '_>, names: &[&str]) -> bool {
     let namespace = node.tag_name().namespace();
     node.is_element()
         && matches!(namespace, None | Some("http://www.w3.org/2000/svg"))
         && names.contains(&node.tag_name().name())
 }
 
-/// A copy of `text` in which every group, reference, shape and text has an `id`.
+/// A copy of `text` in which every group, reference, shape and text has an `id`, and transforms in
+/// `style` attributes have the form that they have in SVG.
 pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let own: HashSet<&str> =
         document.descendants().filter_map(|node| node.attribute("id")).collect();
@@ -54,7 +59,14 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     for node in document.descendants() {
         let is_traced =
             is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text"]);
-        if !is_traced || node.attribute("id").is_some() || node.parent_element().is_none() {
+        let is_traced =
+            is_traced && node.attribute("id").is_none() && node.parent_element().is_some();
+        let style = node.attribute_node("style").and_then(|style| {
+            let value =
+                text.get(style.range_value()).filter(|value| value.contains("transform"))?;
+            Some((style.range_value(), with_plain_transform(value)?))
+        });
+        if !is_traced && style.is_none() {
             continue;
         }
         // The name of an element ends at a space, a slash or an angle bracket. The contents of an
@@ -64,19 +76,34 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         let is_end = |letter: char| letter.is_whitespace() || matches!(letter, '/' | '>');
         let Some(name) = rest.find(is_end) else { continue };
         let end = start + 1 + name;
-        let id = loop {
-            number += 1;
-            let id = format!("penup-{number}");
-            if !own.contains(id.as_str()) {
-                break id;
-            }
-        };
         copy.push_str(text.get(copied..end).unwrap_or_default());
-        copy.push_str(&format!(" id=\"{id}\""));
         copied = end;
+        if is_traced {
+            let id = loop {
+                number += 1;
+                let id = format!("penup-{number}");
+                if !own.contains(id.as_str()) {
+                    break id;
+                }
+            };
+            copy.push_str(&format!(" id=\"{id}\""));
+        }
+        if let Some((range, style)) = style.filter(|(range, _)| range.start >= copied) {
+            copy.push_str(text.get(copied..range.start).unwrap_or_default());
+            copy.push_str(&style);
+            copied = range.end;
+        }
     }
     copy.push_str(text.get(copied..).unwrap_or_default());
     copy
+}
+
+/// The declarations of a `style` attribute with a transform as SVG writes it; `None` if they have
+/// it, or there is no such form.
+fn with_plain_transform(style: &str) -> Option<String> {
+    let (_, css) = unread::declarations(style).find(|(name, _)| *name == "transform")?;
+    let plain = unread::plain_transform(css)?;
+    (plain != css).then(|| style.replace(css, &plain))
 }
 
 /// The elements of an SVG in which every group and shape has an `id`.
@@ -205,21 +232,50 @@ impl<'a, 'input> Markup<'a, 'input> {
         foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
         let what = "not drawn as a whole: there is an error in the data, and the rest is left out";
         broken.say(&mut said, ["path is", "paths are"], what);
-        let what = "not drawn: hidden, or without a size or points, or a reference to nothing";
+        let what = "not drawn: hidden, or without a size or points, or with one in a unit that is not read, or \
+                    a reference to nothing";
         missing.say(&mut said, ["element is", "elements are"], what);
+        said.extend(unread::sentences(self.document));
         said
     }
+
+    /// Whether a stroke is asked for by the element, or by those that contain it.
+    pub(super) fn asks_for_stroke(&self, element: NodeId) -> bool {
+        let mut nodes = self.node(element).into_iter().flat_map(|node| node.ancestors());
+        nodes
+            .find_map(|node| property(node, "stroke"))
+            .is_some_and(|paint| !matches!(paint, "none" | "transparent"))
+    }
+
+    /// Whether the element or one that contains it says by itself that it is not shown.
+    pub(super) fn is_hidden(&self, element: NodeId) -> bool {
+        self.node(element).is_some_and(is_hidden)
+    }
+
+    /// Whether the width of an element's stroke, and with it the length of its dashes, is the same
+    /// whatever transforms there are.
+    pub(super) fn has_fixed_stroke(&self, element: NodeId) -> bool {
+        let node = self.node(element);
+        node.and_then(|node| property(node, "vector-effect")) == Some("non-scaling-stroke")
+    }
+}
+
+/// The value of a property that the element itself has.
+fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
+    let style = unread::declarations(node.attribute("style").unwrap_or_default());
+    let own = style.filter(|(own, _)| *own == name).map(|(_, value)| value).last();
+    own.or(node.attribute(name))
 }
 
 /// How many elements of one kind there are, and in which line the first one begins.
 #[derive(Debug, Default)]
-struct Count {
+pub(super) struct Count {
     number: usize,
     line: u32,
 }
 
 impl Count {
-    fn add(&mut self, document: &Document<'_>, node: Node<'_, '_>) {
+    pub(super) fn add(&mut self, document: &Document<'_>, node: Node<'_, '_>) {
         if self.number == 0 {
             // Only once for each kind, because the position is counted from the beginning.
             self.line = document.text_pos_at(node.range().start).row;
@@ -227,7 +283,7 @@ impl Count {
         self.number += 1;
     }
 
-    fn say(&self, said: &mut Vec<String>, [one, many]: [&str; 2], what: &str) {
+    pub(super) fn say(&self, said: &mut Vec<String>, [one, many]: [&str; 2], what: &str) {
         let Self { number, line } = self;
         match number {
             0 => {}
@@ -243,7 +299,7 @@ pub(super) fn has_text(document: &Document<'_>) -> bool {
 }
 
 /// Whether a text has letters.
-fn has_letters(text: Node<'_, '_>) -> bool {
+pub(super) fn has_letters(text: Node<'_, '_>) -> bool {
     let mut letters = text.descendants().filter_map(|node| node.text());
     letters.any(|letters| !letters.trim().is_empty())
 }
@@ -271,10 +327,9 @@ fn has_error(node: Node<'_, '_>) -> bool {
 fn is_hidden(node: Node<'_, '_>) -> bool {
     node.ancestors().any(|node| {
         let says = |name: &str, value: &str| {
-            let style = node.attribute("style").unwrap_or_default().split(';');
-            let mut style = style.filter_map(|property| property.split_once(':'));
+            let mut style = unread::declarations(node.attribute("style").unwrap_or_default());
             node.attribute(name).is_some_and(|own| own.trim() == value)
-                || style.any(|(own, own_value)| own.trim() == name && own_value.trim() == value)
+                || style.any(|declaration| declaration == (name, value))
         };
         says("display", "none") || says("visibility", "hidden")
     })

@@ -209,7 +209,7 @@ fn transforms_are_nested_and_references_are_followed() {
 }
 
 #[test]
-fn what_is_outside_of_the_page_or_of_a_convex_clip_path_is_cut_off() {
+fn what_is_outside_of_the_page_or_of_a_clip_path_is_cut_off() {
     let contents = read(&in_mm("<path d='M-10 50H110'/><path d='M200 0h9'/>")).expect("an SVG");
     assert_eq!(polylines(&contents)[0].1, [[0.0, 50.0], [100.0, 50.0]]);
     assert_eq!(contents.notes(), ["2 paths reach beyond the page of the SVG: the rest is cut off"]);
@@ -220,14 +220,6 @@ fn what_is_outside_of_the_page_or_of_a_convex_clip_path_is_cut_off() {
     let contents = read(&clipped).expect("an SVG");
     assert_eq!(polylines(&contents)[0].1, [[20.0, 75.0], [30.0, 75.0]]);
     assert!(contents.notes().is_empty(), "{:?}", contents.notes());
-    let dented = clipped
-        .replace("<rect x='20' y='20' width='10' height='10'/>", "<path d='M0 0H50V50L40 10Z'/>");
-    let contents = read(&dented).expect("an SVG");
-    assert!(
-        contents.notes()[0].starts_with("1 clip path is not applied"),
-        "{:?}",
-        contents.notes()
-    );
 }
 
 #[test]
@@ -393,12 +385,31 @@ fn what_is_not_drawn_is_counted() {
             "1 image is not drawn (line 3)",
             "1 path is not drawn as a whole: there is an error in the data, and the rest is left \
              out (line 4)",
-            "2 elements are not drawn: hidden, or without a size or points, or a reference to \
-             nothing (the first in line 5)",
+            "2 elements are not drawn: hidden, or without a size or points, or with one in a \
+             unit that is not read, or a reference to nothing (the first in line 5)",
             "1 mask is not applied: what it hides is drawn",
             "1 line is not drawn, because a dot has no length",
         ]
     );
+}
+
+#[test]
+fn dots_with_round_or_square_ends_are_drawn_as_very_short_lines() {
+    let dot = |x: f64| vec![[x, 50.0], [x + 0.02, 50.0]];
+    for cap in ["round", "square"] {
+        let stroke = format!("stroke='red' stroke-linecap='{cap}'");
+        let contents = read(&in_mm(&format!(
+            "<path d='M10 50h0M20 50zM200 50h0' {stroke}/><path d='M30 50h5' {stroke} \
+             stroke-dasharray='0 3'/><clipPath id='c'><path d='M0 0H50V100H0Z'/></clipPath>\
+             <path clip-path='url(#c)' d='M40 50h0M60 50h0' {stroke}/><path d='M100 50h0' {stroke}/>"
+        )));
+        let contents = contents.expect("an SVG");
+        let drawn: Vec<_> = polylines(&contents).into_iter().map(|(_, points)| points).collect();
+        let end = vec![[100.0, 50.0], [99.98, 50.0]];
+        assert_eq!(drawn, [dot(10.0), dot(20.0), dot(30.0), dot(33.0), dot(40.0), end], "{cap}");
+        let note = "1 path reaches beyond the page of the SVG: the rest is cut off";
+        assert_eq!(contents.notes(), [note], "{cap}");
+    }
 }
 
 #[test]
@@ -482,5 +493,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
     assert!(error.to_string().contains("UTF-8"), "{error}");
 }
 
+mod clips;
+mod css;
 #[cfg(feature = "text")]
 mod texts;

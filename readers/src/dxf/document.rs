@@ -1,0 +1,162 @@
+//! What a DXF file says: pairs of a code and a value, of which entities, layers and blocks are made.
+
+use crate::plan::Point;
+use std::collections::{HashMap, HashSet};
+
+/// A code and its value, and the line of the file in which the value stands.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pair<'a> {
+    pub(super) code: i32,
+    pub(super) value: &'a str,
+    pub(super) line: usize,
+}
+
+/// An entity of a drawing, such as a line.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Entity<'a> {
+    pub(super) kind: &'a str,
+    pub(super) line: usize,
+    pub(super) pairs: Vec<Pair<'a>>,
+}
+
+/// A reason for a refusal, and the line.
+pub(super) type Refusal = (usize, String);
+
+impl<'a> Entity<'a> {
+    pub(super) fn text(&self, code: i32) -> Option<&'a str> {
+        self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.value)
+    }
+
+    /// All numbers with this code.
+    pub(super) fn numbers(&self, code: i32) -> Result<Vec<f64>, Refusal> {
+        self.pairs.iter().filter(|pair| pair.code == code).map(|pair| number(*pair)).collect()
+    }
+
+    pub(super) fn number(&self, code: i32, default: f64) -> Result<f64, Refusal> {
+        Ok(self.numbers(code)?.first().copied().unwrap_or(default))
+    }
+
+    pub(super) fn point(&self, code: i32) -> Result<Point, Refusal> {
+        Ok([self.number(code, 0.0)?, self.number(code + 10, 0.0)?])
+    }
+
+    pub(super) fn points(&self, code: i32) -> Result<Vec<Point>, Refusal> {
+        let (x, y) = (self.numbers(code)?, self.numbers(code + 10)?);
+        if x.len() != y.len() {
+            return Err((self.line, format!("{} has points without x or y", self.kind)));
+        }
+        Ok(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect())
+    }
+
+    pub(super) fn flags(&self) -> Result<i64, Refusal> {
+        Ok(self.number(70, 0.0)? as i64)
+    }
+
+    pub(super) fn layer(&self) -> &'a str {
+        self.text(8).unwrap_or("0")
+    }
+}
+
+pub(super) fn number(pair: Pair<'_>) -> Result<f64, Refusal> {
+    match pair.value.trim().parse::<f64>() {
+        Ok(value) if value.is_finite() && value.abs() < 1e12 => Ok(value),
+        _ => Err((pair.line, "this is no number that can be drawn".to_owned())),
+    }
+}
+
+/// What a file says.
+#[derive(Debug, Default)]
+pub(super) struct Document<'a> {
+    pub(super) unit: Option<i64>,
+    /// The layers that are not drawn.
+    pub(super) hidden: HashSet<&'a str>,
+    /// The blocks with their base points.
+    pub(super) blocks: HashMap<&'a str, (Point, Vec<Entity<'a>>)>,
+    pub(super) entities: Vec<Entity<'a>>,
+}
+
+/// The pairs of a file.
+pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
+    let mut lines = text.lines().enumerate();
+    let mut pairs = Vec::new();
+    while let Some((index, code)) = lines.next() {
+        let Ok(code) = code.trim().parse() else {
+            if code.trim().is_empty() && lines.clone().all(|(_, line)| line.trim().is_empty()) {
+                break;
+            }
+            return Err((index + 1, "there should be a code of DXF, a whole number".to_owned()));
+        };
+        let Some((index, value)) = lines.next() else {
+            return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
+        };
+        pairs.push(Pair { code, value: value.trim(), line: index + 1 });
+    }
+    Ok(pairs)
+}
+
+/// Divides pairs into entities, each of which begins with code 0.
+pub(super) fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
+    let mut entities: Vec<Entity<'a>> = Vec::new();
+    for pair in pairs {
+        if pair.code == 0 {
+            entities.push(Entity { kind: pair.value, line: pair.line, pairs: Vec::new() });
+        } else if let Some(entity) = entities.last_mut() {
+            entity.pairs.push(*pair);
+        }
+    }
+    entities
+}
+
+pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> {
+    let mut document = Document::default();
+    let starts: Vec<usize> = (0..pairs.len())
+        .filter(|&at| pairs[at].code == 0 && pairs[at].value == "SECTION")
+        .collect();
+    for (number, &start) in starts.iter().enumerate() {
+        let end = starts.get(number + 1).copied().unwrap_or(pairs.len());
+        let section = &pairs[start..end];
+        match section.get(1).map(|pair| pair.value) {
+            Some("HEADER") => {
+                let mut after = section.iter().skip_while(|pair| pair.value != "$INSUNITS");
+                let unit = after.nth(1).filter(|pair| pair.code == 70);
+                document.unit = unit.map(|pair| number_of(*pair)).transpose()?;
+            }
+            Some("TABLES") => {
+                for layer in entities(section).iter().filter(|it| it.kind == "LAYER") {
+                    let is_hidden = layer.number(62, 7.0)? < 0.0 || layer.flags()? & 1 == 1;
+                    document.hidden.extend(layer.text(2).filter(|_| is_hidden));
+                }
+            }
+            Some("BLOCKS") => {
+                let mut block: Option<&str> = None;
+                for entity in entities(section) {
+                    match (entity.kind, block) {
+                        ("BLOCK", _) => {
+                            let name = entity.text(2).unwrap_or_default();
+                            let base = entity.point(10)?;
+                            document.blocks.insert(name, (base, Vec::new()));
+                            block = Some(name);
+                        }
+                        ("ENDBLK" | "ENDSEC" | "SECTION", _) => block = None,
+                        (_, Some(name)) => {
+                            if let Some((_, entities)) = document.blocks.get_mut(name) {
+                                entities.push(entity);
+                            }
+                        }
+                        _ => {}
+                    }
+                }
+            }
+            Some("ENTITIES") => {
+                let is_own = |it: &Entity<'_>| !matches!(it.kind, "SECTION" | "ENDSEC" | "EOF");
+                document.entities = entities(section).into_iter().filter(is_own).collect();
+            }
+            _ => {}
+        }
+    }
+    Ok(document)
+}
+
+fn number_of(pair: Pair<'_>) -> Result<i64, Refusal> {
+    Ok(number(pair)? as i64)
+}

@@ -1,0 +1,214 @@
+//! What an SVG asks for by means that are not read: properties and rules of CSS, scripts,
+//! animations, and paints of other programs. All of it is counted, for the user.
+
+use super::markup::{Count, SHAPES, is_one_of};
+use std::collections::BTreeMap;
+use std::str::FromStr as _;
+use usvg::roxmltree::{Document, Node};
+
+/// The properties of CSS that move or form a shape, and are read as attributes only or not at all.
+const NOT_READ: [&str; 7] =
+    ["d", "offset-path", "rotate", "scale", "shape-inside", "transform-box", "translate"];
+
+/// The attributes of shapes that CSS may set, which are read as attributes only.
+const SIZES: [&str; 8] = ["cx", "cy", "height", "r", "rx", "ry", "width", "x"];
+
+/// The rules of a style sheet that change nothing which is drawn.
+const HARMLESS_RULES: [&str; 5] = ["charset", "font-face", "keyframes", "namespace", "page"];
+
+/// The classes of a selector that are read.
+const CLASSES: [&str; 6] = ["active", "first-child", "focus", "hover", "link", "visited"];
+
+/// Counts what is not read, in sentences.
+pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
+    let mut unread: BTreeMap<String, Count> = BTreeMap::new();
+    let (mut scripts, mut animations, mut flowed, mut paints) =
+        (Count::default(), Count::default(), Count::default(), Count::default());
+    for node in document.descendants().filter(Node::is_element) {
+        if is_one_of(node, &["script"]) {
+            scripts.add(document, node);
+        } else if is_one_of(node, &["animate", "animateMotion", "animateTransform", "set"]) {
+            animations.add(document, node);
+        } else if is_one_of(node, &["flowRoot"]) && super::markup::has_letters(node) {
+            flowed.add(document, node);
+        } else if is_one_of(node, &["meshgradient", "meshGradient", "mesh", "hatch"]) {
+            paints.add(document, node);
+        } else if is_one_of(node, &["style"]) {
+            let sheet: String = node.children().filter_map(|it| it.text()).collect();
+            for what in of_sheet(&sheet) {
+                unread.entry(what).or_default().add(document, node);
+            }
+        }
+        if is_one_of(node, &["symbol"]) && node.attribute("transform").is_some() {
+            unread.entry("the transform of a symbol".to_owned()).or_default().add(document, node);
+        }
+        let is_shape = is_one_of(node, &SHAPES);
+        let own = declarations(node.attribute("style").unwrap_or_default());
+        let attributes = node.attributes().filter(|it| it.name() != "style");
+        let as_attribute = attributes.map(|it| (it.name(), it.value(), false));
+        for (name, value, is_style) in
+            own.map(|(name, value)| (name, value, true)).chain(as_attribute)
+        {
+            if let Some(what) = unread_property(name, value, is_style, is_shape) {
+                unread.entry(what).or_default().add(document, node);
+            }
+        }
+    }
+    let mut said = Vec::new();
+    scripts.say(&mut said, ["script is", "scripts are"], "not run");
+    let what = "not obeyed: what is drawn is the state without them";
+    animations.say(&mut said, ["animation is", "animations are"], what);
+    let what = "not read: convert text to paths";
+    flowed.say(&mut said, ["flowed text of Inkscape is", "flowed texts of Inkscape are"], what);
+    let what = "not read: what is only filled with it is not drawn";
+    paints.say(&mut said, ["mesh or hatch is", "meshes or hatches are"], what);
+    for (what, count) in &unread {
+        let nouns = ["element or style sheet has", "elements or style sheets have"];
+        count.say(&mut said, nouns, &format!("{what}, which is not obeyed"));
+    }
+    said
+}
+
+/// The properties and values of a list of declarations.
+pub(super) fn declarations(list: &str) -> impl Iterator<Item = (&str, &str)> {
+    let pairs = list.split(';').filter_map(|declaration| declaration.split_once(':'));
+    pairs.map(|(name, value)| (name.trim(), value.trim()))
+}
+
+/// What is not read of a property.
+fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> Option<String> {
+    let is_usual = matches!(value, "" | "none" | "auto" | "inherit" | "initial" | "unset");
+    if is_usual {
+        return None;
+    }
+    let is_unread = match name {
+        "clip-path" => !value.starts_with("url(") && !value.contains("var("),
+        "transform" | "patternTransform" | "gradientTransform" => plain_transform(value).is_none(),
+        _ => is_style && (NOT_READ.contains(&name) || is_shape && SIZES.contains(&name)),
+    };
+    if is_unread {
+        return Some(format!("the property {name} of CSS"));
+    }
+    value.contains("var(").then(|| "a variable of CSS".to_owned())
+}
+
+/// What is not read of a style sheet.
+fn of_sheet(sheet: &str) -> Vec<String> {
+    let mut unread = Vec::new();
+    let mut rest = sheet;
+    let mut plain = String::new();
+    while let Some((before, after)) = rest.split_once("/*") {
+        plain.push_str(before);
+        rest = after.split_once("*/").map_or("", |(_, after)| after);
+    }
+    plain.push_str(rest);
+    let mut rest = plain.as_str();
+    while let Some(end) = rest.find(['{', ';', '}']) {
+        let (prelude, body) = (rest[..end].trim(), &rest[end..]);
+        if let Some(rule) = prelude.strip_prefix('@') {
+            let name = rule.split(|it: char| !it.is_alphanumeric() && it != '-').next();
+            let name = name.unwrap_or_default();
+            if !HARMLESS_RULES.iter().any(|rule| name.ends_with(rule)) {
+                unread.push(format!("the rule @{name} of CSS"));
+            }
+            rest = after_block(body);
+            continue;
+        }
+        let Some(block) = body.strip_prefix('{') else {
+            rest = &body[1..];
+            continue;
+        };
+        for class in prelude.split(':').skip(1).filter(|class| !class.is_empty()) {
+            let end = class.find(|it: char| !it.is_alphanumeric() && it != '-');
+            let class = &class[..end.unwrap_or(class.len())];
+            if !CLASSES.contains(&class) && class != "root" {
+                unread.push(format!("a selector :{class} of CSS"));
+            }
+        }
+        let list = block.split('}').next().unwrap_or_default();
+        // Sizes may be those of the whole picture.
+        let properties =
+            declarations(list).filter(|(name, _)| !matches!(*name, "width" | "height"));
+        unread.extend(properties.filter_map(|(name, value)| {
+            if name.starts_with("--") { None } else { unread_property(name, value, true, true) }
+        }));
+        rest = after_block(body);
+    }
+    unread
+}
+
+/// What follows a block, or a semicolon.
+fn after_block(text: &str) -> &str {
+    let mut depth = 0_u32;
+    for (at, letter) in text.char_indices() {
+        match letter {
+            '{' => depth += 1,
+            '}' => depth = depth.saturating_sub(1),
+            ';' => {}
+            _ => continue,
+        }
+        if depth == 0 {
+            return &text[at + 1..];
+        }
+    }
+    ""
+}
+
+/// A transform of CSS in the form of SVG, whose angles are degrees and whose lengths are pixels;
+/// `None` if there is no such form.
+pub(super) fn plain_transform(value: &str) -> Option<String> {
+    let mut plain = String::with_capacity(value.len());
+    let mut rest = value;
+    while let Some(letter) = rest.chars().next() {
+        let unit = ["deg", "px"].into_iter().find(|unit| rest.starts_with(unit));
+        let taken = match unit {
+            Some(unit) if plain.ends_with(|it: char| it.is_ascii_digit() || it == '.') => {
+                unit.len()
+            }
+            _ => {
+                plain.push(letter);
+                letter.len_utf8()
+            }
+        };
+        rest = &rest[taken..];
+    }
+    svgtypes::Transform::from_str(&plain).is_ok().then_some(plain)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_transform_of_css_becomes_one_of_svg() {
+        for (css, svg) in [
+            ("rotate(20deg) translate(3px, 4.px)", Some("rotate(20) translate(3, 4.)")),
+            ("matrix(1,0,0,1,5,6)", Some("matrix(1,0,0,1,5,6)")),
+            ("rotate(0.5turn)", None),
+            ("translate(50%, 0)", None),
+            ("rotate3d(1, 1, 1, 45deg)", None),
+        ] {
+            assert_eq!(plain_transform(css).as_deref(), svg, "{css}");
+        }
+    }
+
+    #[test]
+    fn a_style_sheet_says_what_is_not_read_of_it() {
+        for (sheet, unread) in [
+            (".a{stroke:red;fill:none} /* @import x; */ #b:hover, path:first-child {d:none}", ""),
+            ("@font-face{src:url(a;b)} @charset 'x'; .a{width:5px}", ""),
+            ("@import url(a.css); .a{stroke:red}", "the rule @import of CSS"),
+            ("@media print{.a{d:path('M0 0')} .b{x:1}} .c{r:5px}", "the rule @media of CSS"),
+            ("a:not(.b), c{}", "a selector :not of CSS"),
+            (".a{stroke:var(--b)} :root{--b:red}", "a variable of CSS"),
+            (".a{clip-path:circle(5px)}", "the property clip-path of CSS"),
+            (".a{", ""),
+            ("@media {", "the rule @media of CSS"),
+            ("}}{;@", ""),
+        ] {
+            let said = of_sheet(sheet);
+            assert_eq!(said.first().map_or("", String::as_str), unread, "{sheet}");
+        }
+        assert_eq!(of_sheet("@media print{.a{x:1}} .c{r:5px}").len(), 2);
+    }
+}
