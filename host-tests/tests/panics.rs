@@ -10,23 +10,26 @@ use std::collections::BTreeMap;
 /// the Pico. A room that is missing has none. A number that
 /// has fallen is lowered here.
 const MOST: [(&str, [usize; 2]); 16] = [
-    ("boards", [2, 21]),
-    ("convex", [37, 163]),
-    ("curve", [8, 24]),
-    ("drawing", [4, 12]),
+    ("boards", [2, 19]),
+    ("convex", [37, 153]),
+    // On the Pico other calls are inlined since its image is optimized a little less, by which all
+    // of it has 80 fewer.
+    ("curve", [8, 26]),
+    ("drawing", [4, 11]),
     ("fixed.rs", [4, 5]),
     ("lib.rs", [0, 2]),
-    ("machine", [2, 13]),
-    ("model", [10, 42]),
+    ("machine", [2, 10]),
+    ("model", [10, 39]),
     // The Pico has one more since the pen moves on the way: a profile is also made there.
     ("motion", [6, 16]),
-    ("order", [48, 385]),
+    ("order", [48, 325]),
     // The Pico has two more since the main loop reads HP-GL: divisions that are inlined there.
-    ("plotter", [6, 4]),
+    ("plotter", [6, 3]),
     // The Pico has one more since losses are marked apart from damaged bytes.
-    ("protocol", [3, 5]),
-    ("stage.rs", [0, 24]),
-    ("step", [3, 12]),
+    ("protocol", [3, 4]),
+    // The Pico sorts the vertices of a tile.
+    ("stage.rs", [0, 27]),
+    ("step", [3, 10]),
     ("view", [2, 10]),
     ("visibility", [26, 188]),
 ];
