@@ -219,7 +219,8 @@ pub const LM3S6965: BoardRow = BoardRow {
 };
 
 /// Raspberry Pi Pico. The log is that of the real board, because the same image is flashed. The
-/// budget is all that the memory map (`boards/pico.x`) leaves beside the records and the stack.
+/// budget is all that the memory map (`boards/pico.x`) leaves beside the model in flash, the records
+/// and the stack.
 pub const PICO: BoardRow = BoardRow {
     name: "pico",
     about: "Raspberry Pi Pico: RP2040, Cortex-M0+, 264 KiB of RAM, in rp2040js",
@@ -232,7 +233,7 @@ pub const PICO: BoardRow = BoardRow {
     flash: Region { start: 0x1000_0000, size: 2 << 20 },
     boot_loader: 256,
     ram: Region { start: 0x2000_0000, size: 264 << 10 },
-    budget: ImageBudget { flash: 1760 << 10, ram: 252 << 10, stack: 12 << 10 },
+    budget: ImageBudget { flash: 688 << 10, ram: 252 << 10, stack: 12 << 10 },
     clock_hertz: 125_000_000,
     pins: Pins {
         step_x: 2,
@@ -259,8 +260,8 @@ pub const PICO: BoardRow = BoardRow {
         steps: 1776,
     },
     scene: Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
-    // The feature that would use it is not on for this board yet.
-    model_flash: 0,
+    // Enough for 70,000 triangles.
+    model_flash: 1072 << 10,
     emulator: Emulator::Rp2040js,
     flashing: Some(Flashing {
         chip: "RP2040",

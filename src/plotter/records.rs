@@ -273,57 +273,37 @@ fn load_order<B: Board, I: Index>(begun: Job<I>, words: &mut [u64], board: &mut 
     loaded
 }
 
+/// Returns the job that a record of this layout begins, and the number of words of its memory.
+/// `record` is read up to that memory.
+#[cfg(feature = "early-ink")]
+fn layout_of<I: Index>(
+    layout: u32,
+    job: Job<I>,
+    record: &mut dyn Stored,
+) -> Option<(Job<I>, usize)> {
+    if layout != BEGUN_LAYOUT {
+        return (layout == JOB_LAYOUT).then_some((job, job.words()));
+    }
+    let mut rest = [[0; 4]; UNORDERED_WORDS];
+    if record.read(rest.as_flattened_mut()) != size_of_val(&rest) {
+        return None;
+    }
+    let unordered = Unordered::from_words(rest.map(u32::from_le_bytes))?;
+    Some((job.without_order(unordered), job.drawing_words()))
+}
+
+/// Returns the job that a record of this layout begins, and the number of words of its memory.
+#[cfg(not(feature = "early-ink"))]
+fn layout_of<I: Index>(layout: u32, job: Job<I>, _: &mut dyn Stored) -> Option<(Job<I>, usize)> {
+    (layout == JOB_LAYOUT).then_some((job, job.words()))
+}
+
 /// Loads the job that was kept last. Its memory is then in `words`. If its order is not known, only
 /// its drawing is.
 ///
 /// # Errors
-/// As those of the job with an order.
-#[cfg(feature = "early-ink")]
-#[inline(never)] // Inlined, its frame would take stack while a job is computed.
-pub(super) fn load_job<B: Board, I: Index>(
-    settings: &Settings,
-    words: &mut [u64],
-    board: &mut B,
-) -> Result<Job<I>, CommandError> {
-    let mut found = Err(CommandError::NoJobKept);
-    board.load(Record::Job, &mut |record| {
-        let mut header = [[0; 4]; JOB_HEADER];
-        if record.read(header.as_flattened_mut()) != size_of_val(&header) {
-            return;
-        }
-        let [layout, x, y, figures @ ..] = header.map(u32::from_le_bytes);
-        let Some(mut job) = Job::<I>::from_figures(figures) else { return };
-        let mut words_of_job = job.words();
-        if layout == BEGUN_LAYOUT {
-            let mut rest = [[0; 4]; UNORDERED_WORDS];
-            if record.read(rest.as_flattened_mut()) != size_of_val(&rest) {
-                return;
-            }
-            let Some(unordered) = Unordered::from_words(rest.map(u32::from_le_bytes)) else {
-                return;
-            };
-            words_of_job = job.drawing_words();
-            job = job.without_order(unordered);
-        } else if layout != JOB_LAYOUT {
-            return;
-        }
-        let Some(memory) = words.get_mut(..words_of_job) else { return };
-        if [x, y] != steps(settings) {
-            found = Err(CommandError::OtherSteps);
-        } else if record.read(bytemuck::cast_slice_mut(memory)) == size_of_val(memory) {
-            found = Ok(job);
-        }
-    });
-    let job = found?;
-    Ok(if job.unordered().is_some() { load_order(job, words, board) } else { job })
-}
-
-/// Loads the job that was kept last. Its memory is then in `words`.
-///
-/// # Errors
 /// [`CommandError::NoJobKept`] if there is none, [`CommandError::OtherSteps`] if the steps per
 /// millimetre have changed since. `words` then hold no job.
-#[cfg(not(feature = "early-ink"))]
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 pub(super) fn load_job<B: Board, I: Index>(
     settings: &Settings,
@@ -337,8 +317,8 @@ pub(super) fn load_job<B: Board, I: Index>(
             return;
         }
         let [layout, x, y, figures @ ..] = header.map(u32::from_le_bytes);
-        let job = Job::<I>::from_figures(figures).filter(|_| layout == JOB_LAYOUT);
-        let Some((job, memory)) = job.and_then(|job| Some((job, words.get_mut(..job.words())?)))
+        let job = Job::<I>::from_figures(figures).and_then(|job| layout_of(layout, job, record));
+        let Some((job, memory)) = job.and_then(|(job, count)| Some((job, words.get_mut(..count)?)))
         else {
             return;
         };
@@ -348,5 +328,11 @@ pub(super) fn load_job<B: Board, I: Index>(
             found = Ok(job);
         }
     });
+    #[cfg(feature = "early-ink")]
+    if let Ok(job) = &mut found
+        && job.unordered().is_some()
+    {
+        *job = load_order(*job, words, board);
+    }
     found
 }

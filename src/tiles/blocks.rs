@@ -20,13 +20,20 @@ struct Block {
     low: [u8; 2],
     /// The upper right corner; it lies to the left of the other if the block is empty.
     high: [u8; 2],
+    /// How far an element of the block extends at most, to the right and upwards.
+    extent: [u8; 2],
 }
 
 impl Block {
     /// Makes the smallest one that contains a rectangle.
     fn around(bounds: Rectangle) -> Self {
         let coarse = |point: GridPoint| [(point.x >> 8) as u8, (point.y >> 8) as u8];
-        Self { low: coarse(bounds.low), high: coarse(bounds.high) }
+        Self { low: coarse(bounds.low), high: coarse(bounds.high), extent: [0; 2] }
+    }
+
+    /// Returns how far an element of the block extends on the grid, or a little more.
+    fn extent(self) -> [u16; 2] {
+        self.extent.map(|extent| u16::from(extent) << 8 | 0xFF)
     }
 
     /// Whether it may meet another.
@@ -90,18 +97,21 @@ impl<'t> Blocks<'t> {
         let counts: &mut [u32] = scratch.take(PARTS)?;
         let mut first = 0;
         for (number, block) in blocks.iter_mut().enumerate() {
-            let mut all = Rectangle::NONE;
+            let (mut all, mut extent) = (Rectangle::NONE, [0; 2]);
             while first < corners.min((number + 1) * length) {
                 cancel.check()?;
                 let outline = Outline::at(source, first);
                 first = outline.end();
                 let Some(bounds) = outline.bounds(sight, survey) else { continue };
                 all = all.union(bounds);
+                for (most, here) in extent.iter_mut().zip(bounds.extent()) {
+                    *most = here.max(*most);
+                }
                 if let Some(count) = counts.get_mut(part_of(bounds.low)) {
                     *count += 1;
                 }
             }
-            *block = Block::around(all);
+            *block = Block { extent: extent.map(|most| (most >> 8) as u8), ..Block::around(all) };
         }
         Ok(Self { blocks, counts, length })
     }
@@ -136,22 +146,23 @@ impl<'t> Blocks<'t> {
         .sum()
     }
 
-    /// Iterates over the elements of all blocks that may meet a rectangle.
+    /// Iterates over the elements of all blocks that may meet a rectangle, each with how far it
+    /// extends on the grid at most.
     pub fn outlines<'s, S: ModelSource>(
         &self,
         source: &'s S,
         near: Rectangle,
-    ) -> impl Iterator<Item = Outline<'s, S>> {
+    ) -> impl Iterator<Item = (Outline<'s, S>, [u16; 2])> {
         let wanted = Block::around(near);
         let is_near = move |(_, block): &(usize, &Block)| block.meets(wanted);
         let length = self.length;
-        self.blocks.iter().enumerate().filter(is_near).flat_map(move |(number, _)| {
+        self.blocks.iter().enumerate().filter(is_near).flat_map(move |(number, block)| {
             let end = source.corner_count().min((number + 1) * length);
             let mut next = start_after(source, number * length);
             core::iter::from_fn(move || {
                 let outline = (next < end).then(|| Outline::at(source, next))?;
                 next = outline.end();
-                Some(outline)
+                Some((outline, block.extent()))
             })
         })
     }

@@ -279,11 +279,20 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let window = self.survey.window(near);
         let is_all = near == Rectangle::ALL;
         let of_model = self.blocks.outlines(self.source, near);
+        // Most elements are small and lie far away: then one of their vertices is enough.
+        let (mut around, mut extent) = (window, [0; 2]);
         of_list
-            .map(|&first| Outline::at(self.source, first as usize))
+            .map(|&first| (Outline::at(self.source, first as usize), [0; 2]))
             .chain(of_model.take_while(move |_| listed.is_none()))
-            .map(move |outline| {
-                let is_near = is_all || listed.is_some() || outline.may_meet(&self.sight, &window);
+            .map(move |(outline, most)| {
+                if is_all || listed.is_some() {
+                    return Some(outline);
+                }
+                if most != extent {
+                    (around, extent) = (self.survey.window_around(near, most), most);
+                }
+                let is_near = outline.may_begin_in(&self.sight, &around)
+                    && outline.may_meet(&self.sight, &window);
                 is_near.then_some(outline)
             })
     }

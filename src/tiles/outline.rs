@@ -78,6 +78,13 @@ impl<'s, S: ModelSource> Outline<'s, S> {
         }
     }
 
+    /// Whether the first vertex may lie in a window.
+    pub fn may_begin_in(&self, sight: &Sight, window: &Window) -> bool {
+        let vertex = self.source.vertex(self.source.corner(self.first).vertex());
+        sight.near.is_some_and(|near| vertex.z < near)
+            || window.outcode(sight.projection, vertex) == 0
+    }
+
     /// Whether the rectangle around the outline may meet a window. It takes a third of the time
     /// that [`Outline::bounds`] takes.
     pub fn may_meet(&self, sight: &Sight, window: &Window) -> bool {

@@ -202,13 +202,18 @@ impl Survey {
 
     /// Returns a rectangle as bounds on the page.
     pub(super) fn window(&self, rectangle: Rectangle) -> Window {
+        self.window_around(rectangle, [0; 2])
+    }
+
+    /// Returns a rectangle as bounds on the page, each of them so much farther out.
+    pub(super) fn window_around(&self, rectangle: Rectangle, by: [u16; 2]) -> Window {
         let Rectangle { low, high } = rectangle;
-        let bound =
-            |axis: usize, place: u32| self.low[axis] + (i64::from(place) << self.shift[axis]);
+        let bound = |axis: usize, place: i64| self.low[axis] + (place << self.shift[axis]);
         let (low, high) = ([low.x, low.y], [high.x, high.y]);
         Window {
-            low: [0, 1].map(|axis: usize| bound(axis, low[axis].into())),
-            end: [0, 1].map(|axis: usize| bound(axis, u32::from(high[axis]) + 1)),
+            low: [0, 1].map(|axis: usize| bound(axis, i64::from(low[axis]) - i64::from(by[axis]))),
+            end: [0, 1]
+                .map(|axis: usize| bound(axis, i64::from(high[axis]) + 1 + i64::from(by[axis]))),
         }
     }
 
@@ -231,8 +236,8 @@ impl Window {
     /// Sutherland's outcode). Its place on the page is not computed, which would take divisions:
     /// x / w, rounded down, is below a whole number n if x is below n w.
     ///
-    /// `vertex` must be in front of the eye. The bounds lie within ±2^41 / w, so products are below
-    /// 2^61.
+    /// `vertex` must be in front of the eye. The bounds lie within ±2^42 / w, so products are below
+    /// 2^62.
     pub fn outcode(&self, projection: Projection, vertex: Vertex) -> u32 {
         let w = match projection {
             Projection::Perspective => i64::from(vertex.z),

@@ -22,6 +22,7 @@ mod flash;
 mod firmware;
 mod fuzz;
 mod gallery;
+mod large;
 mod page;
 mod panics;
 mod senders;
@@ -125,6 +126,14 @@ enum Task {
     /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some
     /// minutes).
     Lattice7,
+    /// Lets the emulated Pico draw the Stanford bunny, which is larger than its memory, and compares
+    /// every step with the host's (some hours).
+    Bunny {
+        /// The file; without it, it is fetched.
+        file: Option<PathBuf>,
+    },
+    /// Does the same with a mesh of 10,000 faces (some 20 minutes).
+    Mesh,
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
         /// How many of each; from 4864 on, before every byte that a save changes (some 10 minutes).
@@ -197,6 +206,8 @@ fn carry_out() -> Result<()> {
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
+        Some(Task::Bunny { file }) => large::bunny(file)?,
+        Some(Task::Mesh) => large::mesh()?,
         Some(Task::Senders(arguments)) => senders::try_all(&arguments)?,
         Some(Task::Corpus(arguments)) => corpus::draw_all(&arguments)?,
         Some(Task::Panics) => panics::list()?,

@@ -1,4 +1,4 @@
-//! The end of the flash, where records, and a model if there is room, survive a loss of power.
+//! The end of the flash, where a model and records survive a loss of power.
 //!
 //! The code runs from the same flash, which cannot be read while it is erased or written. So the
 //! functions of the boot ROM do this work, called from RAM with interrupts masked: 45 ms for a
