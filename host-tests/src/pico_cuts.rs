@@ -16,8 +16,8 @@ pub type Run = Vec<Vec<Point>>;
 /// The shortest time before a cut: by then the line behind it has arrived.
 const SOONEST: Duration = Duration::from_millis(60);
 
-/// More reads of the records than a start makes for a small job.
-const READS_OF_A_START: u64 = 6_000;
+/// More reads and writes than there ever are.
+const NEVER: u64 = 1 << 40;
 
 /// How often something has been done to the board.
 #[derive(Debug, Clone, Copy, Default)]
@@ -79,6 +79,8 @@ enum Cut {
 /// A board whose power is cut.
 pub struct CutPico {
     line: Line<Pico>,
+    /// How often the last start has read the records in flash.
+    reads: u64,
     counts: Counts,
 }
 
@@ -89,7 +91,7 @@ impl CutPico {
     /// It does not start.
     pub fn start() -> Result<Self, Box<dyn Error>> {
         let line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
-        Ok(Self { line, counts: Counts::default() })
+        Ok(Self { line, reads: 1, counts: Counts::default() })
     }
 
     /// What has been done to the board.
@@ -120,6 +122,10 @@ impl CutPico {
         cuts: u32,
         random: &mut Random,
     ) -> Result<(), Box<dyn Error>> {
+        // The pen begins at the origin, wherever it ended.
+        self.line.emulator.cut_power()?;
+        self.line.hear_greeting()?;
+        self.line.emulator.garble_flash(NEVER, false)?;
         let mut runs: Vec<Run> = Vec::new();
         let mut stopped = false;
         for number in 0..=cuts {
@@ -167,8 +173,9 @@ impl CutPico {
         random: &mut Random,
     ) -> Result<bool, Box<dyn Error>> {
         let resets = self.line.emulator.resets();
-        if cut.is_some() && random.once_in(2) {
-            self.line.emulator.garble_flash(random.below(READS_OF_A_START), true)?;
+        if cut.is_some() {
+            let reads = if random.once_in(2) { random.below(self.reads) } else { NEVER };
+            self.line.emulator.garble_flash(reads, true)?;
         }
         match cut {
             None => {}
@@ -201,13 +208,16 @@ impl CutPico {
         }
         if is_over {
             // What was to cut the power does not any more, or has just done so.
-            self.line.emulator.cut_power_in_flash(1 << 40)?;
+            self.line.emulator.cut_power_in_flash(NEVER)?;
             if let Some(Cut::At(_) | Cut::Reset(_)) = cut {
                 self.line.hear_greeting()?;
             } else {
                 return Ok(false);
             }
         }
+        // The voltage is steady again.
+        self.line.emulator.garble_flash(NEVER, false)?;
+        self.reads = self.line.emulator.record_reads()?.max(1);
         if self.line.emulator.resets() == resets {
             return Err("the board started again by itself".into());
         }

@@ -31,8 +31,8 @@ struct Drawing {
 
 /// A drawing that this computer is told to compute.
 const SMALL: Drawing = Drawing {
-    scene: "lattice3.obj",
-    options: &["--page", "40x40", "--margin", "3", "--compute", "host"],
+    scene: "lattice2.obj",
+    options: &["--page", "30x30", "--margin", "3", "--hidden", "erased", "--compute", "host"],
 };
 
 /// A drawing of more vertices and corners than the board's memory takes.

@@ -18,7 +18,8 @@
 // stack is unused is asked; 10 where x has gone to so many steps, the main loop stands still for so
 // many hundredths of a second, 12 how long a sector of flash takes to be erased, in microseconds
 // (in the cycle's place), 13 a read of the records in flash returns garbage, after so many (in the
-// cycle's place) from now on (0) or from the next reset on (1). 32 the pin RUN is pulled low for a moment, 33 the image is copied onto
+// cycle's place) from now on (0) or from the next reset on (1), 14 how often the records were read
+// since the chip began is asked. 32 the pin RUN is pulled low for a moment, 33 the image is copied onto
 // the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash
 // (the cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack
 // used up (1) or as it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the
@@ -29,7 +30,7 @@
 // been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
 // character of the serial number that the USB host reads, after a 0, 34 flash has returned garbage,
 // 35 the status was asked for at the serial line, and so many cycles later (in the cycle's place)
-// the first byte of the answer had left.
+// the first byte of the answer had left, 36 so often the records in flash were read.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -87,6 +88,8 @@ const ERASE_TIME = 12;
 const GARBLE = 13;
 const GARBLED = 34;
 const ANSWERED = 35;
+const READS = 14;
+const WERE_READ = 36;
 const GO_ON = -1;
 const DELAY_ALARM = 48;
 /** Nanoseconds by which the next settings of the clock's alarm are late. */
@@ -233,6 +236,7 @@ brownOut.happened = () => report(GARBLED, 0, now());
 /** A chip that begins with this flash, after such a reset. */
 function start(flash, kind) {
   brownOut.after = garbleNext;
+  brownOut.reads = 0;
   garbleNext = Infinity;
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
@@ -553,7 +557,8 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === GARBLE) {
       if (entry.value) garbleNext = entry.cycle;
       else brownOut.after = entry.cycle;
-    } else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
+    } else if (rest[at] === READS) report(WERE_READ, 0, brownOut.reads);
+    else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
       const axis = CONTACTS.indexOf(entry.value);
       switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };

@@ -9,9 +9,9 @@ use process::{
     PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
 };
 use record::{
-    CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG, JUMP, PIN, RUN_PIN,
-    Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2, USB,
-    USB_HOST, USB_LINE, at,
+    CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG, JUMP, PIN, READS,
+    RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2,
+    USB, USB_HOST, USB_LINE, at,
 };
 
 use super::running::{Running, Shared};
@@ -184,6 +184,19 @@ impl Pico {
     /// was asked for: from the end of the byte that asks to the end of the first byte of the answer.
     pub fn take_status_waits(&mut self) -> Vec<Duration> {
         std::mem::take(&mut self.shared.lock().waits)
+    }
+
+    /// How often the records in flash were read since the board last started, each time that the
+    /// flash itself was asked, and not its cache.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn record_reads(&mut self) -> Result<u64, EmulatorError> {
+        self.shared.lock().record_reads = None;
+        self.send(READS, 0, 0)?;
+        let waits = |state: &mut State| state.record_reads.is_none() && !state.ended;
+        let reads = self.shared.wait_while(super::PATIENCE, waits).record_reads;
+        reads.ok_or_else(|| EmulatorError::Ended { said: self.said() })
     }
 
     /// How often flash has returned garbage.

@@ -3,7 +3,7 @@
 use super::BOARD;
 use super::record::{
     ANSWERED, BOOTSEL, GARBLED, LOG, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL,
-    UNUSED_STACK, USB, USB_SERIAL, at,
+    UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
 };
 use super::servo::Servo;
 use crate::emulator::EmulatorError;
@@ -52,6 +52,8 @@ pub(super) struct State {
     pub(super) resets: u32,
     /// How long the status was waited for at the serial line, each time.
     pub(super) waits: Vec<Duration>,
+    /// How often the records in flash were read, the answer to the last query.
+    pub(super) record_reads: Option<u64>,
     /// How often flash has returned garbage.
     pub(super) garbled: u32,
     /// Whether the boot ROM shows its drive and waits for an image.
@@ -205,7 +207,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
         state.ended = count == 0;
         for bytes in buffer[..whole].as_chunks().0 {
             let record = Record::from_bytes(*bytes);
-            if ![RETURNED, UNUSED_STACK, ANSWERED].contains(&record.what) {
+            if ![RETURNED, UNUSED_STACK, ANSWERED, WERE_READ].contains(&record.what) {
                 state.cycles = record.cycle;
             }
             match record.what {
@@ -220,6 +222,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                     state.resets += 1;
                 }
                 GARBLED => state.garbled += 1,
+                WERE_READ => state.record_reads = Some(record.cycle),
                 ANSWERED => state.waits.push(at(record.cycle)),
                 BOOTSEL => state.shows_drive = true,
                 USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),

@@ -28,8 +28,11 @@ const NONE = -1;
 /** Further from every address in flash than a line is long. */
 const NOWHERE = 0;
 
-/** Where reads that return garbage begin, how many there are before one does, and who hears of it. */
-export const brownOut = { from: 0, after: Infinity, happened() {} };
+/**
+ * Where reads that return garbage begin, how many there are before one does, who hears of it, and
+ * how many reads there were at all.
+ */
+export const brownOut = { from: 0, after: Infinity, happened() {}, reads: 0 };
 /** What garbage differs in from what the flash holds. */
 const GARBAGE = 0xa5c396f0;
 
@@ -89,7 +92,8 @@ export class XipCache {
 
   /** Whether the flash, which is asked now, returns garbage. */
   comesAsGarbage(address) {
-    if ((address & 0xffffff) < brownOut.from || brownOut.after === Infinity) return false;
+    if ((address & 0xffffff) < brownOut.from) return false;
+    brownOut.reads++;
     if (brownOut.after-- > 0) return false;
     brownOut.after = Infinity;
     brownOut.happened();
