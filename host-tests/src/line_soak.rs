@@ -52,7 +52,10 @@ impl Board {
     /// How long each status since the last call was waited for, on the board's clock.
     fn take_waits(&mut self) -> Vec<Duration> {
         match self {
-            Self::Pico(pico) => pico.take_status_waits(),
+            Self::Pico(pico) => {
+                let [first_bytes, _] = pico.take_status_waits();
+                first_bytes
+            }
             Self::Lm3s6965(emulator) => {
                 let wait = |line: &String| {
                     let (_, rest) = line.split_once("status after ")?;
@@ -307,6 +310,13 @@ impl DamagedLine {
         Ok(())
     }
 
+    /// Begins a conversation, whatever the last sender has left, and clears the model.
+    fn begin(&mut self) -> Result<(), Box<dyn Error>> {
+        self.board.emulator().send(&[ABORT])?;
+        while !self.hear()?.starts_with("Grbl") {}
+        self.order(&["$clear".to_owned()])
+    }
+
     /// Leaves in the middle of a line, of an upload, or of a job.
     fn leave(&mut self, job: &Job) -> Result<(), Box<dyn Error>> {
         self.counts.left += 1;
@@ -314,12 +324,13 @@ impl DamagedLine {
         match self.random.below(3) {
             0 => self.board.emulator().send(b"v 1 2")?,
             1 => {
+                self.begin()?;
                 let count = self.random.below(model.len() as u64) as usize;
                 self.order(&model[..count])?;
             }
             _ => {
                 self.take_ink()?;
-                self.order(&["$clear".to_owned()])?;
+                self.begin()?;
                 self.order(model)?;
                 self.board.emulator().send(format!("{plot}\n").as_bytes())?;
                 while !self.status()?.starts_with("<Run") {}
@@ -336,8 +347,7 @@ impl DamagedLine {
     /// Draws the job, asks for the status all the time, and compares it with the pins.
     fn ask(&mut self, job: &Job) -> Result<(), Box<dyn Error>> {
         self.take_ink()?;
-        self.board.take_waits();
-        self.order(&["$clear".to_owned()])?;
+        self.begin()?;
         self.order(&job.lines)?;
         self.board.take_waits();
         loop {
@@ -371,7 +381,7 @@ impl DamagedLine {
     fn ask_while_flash_is_erased(&mut self, job: &Job) -> Result<(), Box<dyn Error>> {
         let Board::Pico(pico) = &mut self.board else { return Ok(()) };
         pico.set_erase_time(Duration::from_millis(400))?;
-        self.order(&["$clear".to_owned()])?;
+        self.begin()?;
         let (plot, model) = job.lines.split_last().ok_or("a job")?;
         self.order(model)?;
         self.board.take_waits();

@@ -30,7 +30,7 @@
 // been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
 // character of the serial number that the USB host reads, after a 0, 34 flash has returned garbage,
 // 35 the status was asked for at the serial line, and so many cycles later (in the cycle's place)
-// the first byte of the answer had left, 36 so often the records in flash were read.
+// the first byte of the answer (0) or all of it (1) had left, 36 so often the records in flash were read.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -217,14 +217,22 @@ function flashImage(image, flash) {
 
 const QUESTION = '?'.charCodeAt(0);
 const ANSWER = '<'.charCodeAt(0);
+const NEWLINE = '\n'.charCodeAt(0);
 /** When the status was asked for that has not been answered, or null. */
 let asked = null;
+/** The same while the answer leaves. */
+let answeredFor = null;
 
 /** A byte has left at the serial line. */
 function tell(byte) {
   report(SERIAL, byte, now());
+  if (byte === NEWLINE && answeredFor !== null) {
+    report(ANSWERED, 1, now() - answeredFor);
+    answeredFor = null;
+  }
   if (byte !== ANSWER || asked === null) return;
   report(ANSWERED, 0, now() - asked);
+  answeredFor = asked;
   asked = null;
 }
 
@@ -268,7 +276,7 @@ function start(flash, kind) {
   });
   delayAlarm(chip, () => alarmDelays.shift() ?? 0, pass);
   watchPins();
-  asked = null;
+  asked = answeredFor = null;
   uart = new Uart(chip, cable, tell, (byte) => {
     if (byte === QUESTION) asked ??= now();
   });

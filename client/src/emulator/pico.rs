@@ -181,8 +181,9 @@ impl Pico {
     }
 
     /// How long the status was waited for at the serial line since the last call, each time that it
-    /// was asked for: from the end of the byte that asks to the end of the first byte of the answer.
-    pub fn take_status_waits(&mut self) -> Vec<Duration> {
+    /// was asked for: from the end of the byte that asks to the end of the first byte of the
+    /// answer, and to the end of the answer.
+    pub fn take_status_waits(&mut self) -> [Vec<Duration>; 2] {
         std::mem::take(&mut self.shared.lock().waits)
     }
 

@@ -50,8 +50,9 @@ pub(super) struct State {
     pub(super) unused_stack: Option<u64>,
     /// How often the chip was reset.
     pub(super) resets: u32,
-    /// How long the status was waited for at the serial line, each time.
-    pub(super) waits: Vec<Duration>,
+    /// How long the status was waited for at the serial line, each time: up to the first byte of the
+    /// answer, and up to its end.
+    pub(super) waits: [Vec<Duration>; 2],
     /// How often the records in flash were read, the answer to the last query.
     pub(super) record_reads: Option<u64>,
     /// How often flash has returned garbage.
@@ -223,7 +224,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                 }
                 GARBLED => state.garbled += 1,
                 WERE_READ => state.record_reads = Some(record.cycle),
-                ANSWERED => state.waits.push(at(record.cycle)),
+                ANSWERED => state.waits[usize::from(record.value & 1)].push(at(record.cycle)),
                 BOOTSEL => state.shows_drive = true,
                 USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
                 USB_SERIAL => state.usb_serial_number.push(char::from(record.value)),
