@@ -35,9 +35,11 @@ const SMALL: Drawing = Drawing {
     options: &["--page", "30x30", "--margin", "3", "--hidden", "erased", "--compute", "host"],
 };
 
-/// A drawing of more vertices and corners than the board's memory takes.
-const LARGE: Drawing =
-    Drawing { scene: "gears.obj", options: &["--page", "80x60", "--margin", "3"] };
+/// A drawing of some hundred strokes, which this computer is told to compute.
+const LARGE: Drawing = Drawing {
+    scene: "lattice4.obj",
+    options: &["--page", "60x60", "--margin", "3", "--compute", "host"],
+};
 
 /// A board that has greeted, with a pen that takes little time.
 fn plugged_in() -> Result<PicoTerminal, Box<dyn Error>> {
@@ -128,5 +130,39 @@ fn a_drawing_that_is_sent_goes_on_after_cuts() -> TestResult {
     assert!(twice <= 3, "{twice}");
     assert_eq!(ink(runs.iter().flatten()), ink(&whole));
     eprintln!("{:?}", begun.elapsed());
+    Ok(())
+}
+
+/// A number that `cargo xtask` hands over, or else `default`.
+fn wish(name: &str, default: u64) -> u64 {
+    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
+}
+
+/// Draws a larger drawing with ten cuts, again and again.
+#[test]
+#[ignore = "`cargo xtask power-soak --streamed` runs it for many minutes"]
+fn soak() -> TestResult {
+    let (minutes, seed) = (wish("PENUP_MINUTES", 10), wish("PENUP_SEED", 1));
+    let mut random = Random::new(seed);
+    let begun = Instant::now();
+    let (whole, time) = LARGE.undisturbed()?;
+    println!("{} strokes, {time:?}, {:?}", whole.len(), begun.elapsed());
+    let mut all = 0;
+    while begun.elapsed() < Duration::from_secs(60 * minutes) {
+        let mut cuts = 0;
+        let runs = LARGE
+            .with_cuts(|board| {
+                cuts += 1;
+                if cuts <= 10 {
+                    let after = time / 20 + time * random.below(1000) as u32 / 10_000;
+                    board.cut_power_after(after)?;
+                }
+                Ok(cuts <= 10)
+            })
+            .map_err(|error| format!("seed {seed}: {error}"))?;
+        let twice = assert_one_drawing(&whole, &runs);
+        all += runs.len() - 1;
+        println!("{} s: {all} cuts, {twice} strokes twice", begun.elapsed().as_secs());
+    }
     Ok(())
 }
