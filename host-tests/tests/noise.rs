@@ -4,7 +4,6 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::machine::State;
-use penup::plotter::Board as _;
 use penup_host_tests::ink::Ink;
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::Bench;
