@@ -147,20 +147,52 @@ impl Slots {
         self,
         flash: &mut F,
     ) -> Result<Writer<'_, F>, StorageError<F::Error>> {
+        self.write_into_erased(flash, 0)
+    }
+
+    /// Does the same where so many bytes of the slot that is to be written, whole sectors from its
+    /// beginning on, have been erased by [`Slots::erase_ahead`] and not been written since.
+    ///
+    /// # Errors
+    /// As [`Slots::write`].
+    pub(crate) fn write_into_erased<F: NorFlash>(
+        self,
+        flash: &mut F,
+        erased: u32,
+    ) -> Result<Writer<'_, F>, StorageError<F::Error>> {
         let latest = self.find(flash);
         let slot = latest.map_or(0, |valid| 1 - valid.slot);
-        let start = self.begin(slot);
-        flash.erase(start, start + F::ERASE_SIZE as u32)?;
-        Ok(Writer {
+        let mut writer = Writer {
             flash,
             slots: self,
-            start,
+            start: self.begin(slot),
             sequence: latest.map_or(0, |valid| valid.sequence.wrapping_add(1)),
             length: 0,
-            erased: F::ERASE_SIZE as u32,
+            erased,
             page: [0xFF; PAGE_BYTES],
             digest: Crc32::new(),
-        })
+        };
+        writer.erase_up_to(F::ERASE_SIZE as u32)?;
+        Ok(writer)
+    }
+
+    /// Erases a sector of the slot that is written next, which begins so many bytes behind the
+    /// slot's beginning. Returns which slot that is, 0 or 1.
+    ///
+    /// # Errors
+    /// The error of the flash; the latest state is unchanged.
+    #[cfg(feature = "early-ink")]
+    pub(crate) fn erase_ahead<F: NorFlash>(
+        self,
+        flash: &mut F,
+        from: u32,
+    ) -> Result<usize, F::Error> {
+        let slot = self.find(flash).map_or(0, |valid| 1 - valid.slot);
+        if from < self.bytes {
+            let start = self.begin(slot) + from;
+            flash.erase(start, start + F::ERASE_SIZE as u32)?;
+        }
+        Ok(slot as usize)
     }
 
     /// Adds the concatenation of `parts` to the latest state, behind which there is

@@ -6,7 +6,9 @@
 //! tests are built with checks for overflow, so a value that wraps is found, too.
 
 mod drawing;
+mod edits;
 mod files;
+mod gcode;
 mod hpgl;
 mod scene;
 mod sender;
@@ -14,7 +16,9 @@ mod session;
 mod stored;
 
 pub use drawing::fuzz as drawing;
+pub use edits::fuzz as edits;
 pub use files::fuzz as files;
+pub use gcode::fuzz as gcode;
 pub use hpgl::fuzz as hpgl;
 pub use scene::fuzz as scene;
 pub use sender::fuzz as sender;
@@ -25,8 +29,10 @@ pub use stored::fuzz as stored;
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 7] = [
+pub const TARGETS: [Target; 9] = [
     ("session", session),
+    ("gcode", gcode),
+    ("edits", edits),
     ("hpgl", hpgl),
     ("files", files),
     ("stored", stored),

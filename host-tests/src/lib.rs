@@ -16,8 +16,12 @@ pub mod event_checker;
 pub mod motion_cases;
 pub mod motion_optimum;
 pub mod motion_paths;
+pub mod line_soak;
 pub mod noisy_line;
 pub mod panic_calls;
+pub mod pico_cuts;
+#[cfg(unix)]
+pub mod pico_terminal;
 pub mod pin_machine;
 pub mod camera_scenes;
 pub mod exact_picture;

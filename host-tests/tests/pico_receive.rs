@@ -93,6 +93,31 @@ fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
     Ok(())
 }
 
+/// The log and each sector of a job are erased one after the other. In between the status is
+/// answered, so nobody waits for more than one of them.
+#[test]
+fn the_status_waits_for_one_sector_at_most() -> TestResult {
+    let mut line = start()?;
+    line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    let lines = job_lines("lattice3.obj", &["$page=60x60", "$margin=5"]);
+    let (plot, model) = lines.split_last().ok_or("a job")?;
+    stream(&mut line, model)?;
+    line.emulator.take_status_waits();
+    line.emulator.send(format!("{plot}\n").as_bytes())?;
+    // Whenever an erasure begins, somebody waits.
+    loop {
+        let heard = line.status()?;
+        if heard.starts_with("<Run") && !heard.contains("|Stage:") {
+            break;
+        }
+    }
+    let [_, answered] = line.emulator.take_status_waits();
+    let longest = answered.into_iter().max().unwrap_or_default();
+    assert!(longest > SLOWEST_ERASE / 2, "{longest:?}");
+    assert!(longest < SLOWEST_ERASE + Duration::from_millis(20), "{longest:?}");
+    Ok(())
+}
+
 /// A sender that ignores the window overruns the ring of the DMA and the queue.
 #[test]
 fn bytes_beyond_every_window_are_refused_not_mistaken() -> TestResult {

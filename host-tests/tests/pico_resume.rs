@@ -144,6 +144,50 @@ fn a_job_goes_on_after_a_cut_a_reset_and_a_fault() -> TestResult {
     Ok(())
 }
 
+/// The messages of a start behind the greeting, and the dwell of the pen that the flash keeps.
+fn start_again(line: &mut Line<Pico>) -> Result<(String, Option<String>), Box<dyn Error>> {
+    line.emulator.cut_power()?;
+    line.hear_greeting()?;
+    let (mut said, mut dwell) = (String::new(), None);
+    line.emulator.garble_flash(1 << 40, false)?;
+    line.emulator.send(b"$$\n")?;
+    loop {
+        match line.hear()? {
+            end if end == "ok" => return Ok((said, dwell)),
+            setting if setting.starts_with("$212=") => dwell = Some(setting),
+            message if message.starts_with("[MSG:") => said += &message,
+            setting if setting.starts_with('$') => {}
+            other => return Err(other.into()),
+        }
+    }
+}
+
+/// While the voltage rises, flash returns garbage once, which its cache then keeps.
+#[test]
+fn a_start_with_garbage_from_the_flash_finds_everything() -> TestResult {
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    for text in &job("30") {
+        assert_eq!(ask(&mut line, text)?, "ok", "{text}");
+    }
+    assert!(!wait_for(&mut line, 3)?);
+    let found = start_again(&mut line)?;
+    assert!(found.0.starts_with("[MSG:a job stopped at stroke "), "{found:?}");
+    assert!(found.1.is_some(), "{found:?}");
+    let reads = line.emulator.record_reads()?;
+    assert!(reads > 100, "{reads}");
+    let starts = std::env::var("PENUP_GARBLED").ok().and_then(|count| count.parse().ok());
+    let starts: u64 = starts.unwrap_or(12);
+    let mut random = Random::new(2102);
+    for number in 0..starts {
+        // The records begin with the settings, whose header is read first.
+        let read = if number < 4 { number } else { random.below(reads) };
+        line.emulator.garble_flash(read, true)?;
+        assert_eq!(start_again(&mut line)?, found, "garbage at read {read} of {reads}");
+    }
+    assert!(u64::from(line.emulator.garbled()) >= starts - 1, "{}", line.emulator.garbled());
+    Ok(())
+}
+
 /// A spiral of one stroke, with rests after each 40 mm of it.
 #[test]
 fn a_job_goes_on_within_its_only_stroke() -> TestResult {

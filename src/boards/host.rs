@@ -538,6 +538,14 @@ impl Board for HostBoard<'_> {
     }
 
     /// # Panics
+    /// As [`HostBoard::save`].
+    #[cfg(feature = "early-ink")]
+    fn erase_ahead(&mut self, bytes: u32) -> bool {
+        assert!(self.state.is_drained(), "flash is erased while something moves");
+        self.kept.as_mut().is_some_and(|kept| kept.erase_ahead(bytes))
+    }
+
+    /// # Panics
     /// When a step is due meanwhile, because a board that writes to its flash delays it.
     #[cfg(feature = "early-ink")]
     fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {

@@ -98,6 +98,15 @@ pub trait Board {
         let _ = room;
         self.save(record, parts)
     }
+    /// Erases one more sector of what the next job will take if it is saved with so many `bytes`,
+    /// its header and its room included, and at last its log. Returns whether more may be left. The
+    /// call may block, so it is only made while the machine is stopped; between two calls the user
+    /// is listened to. What was erased ahead is not erased again.
+    #[cfg(feature = "early-ink")]
+    fn erase_ahead(&mut self, bytes: u32) -> bool {
+        let _ = bytes;
+        false
+    }
     /// Adds the concatenation of `parts` to the state of `record` that was saved last, for which
     /// there is [room](Board::save_with_room). The call may block for some milliseconds, so it is
     /// only made while the machine stands with the pen raised and no step waits.

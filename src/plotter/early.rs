@@ -119,6 +119,7 @@ impl<I: Index> Inner<'_, I> {
         let job = self.begin_job(listener, &mut Unobserved)?;
         if !self.begins_early(job) {
             self.job = job.ordered(self.words, listener)?;
+            Self::make_room(listener, records::flash_bytes(&self.job))?;
             let is_kept = self.save(listener.board);
             self.begin(listener)?;
             if is_kept {
@@ -188,6 +189,7 @@ impl<I: Index> Inner<'_, I> {
         listener: &mut Listener<'_, B>,
     ) -> Result<Measured, CommandError> {
         self.job = job;
+        Self::make_room(listener, records::flash_bytes(&self.job))?;
         let is_kept = self.save(listener.board);
         let measured = self.machine.begin_measuring();
         {

@@ -70,12 +70,31 @@ pub struct Kept<F> {
     layout: Layout,
     /// The log of the job that is being drawn, or that could go on.
     open: Option<OpenLog>,
+    /// What has been erased for the next job.
+    #[cfg(feature = "early-ink")]
+    ahead: Ahead,
+}
+
+/// What has been erased for the next job, and not been written since.
+#[cfg(feature = "early-ink")]
+#[derive(Debug, Clone, Copy, Default)]
+struct Ahead {
+    /// The number of bytes of the slot that is written next, from its beginning on.
+    job: u32,
+    /// The number of the slot whose log it is, if the log is erased.
+    log: Option<usize>,
 }
 
 impl<F: MultiwriteNorFlash> Kept<F> {
     /// The records that lie in `flash` as `layout` says.
     pub const fn new(flash: F, layout: Layout) -> Self {
-        Self { flash, layout, open: None }
+        Self {
+            flash,
+            layout,
+            open: None,
+            #[cfg(feature = "early-ink")]
+            ahead: Ahead { job: 0, log: None },
+        }
     }
 
     /// Carries out [`Board::save`](super::Board::save).
@@ -111,11 +130,14 @@ impl<F: MultiwriteNorFlash> Kept<F> {
         parts: &[&[u8]],
         room: u32,
     ) -> Result<(), NotStored> {
+        let mut erased = 0;
         if record == Record::Job {
             self.open = None;
+            erased = core::mem::take(&mut self.ahead.job);
         }
         let slots = self.layout.slots(record);
-        let mut writer = slots.write(&mut self.flash).map_err(|_| NotStored)?;
+        let writer = slots.write_into_erased(&mut self.flash, erased);
+        let mut writer = writer.map_err(|_| NotStored)?;
         for part in parts {
             writer.write(part).map_err(|_| NotStored)?;
         }
@@ -123,6 +145,27 @@ impl<F: MultiwriteNorFlash> Kept<F> {
             writer.leave_room(room).map_err(|_| NotStored)?;
         }
         writer.finish().map_err(|_| NotStored)
+    }
+
+    /// Carries out [`Board::erase_ahead`](super::Board::erase_ahead).
+    #[cfg(feature = "early-ink")]
+    #[inline(never)] // It is called seldom.
+    pub fn erase_ahead(&mut self, bytes: u32) -> bool {
+        let Layout { job, logs, .. } = self.layout;
+        // With a flash that fails, the job is not kept, which its saving says.
+        if self.ahead.job < bytes {
+            let erased = job.erase_ahead(&mut self.flash, self.ahead.job).is_ok();
+            self.ahead.job += SECTOR_BYTES;
+            return erased;
+        }
+        if self.ahead.log.is_none()
+            && let Ok(slot) = job.erase_ahead(&mut self.flash, job.bytes)
+            && let Some(log) = logs.get(slot)
+            && log.erase(&mut self.flash).is_ok()
+        {
+            self.ahead.log = Some(slot);
+        }
+        false
     }
 
     /// Carries out [`Board::add`](super::Board::add).
@@ -161,7 +204,15 @@ impl<F: MultiwriteNorFlash> Kept<F> {
         if strokes > log.limit() {
             return Err(NotStored);
         }
-        log.begin(&mut self.flash, sum, notes).map_err(|_| NotStored)?;
+        #[cfg(feature = "early-ink")]
+        let begun = if self.ahead.log.take() == Some(slot) {
+            log.begin_erased(&mut self.flash, sum, notes)
+        } else {
+            log.begin(&mut self.flash, sum, notes)
+        };
+        #[cfg(not(feature = "early-ink"))]
+        let begun = log.begin(&mut self.flash, sum, notes);
+        begun.map_err(|_| NotStored)?;
         self.open = Some(OpenLog { log, noted: Noted::default() });
         Ok(())
     }

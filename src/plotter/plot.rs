@@ -12,6 +12,8 @@ use crate::machine::State;
 use crate::order::Pace;
 use crate::protocol::{CommandError, RealTime};
 use crate::stage::{Aborted, Cancel, Stage};
+#[cfg(feature = "early-ink")]
+use crate::storage::PAGE_BYTES;
 
 /// Which job is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -97,7 +99,8 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// Waits until the last moves are made, while the user is listened to.
+    /// Waits until the last moves are made, and makes room in the flash for a job that is sent while
+    /// it is drawn. Meanwhile the user is listened to.
     ///
     /// # Errors
     /// [`Aborted`] if the user does not want what comes next.
@@ -109,6 +112,11 @@ impl<I: Index> Inner<'_, I> {
         let requests = RealTime::default();
         let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
         self.settle(&mut listener)?;
+        // The rest of a job that has stopped goes on in its log.
+        #[cfg(feature = "early-ink")]
+        if self.resumption.stopped(State::Idle).is_none() {
+            Self::make_room(&mut listener, 2 * PAGE_BYTES as u32)?;
+        }
         let requests = listener.requests;
         self.act(requests);
         Ok(())
@@ -123,6 +131,29 @@ impl<I: Index> Inner<'_, I> {
             listener.board.wait_briefly();
         }
         Ok(())
+    }
+
+    /// Erases what a record of a job and its log will take, one sector after the other, while the
+    /// user is listened to: a sector may take 400 ms.
+    ///
+    /// # Errors
+    /// [`Aborted`] if the user does not want the job any more. Nothing that is kept is lost.
+    #[cfg(feature = "early-ink")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn make_room<B: Board>(
+        listener: &mut Listener<'_, B>,
+        bytes: u32,
+    ) -> Result<(), Aborted> {
+        // What is answered has left before the next sector is erased.
+        const ANSWER_MICROSECONDS: u32 = 10_000;
+        while listener.board.erase_ahead(bytes) {
+            let begun = listener.board.microseconds();
+            while listener.board.microseconds().wrapping_sub(begun) < ANSWER_MICROSECONDS {
+                listener.check()?;
+                listener.board.wait_briefly();
+            }
+        }
+        listener.check()
     }
 
     /// Writes the job to flash before anything moves, because flash cannot be read during the

@@ -10,6 +10,8 @@ use crate::array::MapEach;
 use crate::index::Index;
 use crate::machine::{SETTINGS, Settings, Value};
 use crate::protocol::CommandError;
+#[cfg(feature = "early-ink")]
+use crate::storage::PAGE_BYTES;
 
 /// Size of a kept setting: two bytes for its number, four for its value.
 const SETTING_BYTES: usize = 6;
@@ -212,6 +214,20 @@ fn save_begun<B: Board, I: Index>(
     let room = u32::try_from(room).map_err(|_| NotStored)?;
     let parts = [header.as_flattened(), bytemuck::cast_slice(memory)];
     board.save_with_room(Record::Job, &parts, room)
+}
+
+/// The number of bytes of flash that a job takes when it is saved, its headers and the room for its
+/// order included.
+#[cfg(feature = "early-ink")]
+pub(super) fn flash_bytes<I: Index>(job: &Job<I>) -> u32 {
+    let pages = |words: usize, header: usize| 1 + (4 * header + 8 * words).div_ceil(PAGE_BYTES);
+    let pages = if job.unordered().is_some() {
+        let legs = job.words() - job.drawing_words();
+        pages(job.drawing_words(), BEGUN_HEADER) + pages(legs, ORDER_HEADER)
+    } else {
+        pages(job.words(), JOB_HEADER)
+    };
+    u32::try_from(pages * PAGE_BYTES).unwrap_or(u32::MAX)
 }
 
 /// Adds the order of a job, and its number of strokes, to the job that was kept last.

@@ -68,6 +68,35 @@ impl Log {
         of: u32,
         notes: &[u8],
     ) -> Result<(), StorageError<F::Error>> {
+        // Notes that do not fit leave the log as it was.
+        if notes.len() > NOTE_BYTES {
+            return Err(StorageError::TooLong);
+        }
+        self.erase(flash)?;
+        self.begin_erased(flash, of, notes)
+    }
+
+    /// Erases the log, which has then not begun.
+    ///
+    /// # Errors
+    /// The error of the flash.
+    pub(crate) fn erase<F: MultiwriteNorFlash>(self, flash: &mut F) -> Result<(), F::Error> {
+        for at in (self.start..self.start + self.bytes).step_by(F::ERASE_SIZE) {
+            flash.erase(at, at + F::ERASE_SIZE as u32)?;
+        }
+        Ok(())
+    }
+
+    /// Begins the log as [`Log::begin`] does, where it has been erased.
+    ///
+    /// # Errors
+    /// As [`Log::begin`].
+    pub(crate) fn begin_erased<F: MultiwriteNorFlash>(
+        self,
+        flash: &mut F,
+        of: u32,
+        notes: &[u8],
+    ) -> Result<(), StorageError<F::Error>> {
         let mut page = [0xFF; PAGE_BYTES];
         let (head, tail) = page.split_at_mut(HEADER_BYTES);
         tail.get_mut(..notes.len()).ok_or(StorageError::TooLong)?.copy_from_slice(notes);
@@ -75,9 +104,6 @@ impl Log {
         let words = [MARK, of, length, checksum(of, notes)];
         for (slot, word) in head.chunks_exact_mut(4).zip(words) {
             slot.copy_from_slice(&word.to_le_bytes());
-        }
-        for at in (self.start..self.start + self.bytes).step_by(F::ERASE_SIZE) {
-            flash.erase(at, at + F::ERASE_SIZE as u32)?;
         }
         flash.write(self.start, &page)?;
         Ok(())

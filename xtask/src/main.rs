@@ -23,6 +23,7 @@ mod firmware;
 mod fuzz;
 mod gallery;
 mod large;
+mod mutants;
 mod page;
 mod panics;
 mod senders;
@@ -140,6 +141,39 @@ enum Task {
         #[arg(default_value_t = 4864)]
         count: u32,
     },
+    /// Draws jobs of every kind on the emulated Pico, whose power is cut at random instants and in
+    /// writes of its flash, which then returns garbage once; judged by the ink.
+    PowerSoak {
+        /// For how many minutes.
+        #[arg(default_value_t = 30)]
+        minutes: u32,
+        /// The seed of the random numbers.
+        #[arg(default_value_t = 1)]
+        seed: u64,
+        /// Draws one job of half an hour instead, which is cut ten times.
+        #[arg(long, conflicts_with_all = ["minutes", "streamed"])]
+        long: bool,
+        /// Lets the client's `plot --resume` send a large drawing instead.
+        #[arg(long)]
+        streamed: bool,
+    },
+    /// Damages lines, makes noise and leaves in the middle of things on both emulated boards, and
+    /// measures how long the status is waited for.
+    LineSoak {
+        /// For how many minutes on each board, both at once.
+        #[arg(default_value_t = 60)]
+        minutes: u32,
+        /// The seed of the random numbers.
+        #[arg(default_value_t = 1)]
+        seed: u64,
+    },
+    /// Changes the library in small ways, and lists the changes that no unit test finds; needs
+    /// cargo-mutants.
+    Mutants {
+        /// How many changes of those modules that decide what is drawn, always the same ones.
+        #[arg(default_value_t = 500)]
+        count: u32,
+    },
     /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs
     /// them into target/senders (some 30 minutes).
     Senders(senders::Arguments),
@@ -205,6 +239,11 @@ fn carry_out() -> Result<()> {
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
+        Some(Task::PowerSoak { minutes, seed, long, streamed }) => {
+            test::power_soak(minutes, seed, long, streamed)?;
+        }
+        Some(Task::LineSoak { minutes, seed }) => test::line_soak(minutes, seed)?,
+        Some(Task::Mutants { count }) => mutants::run_sample(count)?,
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::Bunny { file }) => large::bunny(file)?,
         Some(Task::Mesh) => large::mesh()?,

@@ -9,7 +9,7 @@ use crate::firmware;
 use crate::page;
 use crate::set_up::{self, Toolchain};
 use crate::side_by_side;
-use crate::table::{BOARDS, BoardRow, PICO};
+use crate::table::{BOARDS, BoardRow, LM3S6965, PICO};
 
 /// Installs what is missing, then runs all checks. It stops at the first failure.
 pub fn everything() -> Result<()> {
@@ -93,6 +93,32 @@ pub fn random_solids(count: u32) -> Result<()> {
 /// fails before every byte of flash that a save changes.
 pub fn power_cuts(count: u32) -> Result<()> {
     step(on_the_pico("pico_power")?.env("PENUP_CUTS", count.to_string()))
+}
+
+/// Cuts the power of the emulated Pico for some minutes: while jobs of every kind are drawn, while
+/// a `long` one is, or while the client sends one (`streamed`).
+pub fn power_soak(minutes: u32, seed: u64, long: bool, streamed: bool) -> Result<()> {
+    let test = if streamed { "pico_streamed_resume" } else { "pico_cuts" };
+    let name = if long { "a_job_of_half_an_hour_is_whole_after_ten_cuts" } else { "soak" };
+    soak(&mut on_the_pico(test)?, &["--exact", name], minutes, seed)
+}
+
+/// Damages the lines of both emulated boards for some minutes.
+pub fn line_soak(minutes: u32, seed: u64) -> Result<()> {
+    set_up::emulator(&LM3S6965)?;
+    firmware::check(&LM3S6965, &firmware::build(&LM3S6965)?)?;
+    soak(&mut on_the_pico("line_soak")?, &[], minutes, seed)
+}
+
+/// Runs the ignored tests of a command, with these further arguments.
+fn soak(command: &mut Command, arguments: &[&str], minutes: u32, seed: u64) -> Result<()> {
+    step(
+        command
+            .args(["--", "--ignored", "--nocapture"])
+            .args(arguments)
+            .env("PENUP_MINUTES", minutes.to_string())
+            .env("PENUP_SEED", seed.to_string()),
+    )
 }
 
 /// Runs the largest scene of the Pico on its emulator, from the upload to the last step.

@@ -17,7 +17,9 @@
 // bounces; 8 a function (its number, its address in the cycle's place) is timed; 9 how much of the
 // stack is unused is asked; 10 where x has gone to so many steps, the main loop stands still for so
 // many hundredths of a second, 12 how long a sector of flash takes to be erased, in microseconds
-// (in the cycle's place). 32 the pin RUN is pulled low for a moment, 33 the image is copied onto
+// (in the cycle's place), 13 a read of the records in flash returns garbage, after so many (in the
+// cycle's place) from now on (0) or from the next reset on (1), 14 how often the records were read
+// since the chip began is asked. 32 the pin RUN is pulled low for a moment, 33 the image is copied onto
 // the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash
 // (the cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack
 // used up (1) or as it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the
@@ -26,7 +28,9 @@
 // by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function
 // has returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not
 // been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
-// character of the serial number that the USB host reads, after a 0.
+// character of the serial number that the USB host reads, after a 0, 34 flash has returned garbage,
+// 35 the status was asked for at the serial line, and so many cycles later (in the cycle's place)
+// the first byte of the answer (0) or all of it (1) had left, 36 so often the records in flash were read.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -45,7 +49,7 @@ import { SlowContacts } from './pico/slow_contacts.mjs';
 import { Uart } from './pico/uart.mjs';
 import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
-import { XipCache } from './pico/xip_cache.mjs';
+import { brownOut, XipCache } from './pico/xip_cache.mjs';
 
 const [directory, imagePath, logAddress, boardText] = process.argv.slice(-4);
 const board = JSON.parse(boardText);
@@ -81,6 +85,11 @@ const RETURNED = 6;
 const STACK = 9;
 const STALL = 10;
 const ERASE_TIME = 12;
+const GARBLE = 13;
+const GARBLED = 34;
+const ANSWERED = 35;
+const READS = 14;
+const WERE_READ = 36;
 const GO_ON = -1;
 const DELAY_ALARM = 48;
 /** Nanoseconds by which the next settings of the clock's alarm are late. */
@@ -206,8 +215,37 @@ function flashImage(image, flash) {
   }
 }
 
+const QUESTION = '?'.charCodeAt(0);
+const ANSWER = '<'.charCodeAt(0);
+const NEWLINE = '\n'.charCodeAt(0);
+/** When the status was asked for that has not been answered, or null. */
+let asked = null;
+/** The same while the answer leaves. */
+let answeredFor = null;
+
+/** A byte has left at the serial line. */
+function tell(byte) {
+  report(SERIAL, byte, now());
+  if (byte === NEWLINE && answeredFor !== null) {
+    report(ANSWERED, 1, now() - answeredFor);
+    answeredFor = null;
+  }
+  if (byte !== ANSWER || asked === null) return;
+  report(ANSWERED, 0, now() - asked);
+  answeredFor = asked;
+  asked = null;
+}
+
+/** After how many reads flash returns garbage from the next reset on. */
+let garbleNext = Infinity;
+brownOut.from = board.records;
+brownOut.happened = () => report(GARBLED, 0, now());
+
 /** A chip that begins with this flash, after such a reset. */
 function start(flash, kind) {
+  brownOut.after = garbleNext;
+  brownOut.reads = 0;
+  garbleNext = Infinity;
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
   const before = chip;
@@ -238,7 +276,10 @@ function start(flash, kind) {
   });
   delayAlarm(chip, () => alarmDelays.shift() ?? 0, pass);
   watchPins();
-  uart = new Uart(chip, cable, (byte) => report(SERIAL, byte, now()));
+  asked = answeredFor = null;
+  uart = new Uart(chip, cable, tell, (byte) => {
+    if (byte === QUESTION) asked ??= now();
+  });
   machines = chip.pio.flatMap((pio) => pio.machines);
   machines.forEach(followQueue);
   chip.pio.forEach(followPio);
@@ -521,6 +562,10 @@ process.stdin.on('data', (data) => {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
     if (rest[at] === SERIAL) cable.bytes.push({ value: entry.value, errors: entry.cycle });
     else if (rest[at] === ERASE_TIME) sectorMicroseconds = entry.cycle;
+    else if (rest[at] === GARBLE) {
+      if (entry.value) garbleNext = entry.cycle;
+      else brownOut.after = entry.cycle;
+    } else if (rest[at] === READS) report(WERE_READ, 0, brownOut.reads);
     else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
       const axis = CONTACTS.indexOf(entry.value);

@@ -9,9 +9,9 @@ use process::{
     PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
 };
 use record::{
-    CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, HANG, JUMP, PIN, RUN_PIN, Record,
-    SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2, USB, USB_HOST,
-    USB_LINE, at,
+    CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG, JUMP, PIN, READS,
+    RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2,
+    USB, USB_HOST, USB_LINE, at,
 };
 
 use super::running::{Running, Shared};
@@ -166,6 +166,45 @@ impl Pico {
         self.send(CUT_FLASH, 0, bytes)
     }
 
+    /// How often the board was reset so far: by a loss of power, by the watchdog, by the pin RUN.
+    pub fn resets(&self) -> u32 {
+        self.shared.lock().resets
+    }
+
+    /// Lets flash return garbage once, as in a brown-out: when `reads` more have gone to the
+    /// records, counted from now on, or from the next reset on.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn garble_flash(&mut self, reads: u64, behind_reset: bool) -> io::Result<()> {
+        self.send(GARBLE, u8::from(behind_reset), reads)
+    }
+
+    /// How long the status was waited for at the serial line since the last call, each time that it
+    /// was asked for: from the end of the byte that asks to the end of the first byte of the
+    /// answer, and to the end of the answer.
+    pub fn take_status_waits(&mut self) -> [Vec<Duration>; 2] {
+        std::mem::take(&mut self.shared.lock().waits)
+    }
+
+    /// How often the records in flash were read since the board last started, each time that the
+    /// flash itself was asked, and not its cache.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn record_reads(&mut self) -> Result<u64, EmulatorError> {
+        self.shared.lock().record_reads = None;
+        self.send(READS, 0, 0)?;
+        let waits = |state: &mut State| state.record_reads.is_none() && !state.ended;
+        let reads = self.shared.wait_while(super::PATIENCE, waits).record_reads;
+        reads.ok_or_else(|| EmulatorError::Ended { said: self.said() })
+    }
+
+    /// How often flash has returned garbage.
+    pub fn garbled(&self) -> u32 {
+        self.shared.lock().garbled
+    }
+
     /// From now on, measures the cycles of each call of a function of `image`, including
     /// interrupts: the first function whose mangled name contains `name`. [`Pico::take_timed`]
     /// returns the results together with `number`.
@@ -195,6 +234,16 @@ impl Pico {
     /// The emulator has ended.
     pub fn pull_run_low(&mut self) -> io::Result<()> {
         self.send(RUN_PIN, 0, 0)
+    }
+
+    /// Pulls the pin RUN low as [`Pico::pull_run_low`] does, after `time` has passed.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn pull_run_low_after(&mut self, time: Duration) -> io::Result<()> {
+        let cycles = time.as_nanos() as u64 / CYCLE_NANOS;
+        let cycle = self.shared.lock().cycles + cycles;
+        self.send(RUN_PIN, 0, cycle)
     }
 
     /// Connects the board with BOOTSEL held and copies the image onto the drive that it shows. The

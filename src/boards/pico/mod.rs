@@ -250,6 +250,11 @@ impl Board for Pico {
     }
 
     #[cfg(feature = "early-ink")]
+    fn erase_ahead(&mut self, bytes: u32) -> bool {
+        self.kept.erase_ahead(bytes)
+    }
+
+    #[cfg(feature = "early-ink")]
     fn add(&mut self, record: Record, parts: &[&[u8]]) -> Result<(), NotStored> {
         self.kept.add(record, parts)
     }

@@ -2,7 +2,8 @@
 
 use super::BOARD;
 use super::record::{
-    BOOTSEL, LOG, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL, UNUSED_STACK, USB, USB_SERIAL,
+    ANSWERED, BOOTSEL, GARBLED, LOG, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL,
+    UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
 };
 use super::servo::Servo;
 use crate::emulator::EmulatorError;
@@ -16,6 +17,7 @@ use std::io::{self, BufRead, BufReader, PipeWriter, Read, Write};
 use std::path::Path;
 use std::process::{Child, ChildStderr, ChildStdin, ChildStdout, Command, Stdio};
 use std::sync::mpsc;
+use std::time::Duration;
 
 pub(super) const PROGRAM: &str = "node";
 const SCRIPT: &str = include_str!("../pico.mjs");
@@ -46,6 +48,15 @@ pub(super) struct State {
     pub(super) cycles: u64,
     /// The number of unused bytes of the stack, the answer to the last query.
     pub(super) unused_stack: Option<u64>,
+    /// How often the chip was reset.
+    pub(super) resets: u32,
+    /// How long the status was waited for at the serial line, each time: up to the first byte of the
+    /// answer, and up to its end.
+    pub(super) waits: [Vec<Duration>; 2],
+    /// How often the records in flash were read, the answer to the last query.
+    pub(super) record_reads: Option<u64>,
+    /// How often flash has returned garbage.
+    pub(super) garbled: u32,
     /// Whether the boot ROM shows its drive and waits for an image.
     pub(super) shows_drive: bool,
     /// The serial number that the USB host has read.
@@ -121,13 +132,15 @@ pub(super) fn command(image: &Path, log_address: u64) -> Command {
 
 /// What the script must know of the board, as JSON.
 fn board() -> String {
-    let BoardRow { clock_hertz, flash, ram, boot_loader, pins, .. } = BOARD;
+    let BoardRow { clock_hertz, flash, ram, boot_loader, pins, budget, model_flash, .. } = BOARD;
     let Pins { step_x, step_y, dir_x, dir_y, limit_x, limit_y, stop, .. } = pins;
     serde_json::json!({
         "clockHertz": clock_hertz,
         "flash": flash.start,
         "vectors": flash.start + boot_loader,
         "ram": ram.start,
+        // Where the records begin in flash.
+        "records": budget.flash + model_flash,
         "steps": [step_x, step_y],
         "directions": [dir_x, dir_y],
         "contacts": [limit_x, limit_y, stop],
@@ -195,7 +208,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
         state.ended = count == 0;
         for bytes in buffer[..whole].as_chunks().0 {
             let record = Record::from_bytes(*bytes);
-            if record.what != RETURNED && record.what != UNUSED_STACK {
+            if ![RETURNED, UNUSED_STACK, ANSWERED, WERE_READ].contains(&record.what) {
                 state.cycles = record.cycle;
             }
             match record.what {
@@ -205,7 +218,13 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                 USB => state.usb.push_back(record.value),
                 PIN => state.pins.extend(servo.pin_change(&record)),
                 LOG => logged.push(record.value),
-                RESET => state.shows_drive = false,
+                RESET => {
+                    state.shows_drive = false;
+                    state.resets += 1;
+                }
+                GARBLED => state.garbled += 1,
+                WERE_READ => state.record_reads = Some(record.cycle),
+                ANSWERED => state.waits[usize::from(record.value & 1)].push(at(record.cycle)),
                 BOOTSEL => state.shows_drive = true,
                 USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
                 USB_SERIAL => state.usb_serial_number.push(char::from(record.value)),

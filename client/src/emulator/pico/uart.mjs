@@ -68,12 +68,12 @@ const wholeCycles = (nanos) => Math.round(nanos / 8) * 8;
 
 /**
  * `cable.bytes` are the bytes on their way to the chip, each with its error bits; they outlive a
- * reset. `sent` is told each byte when it has left.
+ * reset. `sent` is told each byte when it has left, and `came` each one that has arrived.
  */
 export class Uart {
-  constructor(chip, cable, sent) {
+  constructor(chip, cable, sent, came) {
     const { irq, dreq } = chip.uart[0];
-    Object.assign(this, { chip, cable, sent, irq, dreq });
+    Object.assign(this, { chip, cable, sent, came, irq, dreq });
     this.rawWriteValue = 0;
     this.received = [];
     this.toSend = [];
@@ -131,7 +131,10 @@ export class Uart {
   arrive() {
     const { value, errors } = this.arriving;
     this.arriving = null;
-    if (this.receives && this.isRouted) this.receive(value | errors);
+    if (this.receives && this.isRouted) {
+      this.came(value);
+      this.receive(value | errors);
+    }
     this.listen();
   }
 

@@ -13,6 +13,9 @@
 //
 // The core fetches one word ahead of what it executes. A line that is fetched ahead of a branch and
 // then not needed is not counted.
+//
+// While the voltage falls or rises, flash may return garbage. A line that was fetched then stays
+// garbage in the cache: reading it again does not ask the flash again.
 
 /** Cycles that the core waits on a miss. */
 export const MISS_CYCLES = 50;
@@ -25,9 +28,21 @@ const NONE = -1;
 /** Further from every address in flash than a line is long. */
 const NOWHERE = 0;
 
+/**
+ * Where reads that return garbage begin, how many there are before one does, who hears of it, and
+ * how many reads there were at all.
+ */
+export const brownOut = { from: 0, after: Infinity, happened() {}, reads: 0 };
+/** What garbage differs in from what the flash holds. */
+const GARBAGE = 0xa5c396f0;
+
 export class XipCache {
   constructor(chip) {
     this.chip = chip;
+    /** The line that was fetched as garbage, as long as it is held. */
+    this.garbled = NONE;
+    /** Whether what is read now is garbage. */
+    this.isGarbage = false;
     /** The lines that are held: two ways of each set. */
     this.held = new Int32Array(2 * SETS);
     /** Of each set, the way that was used longest ago. */
@@ -43,6 +58,7 @@ export class XipCache {
   /** Forgets everything, as `flash_flush_cache` does. */
   flush() {
     this.held.fill(NONE);
+    this.garbled = NONE;
     this.from = NOWHERE;
   }
 
@@ -54,6 +70,7 @@ export class XipCache {
     const first = 2 * set;
     // 0x12 and 0x13 do not look into the cache; 0x11 and 0x13 leave it as it is.
     const looks = alias < 2;
+    this.isGarbage = looks && this.garbled === line;
     if (looks && this.held[first] === line) {
       this.oldest[set] = 1;
       return;
@@ -63,11 +80,24 @@ export class XipCache {
       return;
     }
     this.stalled += MISS_CYCLES;
+    this.isGarbage = this.comesAsGarbage(address);
     if (alias & 1) return;
     const way = this.oldest[set];
+    if (this.held[first + way] === this.garbled) this.garbled = NONE;
+    if (this.isGarbage) this.garbled = line;
     if (this.held[first + way] === ((this.from >>> 3) & LINES)) this.from = NOWHERE;
     this.held[first + way] = line;
     this.oldest[set] = way ^ 1;
+  }
+
+  /** Whether the flash, which is asked now, returns garbage. */
+  comesAsGarbage(address) {
+    if ((address & 0xffffff) < brownOut.from) return false;
+    brownOut.reads++;
+    if (brownOut.after-- > 0) return false;
+    brownOut.after = Infinity;
+    brownOut.happened();
+    return true;
   }
 
   /**
@@ -88,14 +118,16 @@ export class XipCache {
   watchReads() {
     const { chip } = this;
     const { core } = chip;
+    /** What garbage makes of what is read. */
     const note = (address) => {
       // Instructions come this way, too, and have been counted.
-      if ((address - this.from) >>> 0 < 8 || address >>> 26 !== FLASH_WINDOW) return;
+      if ((address - this.from) >>> 0 < 8 || address >>> 26 !== FLASH_WINDOW) return 0;
       this.read(address);
+      return this.isGarbage ? GARBAGE >>> (8 * (address & 3)) : 0;
     };
-    core.readUint32 = (address) => (note(address), chip.readUint32(address));
-    core.readUint16 = (address) => (note(address), chip.readUint16(address));
-    core.readUint8 = (address) => (note(address), chip.readUint8(address));
+    core.readUint32 = (address) => (note(address) ^ chip.readUint32(address)) >>> 0;
+    core.readUint16 = (address) => (note(address) & 0xffff) ^ chip.readUint16(address);
+    core.readUint8 = (address) => (note(address) & 0xff) ^ chip.readUint8(address);
   }
 }
 

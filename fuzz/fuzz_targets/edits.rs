@@ -1,0 +1,4 @@
+//! Lines of OBJ and `$` commands, real-time bytes at any time, for a small plotter.
+#![no_main]
+
+libfuzzer_sys::fuzz_target!(|input: &[u8]| penup_host_tests::fuzz_targets::edits(input));
