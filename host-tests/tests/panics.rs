@@ -13,13 +13,13 @@ const MOST: [(&str, [usize; 2]); 10] = [
     // In the code of the USB driver and of the chip's pins, which the compiler inlines there.
     ("boards", [0, 10]),
     ("convex", [37, 163]),
-    ("curve", [6, 19]),
-    ("drawing", [4, 12]),
+    ("curve", [5, 18]),
+    ("drawing", [1, 7]),
     ("model", [10, 42]),
     ("order", [46, 353]),
-    ("plotter", [5, 2]),
+    ("plotter", [2, 2]),
     ("stage.rs", [0, 24]),
-    ("view", [2, 10]),
+    ("view", [2, 8]),
     ("visibility", [26, 183]),
 ];
 
