@@ -13,14 +13,14 @@ const MOST: [(&str, [usize; 2]); 10] = [
     // In the code of the USB driver and of the chip's pins, which the compiler inlines there.
     ("boards", [0, 10]),
     ("convex", [37, 153]),
-    ("curve", [6, 21]),
-    ("drawing", [4, 11]),
+    ("curve", [5, 18]),
+    ("drawing", [1, 7]),
     ("model", [10, 39]),
     ("order", [46, 325]),
-    ("plotter", [5, 2]),
+    ("plotter", [2, 2]),
     // The Pico sorts the vertices of a tile.
     ("stage.rs", [0, 27]),
-    ("view", [2, 10]),
+    ("view", [2, 8]),
     ("visibility", [26, 183]),
 ];
 

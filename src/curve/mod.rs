@@ -334,7 +334,8 @@ pub(crate) fn parameter_of(
         return Parameter::start_of(spans);
     }
     // The product is below 2^(23 + 16 + 21).
-    let local = (((u - knot(span)) << (Parameter::LOCAL_BITS + 1)) / length + 1) >> 1;
+    let twice = ((u - knot(span)) << (Parameter::LOCAL_BITS + 1)).checked_div(length);
+    let local = (twice.unwrap_or(0) + 1) >> 1;
     Parameter(Parameter::start_of(span).0 + local as u32)
 }
 

@@ -362,7 +362,7 @@ impl<'a, I: Index> PointFinder<'a, I> {
         loop {
             let next = *self.table.get(slot)?;
             let at = next.get().checked_sub(1)?;
-            if self.points[at] == point {
+            if *self.points.get(at)? == point {
                 return Some(next - I::ONE);
             }
             slot = (slot + 1) & (self.table.len() - 1);
@@ -381,12 +381,13 @@ impl<'a, I: Index> PointFinder<'a, I> {
         }
         *self.points.get_mut(self.count).ok_or(full)? = point;
         let mut slot = self.slot(point);
-        while self.table[slot] != I::ZERO {
+        while *self.table.get(slot).ok_or(full)? != I::ZERO {
             slot = (slot + 1) & (self.table.len() - 1);
         }
+        let number = I::new(self.count);
         self.count += 1;
-        self.table[slot] = I::new(self.count);
-        Ok(self.table[slot] - I::ONE)
+        *self.table.get_mut(slot).ok_or(full)? = number + I::ONE;
+        Ok(number)
     }
 }
 

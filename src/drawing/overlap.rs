@@ -119,9 +119,9 @@ impl Key {
     fn slope(&self) -> u32 {
         let (dx, dy) = self.direction();
         if dx >= dy.abs() {
-            (((dy << 28) / dx.max(1)) + (1 << 28)) as u32
+            ((dy << 28).checked_div(dx).unwrap_or(0) + (1 << 28)) as u32
         } else {
-            1 << 31 | ((dx << 28) / dy) as u32 & 0x7FFF_FFFF
+            1 << 31 | (dx << 28).checked_div(dy).unwrap_or(0) as u32 & 0x7FFF_FFFF
         }
     }
 

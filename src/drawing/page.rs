@@ -86,13 +86,12 @@ impl Page {
         // Steps are within 2^21, and steps per millimetre have 16 fraction bits: the page has less
         // than 2^20 steps.
         let millimetres = |steps: i64, per_millimetre: Millimetres| {
-            Millimetres::from_bits(
-                ((steps << 32) / i64::from(per_millimetre.to_bits()).max(1)) as i32,
-            )
+            let bits = (steps << 32).checked_div(per_millimetre.to_bits().into());
+            Millimetres::from_bits(bits.unwrap_or(0) as i32)
         };
         let middle = millimetres((i64::from(left) + i64::from(right)) / 2, steps[0]);
         let last = self.margin.saturating_add(free - width);
-        let x = middle.saturating_sub(width / 2).clamp(self.margin, last);
+        let x = middle.saturating_sub(width / 2).min(last).max(self.margin);
         let y = millimetres(bottom.into(), steps[1]).saturating_sub(title.rise());
         Ok([x, y.max(self.margin.saturating_add(title.depth()))])
     }

@@ -44,9 +44,10 @@ pub(super) fn save_settings<B: Board>(
     board: &mut B,
 ) -> Result<(), CommandError> {
     let mut bytes = [0; SETTINGS.len() * SETTING_BYTES];
-    for (entry, (info, value)) in bytes.chunks_exact_mut(SETTING_BYTES).zip(settings.iter()) {
-        entry[..2].copy_from_slice(&info.number.to_le_bytes());
-        entry[2..].copy_from_slice(&value.to_bits().to_le_bytes());
+    let (entries, _) = bytes.as_chunks_mut::<SETTING_BYTES>();
+    for (entry, (info, value)) in entries.iter_mut().zip(settings.iter()) {
+        let ([a, b], [c, d, e, f]) = (info.number.to_le_bytes(), value.to_bits().to_le_bytes());
+        *entry = [a, b, c, d, e, f];
     }
     board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)
 }

@@ -120,14 +120,14 @@ impl<I: Index> Inner<'_, I> {
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
         // This converts from 1/256 step to 1/256 mm. Lengths are below 2^56.
-        let steps = self.machine.settings().get(Setting::StepsPerMmX).to_bits().max(1);
+        let steps = self.machine.settings().get(Setting::StepsPerMmX).to_bits();
         let mm = |length: u64| BinaryFraction {
-            units: ((length << 16) / u64::from(steps.unsigned_abs())) as i64,
+            units: (length << 16).checked_div(steps.unsigned_abs().into()).unwrap_or(0) as i64,
             fraction_bits: 8,
             decimals: 1,
         };
         let percent = BinaryFraction {
-            units: ((pen_down * 25600) / (pen_down + pen_up).max(1)) as i64,
+            units: (pen_down * 25600).checked_div(pen_down + pen_up).unwrap_or(0) as i64,
             fraction_bits: 8,
             decimals: 1,
         };

@@ -236,8 +236,11 @@ impl Axes {
         let directions = match camera.lens {
             Lens::Oblique { angle, ratio } => {
                 let (sin, cos) = sin_cos_degrees(angle);
-                let slanted = |axis: Direction, by: f64| {
-                    [0, 1, 2].map(|i: usize| axis[i] + ratio * by * forward[i])
+                let slanted = |mut axis: Direction, by: f64| {
+                    for (part, forward) in axis.iter_mut().zip(forward) {
+                        *part += ratio * by * forward;
+                    }
+                    axis
                 };
                 [slanted(right, cos), slanted(up, sin), forward]
             }
