@@ -123,8 +123,8 @@ impl Plan {
         self.strokes.push(Stroke { points, pen, layer, element });
     }
 
-    /// Draws a dot on a layer, as a line of [`DOT`] to the right, or to the left at the right end of
-    /// the page.
+    /// Draws a dot on a layer, as a line of [`DOT`] to the right, or to the left at the right end
+    /// of the page.
     pub(crate) fn draw_dot(&mut self, [x, y]: Point, page: Option<[f64; 2]>, pen: u32, layer: u32) {
         let is_at_end = page.is_some_and(|page| x + DOT > page[0]);
         let beside = if is_at_end { x - DOT } else { x + DOT };

@@ -2,15 +2,14 @@
 //!
 //! `usvg` resolves styles, units (96 pixels in an inch), the viewBox, references and transforms.
 //! [`flatten`] makes polylines of the paths, [`clip`] cuts them at the page and
-//! [`region`](crate::region) at clip paths, [`pens`] chooses pens by layers or colours, and [`Plan`]
-//! writes the lines that are sent. [`unread`] knows what all of this does not read.
+//! [`region`](crate::region) at clip paths, [`pens`] chooses pens by layers or colours, and
+//! [`Plan`] writes the lines that are sent. [`unread`] knows what all of this does not read.
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
-//! a dot with round or
-//! square ends is a very short line; a shape that is only filled is drawn as its outline. What has neither is not drawn. Texts are
-//! drawn as the outlines of their letters, if the caller knows fonts. Clip paths cut lines off, and
-//! are a part of the outline of what is only filled. Images, masks, filters and patterns are
-//! counted, and the user is told.
+//! a dot with round or square ends is a very short line; a shape that is only filled is drawn as
+//! its outline. What has neither is not drawn. Texts are drawn as the outlines of their letters, if
+//! the caller knows fonts. Clip paths cut lines off, and are a part of the outline of what is only
+//! filled. Images, masks, filters and patterns are counted, and the user is told.
 //!
 //! The names of layers may hold the codes of AxiDraw ([`axidraw`]).
 //!
@@ -118,7 +117,9 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let markup = Markup::new(&document);
     let with_areas = arrangement.hatch.is_some();
     let drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
-        "the SVG has too many points, too large clip paths, or a curve of kilometres: leave it out".to_owned()
+        "the SVG has too many points, too large clip paths, or a curve of kilometres: leave it \
+         out"
+        .to_owned()
     })?;
     let mut plan = Plan::new(file.to_owned());
     let mut areas = Vec::new();

@@ -1,4 +1,4 @@
-//! What a DXF file says: pairs of a code and a value, of which entities, layers and blocks are made.
+//! What a DXF file says: pairs of a code and a value, which make entities, layers and blocks.
 
 use crate::plan::Point;
 use std::collections::{HashMap, HashSet};

@@ -359,8 +359,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         Ok(parts.into_iter().map(of_points).collect())
     }
 
-    /// Whether the page lies within these outlines, as it does in those of a background, and what is
-    /// left of them is on its border at most.
+    /// Whether the page lies within these outlines, as it does in those of a background, and what
+    /// is left of them is on its border at most.
     fn is_background(&self, outlines: &[Polyline], areas: &Regions, parts: &[Polyline]) -> bool {
         let is_on_border = |part: &Polyline| {
             let mut lines = part.points.iter().zip(part.points.iter().skip(1));
@@ -368,10 +368,13 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
                 [*from, from.midpoint(*to), *to].iter().all(|it| self.page.depth(*it) <= SLACK)
             })
         };
+        if !parts.iter().all(is_on_border) {
+            return false;
+        }
         let mut shape = Region::default();
         shape.add(outlines.iter().map(Polyline::positions).collect(), false, Vec::new());
         let middle = self.page.middle();
-        parts.iter().all(is_on_border) && shape.contains(middle) && areas.contain(middle)
+        shape.contains(middle) && areas.contain(middle)
     }
 }
 

@@ -232,8 +232,8 @@ impl<'a, 'input> Markup<'a, 'input> {
         foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
         let what = "not drawn as a whole: there is an error in the data, and the rest is left out";
         broken.say(&mut said, ["path is", "paths are"], what);
-        let what = "not drawn: hidden, or without a size or points, or with one in a unit that is not read, or \
-                    a reference to nothing";
+        let what = "not drawn: hidden, or without a size or points, or with one in a unit that is \
+                    not read, or a reference to nothing";
         missing.say(&mut said, ["element is", "elements are"], what);
         said.extend(unread::sentences(self.document));
         said

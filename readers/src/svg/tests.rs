@@ -401,7 +401,8 @@ fn dots_with_round_or_square_ends_are_drawn_as_very_short_lines() {
         let contents = read(&in_mm(&format!(
             "<path d='M10 50h0M20 50zM200 50h0' {stroke}/><path d='M30 50h5' {stroke} \
              stroke-dasharray='0 3'/><clipPath id='c'><path d='M0 0H50V100H0Z'/></clipPath>\
-             <path clip-path='url(#c)' d='M40 50h0M60 50h0' {stroke}/><path d='M100 50h0' {stroke}/>"
+             <path clip-path='url(#c)' d='M40 50h0M60 50h0' {stroke}/>\
+             <path d='M100 50h0' {stroke}/>"
         )));
         let contents = contents.expect("an SVG");
         let drawn: Vec<_> = polylines(&contents).into_iter().map(|(_, points)| points).collect();
