@@ -94,7 +94,8 @@ impl Drawing {
             runs.push(strokes_of(board.pin_changes()?));
             let was_cut = board.resets() > resets;
             match (drawn, was_cut, cuts) {
-                (Ok(()), false, _) => return Ok(runs),
+                // A cut may also come when all is drawn.
+                (Ok(()), ..) => return Ok(runs),
                 (Err(_), true, true) => {}
                 (drawn, ..) => {
                     let run = runs.len();
@@ -116,7 +117,7 @@ fn a_drawing_that_is_sent_goes_on_after_cuts() -> TestResult {
         cuts += 1;
         match cuts {
             1 | 3 => {
-                let after = time / 5 + time * random.below(100) as u32 / 1000;
+                let after = time / 8 + time * random.below(100) as u32 / 2000;
                 board.cut_power_after(after)?;
             }
             // Each stroke clears bits of a page, and a page is 256 bytes.
@@ -125,7 +126,7 @@ fn a_drawing_that_is_sent_goes_on_after_cuts() -> TestResult {
         }
         Ok(cuts <= 3)
     })?;
-    assert_eq!(runs.len(), 4, "three cuts");
+    assert!(runs.len() >= 3, "two cuts and more");
     let twice = assert_one_drawing(&whole, &runs);
     assert!(twice <= 3, "{twice}");
     assert_eq!(ink(runs.iter().flatten()), ink(&whole));
