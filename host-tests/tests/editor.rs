@@ -335,11 +335,13 @@ proptest! {
             // To choose the same pen again is no change.
             if b % 3 == 0 && (kind < 14 || plain != before) {
                 // Commands that are refused in between change nothing, and neither do commands that
-                // are undone.
-                let refused = REFUSED[usize::from(a) % REFUSED.len()];
-                let answer = bench.say(&format!("{refused}\n"));
-                prop_assert!(answer.contains("error:"), "{}: {}", refused, answer);
-                prop_assert_eq!(of(&bench), plain.shown(), "{}", refused);
+                // are undone. Nothing is too far for a model without vertices.
+                if !plain.vertices.is_empty() {
+                    let refused = REFUSED[usize::from(a) % REFUSED.len()];
+                    let answer = bench.say(&format!("{refused}\n"));
+                    prop_assert!(answer.contains("error:"), "{}: {}", refused, answer);
+                    prop_assert_eq!(of(&bench), plain.shown(), "{}", refused);
+                }
                 prop_assert_eq!(bench.say("$undo\n"), "ok\n");
                 prop_assert_eq!(of(&bench), before.shown(), "{} taken back", line);
                 plain = before;

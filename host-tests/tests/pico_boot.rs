@@ -102,7 +102,10 @@ fn a_panic_in_a_job_makes_the_machine_safe_and_is_reported_after_the_restart() -
     }
     // The entry point runs a second time, so the board is initialised twice.
     line.emulator.jump_to_function(&image_path("pico"), "main", false)?;
-    assert_fault(&without_stopped_job(hear_start(&mut line)?), "the board was taken twice");
+    assert_fault(
+        &without_stopped_job(hear_start(&mut line)?),
+        "a part of the board was set up twice",
+    );
     assert_safe(&mut line)?;
     assert!(line.unlock()?);
     // The fault is reported once.
@@ -130,14 +133,14 @@ fn a_program_that_faults_at_every_start_is_given_up_but_answers() -> TestResult 
     let mut line = start()?;
     for _ in 0..2 {
         line.emulator.jump_to_function(&image_path("pico"), "main", false)?;
-        assert_fault(&hear_start(&mut line)?, "the board was taken twice");
+        assert_fault(&hear_start(&mut line)?, "a part of the board was set up twice");
     }
     line.emulator.jump_to_function(&image_path("pico"), "main", false)?;
     while !line.hear()?.starts_with("[MSG:the program faults as soon as it starts") {}
     assert_eq!(line.hear()?, "ALARM:101");
     assert!(line.status()?.starts_with("<Alarm"));
     assert!(line.ask("$plot")?.is_empty());
-    assert!(line.hear()?.contains("the board was taken twice"));
+    assert!(line.hear()?.contains("a part of the board was set up twice"));
     assert_eq!(line.hear()?, "ALARM:101");
     assert_eq!(line.hear()?, "error:9");
     assert_safe(&mut line)?;
@@ -146,7 +149,7 @@ fn a_program_that_faults_at_every_start_is_given_up_but_answers() -> TestResult 
     let mut usb = Line::silent(Box::new(PicoByUsb(*line.emulator)));
     assert_eq!(usb.hear()?, "");
     let message = usb.hear()?;
-    assert!(message.contains("the board was taken twice"), "{message}");
+    assert!(message.contains("a part of the board was set up twice"), "{message}");
     let mut line = Line::silent(Box::new(usb.emulator.0));
     line.emulator.send(b"\x18")?;
     assert_fresh(&hear_start(&mut line)?);

@@ -268,9 +268,10 @@ fn the_last_job_is_drawn_again_after_a_loss_of_power() -> TestResult {
 
 #[test]
 fn after_a_cut_while_a_job_is_kept_it_is_the_old_one_or_the_new_one() -> TestResult {
-    /// A sector is erased, a page of figures and strokes is written, and the header's.
-    const JOB_BYTES: u64 = 4096 + 2 * 256;
-    const VALID_FROM: u64 = 4096 + 256 + 16;
+    /// A sector is erased, and that of the log. Then a page of figures and strokes is written, and
+    /// the header's.
+    const JOB_BYTES: u64 = 2 * 4096 + 2 * 256;
+    const VALID_FROM: u64 = 2 * 4096 + 256 + 16;
     let mut watched = Watched::start()?;
     let page = ["$page=60x60", "$margin=5"];
     let lines = [job_lines("cube.obj", &page), job_lines("octahedron.obj", &page)];

@@ -289,7 +289,7 @@ fn a_fault_is_reported_at_an_open_port_too() -> TestResult {
     line.emulator.0.jump_to_function(&image_path("pico"), "main", false)?;
     line.hear_greeting()?;
     let message = line.hear()?;
-    assert!(message.contains("the board was taken twice"), "{message}");
+    assert!(message.contains("a part of the board was set up twice"), "{message}");
     assert_eq!(line.hear()?, "[MSG:'$H'|'$X' to unlock]");
     assert_eq!(line.hear()?, "ALARM:101");
     assert!(line.unlock()?);

@@ -152,10 +152,10 @@ impl<F: MultiwriteNorFlash> Kept<F> {
     #[inline(never)] // It is called seldom.
     pub fn erase_ahead(&mut self, bytes: u32) -> bool {
         let Layout { job, logs, .. } = self.layout;
-        // With a flash that fails, the job is not kept, which its saving says.
         if self.ahead.job < bytes {
+            // A sector that fails is erased again when the job is saved, which then fails, too.
             let erased = job.erase_ahead(&mut self.flash, self.ahead.job).is_ok();
-            self.ahead.job += SECTOR_BYTES;
+            self.ahead.job += if erased { SECTOR_BYTES } else { 0 };
             return erased;
         }
         if self.ahead.log.is_none()
