@@ -4,8 +4,8 @@
 //! random token, which only the person who started it knows. A request for another host, as a page
 //! of the web could cause by its own name server, or from another origin, is refused. Nothing but
 //! the files of the page, and the file to draw, can be read from the disk. The page may hand over
-//! a file to be read in the fonts of this computer ([`read`]). If there is a [`Bridge`], it may ask
-//! for a WebSocket to the plotter. For both it must say its origin.
+//! a file to be read in the fonts of this computer. If there is a [`Bridge`], it may ask for a
+//! WebSocket to the plotter. For both it must say its origin.
 
 mod read;
 
