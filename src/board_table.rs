@@ -219,8 +219,8 @@ pub const LM3S6965: BoardRow = BoardRow {
 };
 
 /// Raspberry Pi Pico. The log is that of the real board, because the same image is flashed. The
-/// budget is all that the memory map (`boards/pico.x`) leaves beside the model in flash, the records
-/// and the stack.
+/// budget is all that the memory map (`boards/pico.x`) leaves beside the model in flash, the
+/// records and the stack.
 pub const PICO: BoardRow = BoardRow {
     name: "pico",
     about: "Raspberry Pi Pico: RP2040, Cortex-M0+, 264 KiB of RAM, in rp2040js",

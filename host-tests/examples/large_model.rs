@@ -2,8 +2,8 @@
 //! that is flashed, and compares each step and each move of the pen with those of the host with the
 //! Pico's memory: `cargo xtask bunny` and `cargo xtask mesh` build the image and run this.
 //!
-//! The argument is an OBJ file, or `mesh` for one of 10,000 faces that is made here. A page of 60 mm
-//! and a quick pen make the drawing short; they do not change what is computed.
+//! The argument is an OBJ file, or `mesh` for one of 10,000 faces that is made here. A page of 60
+//! mm and a quick pen make the drawing short; they do not change what is computed.
 
 use penup::board_table::PICO;
 use penup_client::emulator::{EmulatedBoard, Machine, Pico, PicoByUsb, image_path};

@@ -99,8 +99,8 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// Waits until the last moves are made, and makes room in the flash for a job that is sent while
-    /// it is drawn. Meanwhile the user is listened to.
+    /// Waits until the last moves are made, and makes room in the flash for a job that is sent
+    /// while it is drawn. Meanwhile the user is listened to.
     ///
     /// # Errors
     /// [`Aborted`] if the user does not want what comes next.

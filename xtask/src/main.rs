@@ -127,8 +127,8 @@ enum Task {
     /// Lets the emulated Pico draw 343 cubes, and compares every step with the host's (some
     /// minutes).
     Lattice7,
-    /// Lets the emulated Pico draw the Stanford bunny, which is larger than its memory, and compares
-    /// every step with the host's (some hours).
+    /// Lets the emulated Pico draw the Stanford bunny, which is larger than its memory, and
+    /// compares every step with the host's (some hours).
     Bunny {
         /// The file; without it, it is fetched.
         file: Option<PathBuf>,

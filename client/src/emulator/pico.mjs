@@ -19,18 +19,19 @@
 // many hundredths of a second, 12 how long a sector of flash takes to be erased, in microseconds
 // (in the cycle's place), 13 a read of the records in flash returns garbage, after so many (in the
 // cycle's place) from now on (0) or from the next reset on (1), 14 how often the records were read
-// since the chip began is asked. 32 the pin RUN is pulled low for a moment, 33 the image is copied onto
-// the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash
-// (the cycle) stay low or high from now on, 36 the main loop goes on at an address, with the stack
-// used up (1) or as it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the
-// cycle), 48 the next setting of the clock's alarm is late by so many milliseconds. Out: 0 a byte
-// of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0
-// by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function
-// has returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack have not
-// been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive, 33 a
-// character of the serial number that the USB host reads, after a 0, 34 flash has returned garbage,
-// 35 the status was asked for at the serial line, and so many cycles later (in the cycle's place)
-// the first byte of the answer (0) or all of it (1) had left, 36 so often the records in flash were read.
+// since the chip began is asked. 32 the pin RUN is pulled low for a moment, 33 the image is copied
+// onto the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of
+// flash (the cycle) stay low or high from now on, 36 the main loop goes on at an address, with the
+// stack used up (1) or as it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate
+// (the cycle), 48 the next setting of the clock's alarm is late by so many milliseconds. Out: 0 a
+// byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was
+// reset (0 by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed
+// function has returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack
+// have not been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive,
+// 33 a character of the serial number that the USB host reads, after a 0, 34 flash has returned
+// garbage, 35 the status was asked for at the serial line, and so many cycles later (in the cycle's
+// place) the first byte of the answer (0) or all of it (1) had left, 36 so often the records in
+// flash were read.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.

@@ -49,9 +49,9 @@ fn lines_are_drawn_and_answered_as_listed() {
     assert!(faults.is_empty(), "{faults}");
 }
 
-/// What a plotter refuses with an error number, the reader of files refuses with a sentence. It does
-/// not know the travel, so of what lies beyond it draws more; and `ESC.K`, which empties the buffer
-/// of a port, has nothing to empty in a file.
+/// What a plotter refuses with an error number, the reader of files refuses with a sentence. It
+/// does not know the travel, so of what lies beyond it draws more; and `ESC.K`, which empties the
+/// buffer of a port, has nothing to empty in a file.
 #[test]
 fn lines_are_drawn_from_a_file_as_by_the_plotter() {
     /// A dot is drawn from a file as a line of 0.02 mm, in steps.

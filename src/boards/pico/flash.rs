@@ -30,8 +30,8 @@ use super::{BOOT_2, ROW, critical, emergency, usb};
 
 /// The address at which the flash is mapped to memory, so that it can be read.
 const MAPPED_AT: usize = ROW.flash.start as usize;
-/// The address at which the flash is mapped past its cache, which is neither asked nor changed (data
-/// sheet, 2.6.3.1). Only words can be read there in the emulator.
+/// The address at which the flash is mapped past its cache, which is neither asked nor changed
+/// (data sheet, 2.6.3.1). Only words can be read there in the emulator.
 const UNCACHED_AT: usize = MAPPED_AT + 0x0300_0000;
 /// The memory map reserves the flash from here on for this module: first for a model that is too
 /// large for the memory, if the board's row gives it some.

@@ -50,8 +50,8 @@ pub(super) struct State {
     pub(super) unused_stack: Option<u64>,
     /// How often the chip was reset.
     pub(super) resets: u32,
-    /// How long the status was waited for at the serial line, each time: up to the first byte of the
-    /// answer, and up to its end.
+    /// How long the status was waited for at the serial line, each time: up to the first byte of
+    /// the answer, and up to its end.
     pub(super) waits: [Vec<Duration>; 2],
     /// How often the records in flash were read, the answer to the last query.
     pub(super) record_reads: Option<u64>,
