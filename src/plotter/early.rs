@@ -68,7 +68,7 @@ impl<B: Board, I: Index> Cancel for Meanwhile<'_, '_, B, I> {
         *status_due |= requests.has(RealTime::STATUS);
         if *status_due && board.has_room(REPLY_BYTES) {
             *status_due = false;
-            inner.report_status(*board);
+            inner.report_status("|Stage:order", *board);
         }
         match inner.machine.state() {
             State::Run | State::Hold { .. } => Ok(()),

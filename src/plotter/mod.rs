@@ -526,7 +526,7 @@ impl<'m, I: Index> Plotter<'m, I> {
             if let Some(port) = self.hpgl.port() {
                 board.reply_to(Replies::OthersIfAny(port));
             }
-            self.inner.report_status(board);
+            self.inner.report_status("", board);
             #[cfg(feature = "hpgl")]
             self.mute(board);
         }

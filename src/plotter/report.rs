@@ -140,9 +140,11 @@ impl<I: Index> Inner<'_, I> {
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }
 
-    /// Writes Grbl's status report, with penup's own fields at its end.
+    /// Writes Grbl's status report, with penup's own fields at its end, and `stage` behind them. It
+    /// is empty, or the field of the stage that is computed while the machine draws: meanwhile no
+    /// line is read.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    pub fn report_status<B: Board>(&mut self, board: &mut B) {
+    pub fn report_status<B: Board>(&mut self, stage: &str, board: &mut B) {
         let status = self.machine.status();
         let state = match status.state {
             State::Idle if self.machine.is_stopped() => "Idle",
@@ -238,6 +240,6 @@ impl<I: Index> Inner<'_, I> {
         let mm =
             |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, decimals: 0 };
         let (drawn, left) = (mm(done.drawn), status.seconds_left);
-        reply.line(format_args!("|Ink:{drawn}/{}|Left:{left}>", mm(all.drawn)));
+        reply.line(format_args!("|Ink:{drawn}/{}|Left:{left}{stage}>", mm(all.drawn)));
     }
 }

@@ -253,13 +253,15 @@ impl Sender<'_> {
     pub(super) fn confirm(&mut self, lines: &dyn Lines, base: i32) -> Result<(), Error> {
         let number = self.done;
         let last = &|| line_of(lines, base, number);
-        let start = self.link.now();
+        let mut start = self.link.now();
         self.last_heard = start;
         let mut requested_at = None;
+        let mut is_computing = false;
         while self.since(start) < self.patience.lost {
             self.stop_if_interrupted()?;
-            if requested_at
-                .is_none_or(|requested_at| self.since(requested_at) > self.patience.reply)
+            if !is_computing
+                && requested_at
+                    .is_none_or(|requested_at| self.since(requested_at) > self.patience.reply)
             {
                 requested_at = Some(self.link.now());
                 self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))?;
@@ -270,7 +272,15 @@ impl Sender<'_> {
                 Some(Reply::Refused(number, error)) => {
                     self.fail_on(Reply::Error(error), &|| line_of(lines, base, number))?;
                 }
-                Some(Reply::Status(status)) => self.fail_if_alarm(&status)?,
+                Some(Reply::Status(status)) => {
+                    self.fail_if_alarm(&status)?;
+                    // The next part of a drawing is computed while one is drawn; then the plotter
+                    // reads no line.
+                    is_computing = status.is_computing;
+                    if is_computing {
+                        start = self.link.now();
+                    }
+                }
                 Some(Reply::Done(_) | Reply::Resend(_) | Reply::Error(_)) => {}
                 Some(reply) => self.fail_on(reply, last)?,
                 None => self.fail_if_silent(last)?,

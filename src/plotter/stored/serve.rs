@@ -233,7 +233,7 @@ impl<I: Index, B: Board> Cancel for Server<'_, '_, I, B> {
         *is_status_due |= requests.has(RealTime::STATUS);
         if *is_status_due && board.has_room(REPLY_BYTES) {
             *is_status_due = false;
-            inner.report_status(*board);
+            inner.report_status("|Stage:visibility", *board);
         }
         if matches!(inner.machine.state(), State::Run | State::Hold { .. }) {
             return Ok(());
