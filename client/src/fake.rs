@@ -91,6 +91,9 @@ pub struct FakePlotter {
     /// The number of status reports that it sends while it computes the picture. Meanwhile it reads
     /// no lines.
     pub reports_while_computing: usize,
+    /// Whether it answers the line that asks for the picture before it computes it, as it does with
+    /// a picture that it draws part by part.
+    pub answers_first: bool,
     /// The time that it takes to answer a status query while it computes.
     pub answer_delay: Duration,
     queue: Vec<u8>,
@@ -245,9 +248,10 @@ impl FakePlotter {
                 };
                 if text == PLOT && self.reports_while_computing > 0 {
                     self.plot = Some(label);
-                    return;
-                }
-                if text == PLOT || text == AGAIN {
+                    if !self.answers_first {
+                        return;
+                    }
+                } else if text == PLOT || text == AGAIN {
                     self.drawn = Some(0);
                 }
                 self.numbering.note(label, outcome);
@@ -301,8 +305,10 @@ impl FakePlotter {
         if self.reports_while_computing == 0 {
             self.plot = None;
             self.drawn = Some(0);
-            self.numbering.note(label, Ok(()));
-            self.reply(Ok(()), label);
+            if !self.answers_first {
+                self.numbering.note(label, Ok(()));
+                self.reply(Ok(()), label);
+            }
         }
     }
 

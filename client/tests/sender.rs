@@ -140,12 +140,15 @@ fn a_line_that_never_arrives_is_distinguished_from_silence() {
 
 #[test]
 fn a_plotter_that_answers_slowly_while_it_computes_is_not_asked_for_lines() {
-    let mut plotter = FakePlotter::new(Fault::None);
-    plotter.reports_while_computing = 300;
-    plotter.answer_delay = 4 * PATIENCE.reply;
-    job(&mut plotter, 3).expect("a job without a fault");
-    assert!(!plotter.overflowed, "it reads nothing while it computes");
-    assert_eq!(plotter.lines.len(), 4);
+    for answers_first in [false, true] {
+        let mut plotter = FakePlotter::new(Fault::None);
+        plotter.reports_while_computing = 300;
+        plotter.answers_first = answers_first;
+        plotter.answer_delay = 4 * PATIENCE.reply;
+        job(&mut plotter, 3).expect("a job without a fault");
+        assert!(!plotter.overflowed, "it reads nothing while it computes");
+        assert_eq!(plotter.lines.len(), 4);
+    }
 }
 
 #[test]
