@@ -141,10 +141,7 @@ pub fn any_points(random: &mut Random) -> Vec<Point> {
 
 /// The number of random solids that a test compares: `PENUP_SOLIDS`, or else 4,000.
 pub fn solid_count() -> u32 {
-    match std::env::var("PENUP_SOLIDS") {
-        Ok(count) => count.parse().expect("PENUP_SOLIDS is a whole number"),
-        Err(_) => 4000,
-    }
+    crate::wish::wish("PENUP_SOLIDS", 4000) as u32
 }
 
 /// A random solid of any kind with its vertices in any order. Sometimes vertices are repeated, and

@@ -9,6 +9,7 @@
 
 pub mod curve_reference;
 pub mod cut_jobs;
+pub mod damage;
 pub mod enumeration;
 pub mod order_drawings;
 pub mod order_reference;
@@ -39,6 +40,7 @@ pub mod heaviest_jobs;
 pub mod ink;
 pub mod transcript;
 pub mod whole_jobs;
+pub mod wish;
 pub mod emulated_jobs;
 pub mod fuzz_targets;
 pub mod gear_train;

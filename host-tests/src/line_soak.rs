@@ -6,6 +6,7 @@
 //! client reports as drawn must have left exactly its ink, at the very places: not one step may be
 //! lost over the whole soak.
 
+use crate::damage::damaged;
 use crate::emulated_jobs::{Line, bench_like};
 use crate::ink::{Ink, inked};
 use crate::random::Random;
@@ -139,26 +140,21 @@ impl DamagedLine {
 
     /// The bytes that arrive: some are lost, doubled, changed in one bit, or replaced.
     fn damage(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let Some(one_in) = self.one_in else { return bytes.to_vec() };
-        let mut out = Vec::new();
-        for &byte in bytes {
-            if self.random.below(one_in) > 0 {
-                out.push(byte);
-                continue;
-            }
-            self.counts.damaged += 1;
-            let other = match self.random.below(4) {
-                0 => continue,
+        let fault = |byte: u8, random: &mut Random, arrived: &mut Vec<u8>| {
+            let other = match random.below(4) {
+                0 => return,
                 1 => {
-                    out.push(byte);
+                    arrived.push(byte);
                     byte
                 }
-                2 => byte ^ 1 << self.random.below(8),
-                _ => self.random.below(256) as u8,
+                2 => byte ^ 1 << random.below(8),
+                _ => random.below(256) as u8,
             };
-            out.push(if other == STOP { b'x' } else { other });
-        }
-        out
+            arrived.push(if other == STOP { b'x' } else { other });
+        };
+        let (arrived, count) = damaged(bytes, self.one_in, &mut self.random, fault);
+        self.counts.damaged += u64::from(count);
+        arrived
     }
 
     /// Follows the pins up to now.

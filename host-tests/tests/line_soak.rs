@@ -5,15 +5,11 @@
 
 use penup::board_table::{BoardRow, LM3S6965, PICO};
 use penup_host_tests::line_soak::{DamagedLine, Job};
+use penup_host_tests::wish::wish;
 use std::error::Error;
 use std::time::{Duration, Instant};
 
 type TestResult = Result<(), Box<dyn Error>>;
-
-/// A number that `cargo xtask` hands over, or else `default`.
-fn wish(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
-}
 
 /// Does each thing to a board once.
 fn each(row: &'static BoardRow) -> TestResult {

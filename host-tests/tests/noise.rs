@@ -7,6 +7,7 @@ use penup::machine::State;
 use penup_host_tests::ink::Ink;
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::Bench;
+use penup_host_tests::wish::wish;
 use penup_job::pins::PinChange;
 
 /// The emergency stop, after which nobody knows the position.
@@ -16,7 +17,7 @@ const PIECE: usize = 50_000;
 
 /// The number of bytes: `PENUP_NOISE`, or else ten megabytes.
 fn count() -> usize {
-    std::env::var("PENUP_NOISE").ok().and_then(|text| text.parse().ok()).unwrap_or(10_000_000)
+    wish("PENUP_NOISE", 10_000_000) as usize
 }
 
 #[test]

@@ -5,6 +5,7 @@
 use penup_host_tests::pico_cuts::{CutPico, Job};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
+use penup_host_tests::wish::wish;
 use std::error::Error;
 use std::time::{Duration, Instant};
 
@@ -33,11 +34,6 @@ fn a_drawing_is_whole_after_cuts_and_garbage() -> TestResult {
     }
     eprintln!("{:?}", board.counts());
     Ok(())
-}
-
-/// A number that `cargo xtask` hands over, or else `default`.
-fn wish(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
 /// Draws jobs of every kind, each with some cuts, one after the other, and says how many it were.

@@ -8,6 +8,7 @@ use penup_client::emulator::{
 use penup_host_tests::emulated_jobs::{Line, assert_same_as_on_the_host, events_until_idle};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
+use penup_host_tests::wish::wish;
 use std::error::Error;
 use std::time::Duration;
 
@@ -132,7 +133,7 @@ fn changed(line: &str, travel: u32) -> String {
 
 /// The number of power cuts: `PENUP_CUTS`, or else 200.
 fn cut_count() -> u64 {
-    std::env::var("PENUP_CUTS").ok().and_then(|count| count.parse().ok()).unwrap_or(200)
+    wish("PENUP_CUTS", 200)
 }
 
 #[test]

@@ -8,6 +8,7 @@ use penup_host_tests::cut_jobs::{Point, assert_one_drawing, ink, strokes_of};
 use penup_host_tests::emulated_jobs::{Line, bench_like};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
+use penup_host_tests::wish::wish;
 use std::error::Error;
 use std::time::Duration;
 
@@ -175,8 +176,7 @@ fn a_start_with_garbage_from_the_flash_finds_everything() -> TestResult {
     assert!(found.1.is_some(), "{found:?}");
     let reads = line.emulator.record_reads()?;
     assert!(reads > 100, "{reads}");
-    let starts = std::env::var("PENUP_GARBLED").ok().and_then(|count| count.parse().ok());
-    let starts: u64 = starts.unwrap_or(12);
+    let starts = wish("PENUP_GARBLED", 12);
     let mut random = Random::new(2102);
     for number in 0..starts {
         // The records begin with the settings, whose header is read first.

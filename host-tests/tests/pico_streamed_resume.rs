@@ -13,6 +13,7 @@ use penup_host_tests::cut_jobs::{Point, assert_one_drawing, ink, strokes_of};
 use penup_host_tests::emulated_jobs::Line;
 use penup_host_tests::pico_terminal::PicoTerminal;
 use penup_host_tests::random::Random;
+use penup_host_tests::wish::wish;
 use std::error::Error;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -132,11 +133,6 @@ fn a_drawing_that_is_sent_goes_on_after_cuts() -> TestResult {
     assert_eq!(ink(runs.iter().flatten()), ink(&whole));
     eprintln!("{:?}", begun.elapsed());
     Ok(())
-}
-
-/// A number that `cargo xtask` hands over, or else `default`.
-fn wish(name: &str, default: u64) -> u64 {
-    std::env::var(name).ok().and_then(|text| text.parse().ok()).unwrap_or(default)
 }
 
 /// Draws a larger drawing with ten cuts, again and again.

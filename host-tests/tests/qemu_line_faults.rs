@@ -8,6 +8,7 @@ use penup_client::link::Link;
 use penup_client::machines::{WatchedPlotter, emulate};
 use penup_client::progress::Quiet;
 use penup_client::sender::{Patience, Sender};
+use penup_host_tests::damage::damaged;
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
 use penup_job::path::Run;
@@ -28,21 +29,14 @@ struct DamagedLine {
 impl DamagedLine {
     /// The bytes that arrive: some are lost, doubled or replaced, but never by a real-time command.
     fn damage(&mut self, bytes: &[u8]) -> Vec<u8> {
-        let Some(one_in) = self.one_in else { return bytes.to_vec() };
-        let mut out = Vec::new();
-        for &byte in bytes {
-            if self.random.below(one_in) > 0 {
-                out.push(byte);
-                continue;
-            }
-            self.damaged += 1;
-            match self.random.below(3) {
-                0 => {}
-                1 => out.extend([byte; 2]),
-                _ => out.push(b'0' + self.random.below(10) as u8),
-            }
-        }
-        out
+        let fault = |byte, random: &mut Random, arrived: &mut Vec<u8>| match random.below(3) {
+            0 => {}
+            1 => arrived.extend([byte; 2]),
+            _ => arrived.push(b'0' + random.below(10) as u8),
+        };
+        let (arrived, count) = damaged(bytes, self.one_in, &mut self.random, fault);
+        self.damaged += count;
+        arrived
     }
 }
 

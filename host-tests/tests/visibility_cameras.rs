@@ -16,6 +16,7 @@ use penup::visibility::{
 use penup_host_tests::camera_scenes::{CameraScene, KINDS, camera_scene};
 use penup_host_tests::exact_picture::{Picture, Ratio, Seam, compare};
 use penup_host_tests::scene_files::Stretches;
+use penup_host_tests::wish::wish;
 use std::cmp::Ordering;
 
 fn found(scene: &CameraScene, merged_blocks: bool, spare_bytes: usize) -> Vec<Stretch> {
@@ -123,8 +124,7 @@ fn differs(seed: u64, merged: bool) -> Option<String> {
 }
 
 fn scene_count() -> u64 {
-    let given = std::env::var("PENUP_SCENES").ok();
-    given.and_then(|count| count.parse().ok()).unwrap_or(2000)
+    wish("PENUP_SCENES", 2000)
 }
 
 /// Compares every second scene, with separate and merged blocks alternately.

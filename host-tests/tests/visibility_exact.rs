@@ -10,6 +10,7 @@ use penup_host_tests::exact_visibility::{Piece, pieces};
 use penup_host_tests::fraction::Fraction;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
 use penup_host_tests::scene_files::Stretches;
+use penup_host_tests::wish::wish;
 
 fn fraction(along: EdgeParameter) -> Fraction {
     Fraction::new(along.numerator, along.denominator)
@@ -69,8 +70,7 @@ fn agree(seeds: impl Iterator<Item = u64>, merged_blocks: bool) {
 }
 
 fn scene_count() -> u64 {
-    let given = std::env::var("PENUP_SCENES").ok();
-    given.and_then(|count| count.parse().ok()).unwrap_or(2000)
+    wish("PENUP_SCENES", 2000)
 }
 
 #[test]
