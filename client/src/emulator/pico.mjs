@@ -42,9 +42,11 @@
 
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
-import { countMissingCycles } from './pico/core_cycles.mjs';
+import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
 import { attachFlashChip } from './pico/flash_chip.mjs';
 import { delayAlarm } from './pico/late_alarm.mjs';
+import { mendCore, refuseMisaligned } from './pico/mended_core.mjs';
+import { Marks, quickCore } from './pico/quick_core.mjs';
 import * as resets from './pico/resets.mjs';
 import { SlowContacts } from './pico/slow_contacts.mjs';
 import { Uart } from './pico/uart.mjs';
@@ -200,7 +202,7 @@ function serveRom(number) {
 
 // --- The chip ------------------------------------------------------------------------------------
 
-let chip, clock, core, uart, machines, xip, contacts;
+let chip, clock, core, uart, machines, xip, contacts, executeQuickly;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
@@ -265,11 +267,14 @@ function start(flash, kind) {
     core.PM = true;
     report(BOOTSEL, 0, now());
   } else for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
-  mendFlags();
-  mendVectors();
+  mendCore(chip);
   faultDue = isLockedUp = false;
   xip = new XipCache(chip);
   countMissingCycles(chip, xip);
+  refuseMisaligned(core, () => {
+    faultDue = true;
+  });
+  executeQuickly = quickCore(chip, xip, CALL_CYCLES);
   contacts = new SlowContacts(chip, CONTACTS, now, (pin, cycle) => {
     bounces.push({ pin, cycle });
     bounces.sort((one, other) => one.cycle - other.cycle);
@@ -350,41 +355,6 @@ function copyImage() {
   report(BOOTSEL, 0, now());
   flashImage(readFileSync(imagePath), chip.flash);
   resets.restart(chip, 0, 1000);
-}
-
-// rp2040js folds the carry into the second operand. Where that makes 0x80000000 of 0x7fffffff, its
-// overflow flag is wrong.
-function mendFlags() {
-  const ADCS = 0b0100000101;
-  const SBCS = 0b0100000110;
-  const add = core.addUpdateFlags.bind(core);
-  core.addUpdateFlags = (first, second) => {
-    const result = add(first, second);
-    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === ADCS) {
-      const folded = core.registers[chip.readUint16(core.PC - 2) & 7] === 0x7fffffff;
-      if (folded) core.V = !(first & 0x80000000);
-    }
-    return result;
-  };
-  const subtract = core.substractUpdateFlags.bind(core);
-  core.substractUpdateFlags = (first, second) => {
-    const result = subtract(first, second);
-    if (second === 0x80000000 && chip.readUint16(core.PC - 2) >> 6 === SBCS) {
-      const folded = core.registers[(chip.readUint16(core.PC - 2) >> 3) & 7] === 0x7fffffff;
-      if (folded) core.V = !!(first & 0x80000000);
-    }
-    return result;
-  };
-}
-
-// rp2040js leaves the mark of Thumb code, bit 0 of a vector, in the program counter: a jump table
-// in a handler is then read a byte off.
-function mendVectors() {
-  const enter = core.exceptionEntry.bind(core);
-  core.exceptionEntry = (number) => {
-    enter(number);
-    core.PC &= ~1;
-  };
 }
 
 /** What the core has just done is a fault. */
@@ -567,7 +537,7 @@ process.stdin.on('data', (data) => {
       if (entry.value) garbleNext = entry.cycle;
       else brownOut.after = entry.cycle;
     } else if (rest[at] === READS) report(WERE_READ, 0, brownOut.reads);
-    else if (rest[at] === TIMED) timed.set(entry.cycle, entry.value);
+    else if (rest[at] === TIMED) timeFunction(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
       const axis = CONTACTS.indexOf(entry.value);
       switches[axis] = { pin: entry.value, at: entry.cycle - SWITCH_ZERO, closed: false };
@@ -667,19 +637,30 @@ function takeLog() {
 
 /** Their numbers, by address. */
 const timed = new Map();
+/** The instructions with which they begin and to which they return, once there are any. */
+let marks = null;
 /** Those that have been called, and where each returns to. */
 const calls = [];
 
-/** Before each instruction. */
+function timeFunction(address, number) {
+  marks ??= new Marks();
+  marks.add(address, 1);
+  timed.set(address, number);
+}
+
+/** Before each instruction that has a mark. */
 function timeFunctions() {
   const last = calls.at(-1);
   if (last && core.PC === last.returnsTo && core.SP === last.stack) {
     calls.pop();
+    marks.add(last.returnsTo, -1);
     report(RETURNED, last.number, now() - last.began);
   }
   const number = timed.get(core.PC);
   if (number === undefined) return;
-  calls.push({ number, returnsTo: core.LR & ~1, stack: core.SP, began: now() });
+  const returnsTo = core.LR & ~1;
+  marks.add(returnsTo, 1);
+  calls.push({ number, returnsTo, stack: core.SP, began: now() });
 }
 
 // --- Time ----------------------------------------------------------------------------------------
@@ -712,19 +693,25 @@ let disturbed = false;
 function executeUntil(due) {
   // From when on `now` is so much.
   const nanos = (due - 0.5 - cyclesBefore) * NANOS;
-  const times = timed.size > 0;
   disturbed = false;
   do {
     if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
-    if ((core.registers[15] - xip.from) >>> 0 >= 6) xip.fetch(core.registers[15]);
-    if (xip.stalled !== 0) {
-      // Time may bring something before the core goes on.
-      const cycles = xip.stalled;
-      xip.stalled = 0;
+    const alarm = clock.nextAlarm ? clock.nextAlarm.nanos : Infinity;
+    const cycles = executeQuickly((Math.min(alarm, nanos) - clock.nanosCounter) / NANOS, marks);
+    if (cycles !== 0) {
       pass(cycles * NANOS);
       continue;
     }
-    if (times) timeFunctions();
+    // The core is at an instruction for which quick execution is not meant.
+    if ((core.registers[15] - xip.from) >>> 0 >= 6) xip.fetch(core.registers[15]);
+    if (xip.stalled !== 0) {
+      // Time may bring something before the core goes on.
+      const stalled = xip.stalled;
+      xip.stalled = 0;
+      pass(stalled * NANOS);
+      continue;
+    }
+    if (marks) timeFunctions();
     pass(core.executeInstruction() * NANOS);
     if (faultDue) takeFault();
     if (flashNanos) waitForFlash();

@@ -10,7 +10,7 @@ const ENTRY_CYCLES = 15;
 /** Beside the two of BX, or those of POP. */
 const RETURN_CYCLES = 10;
 /** LR on the way in and PC on the way out. */
-const CALL_CYCLES = 2;
+export const CALL_CYCLES = 2;
 const POP = 0b1011110;
 
 /** Adds them to the cycles for which the core of the chip waits: the field `stalled` of `waits`. */

@@ -10,6 +10,8 @@ use crate::emulator::EmulatorError;
 use crate::emulator::PinChange;
 use crate::emulator::running::{Shared, quitting_with_parent};
 use crate::table::{BoardRow, Pins};
+use base64::Engine as _;
+use base64::prelude::BASE64_STANDARD;
 use object::{Object, ObjectSymbol};
 use std::collections::VecDeque;
 use std::fs;
@@ -26,6 +28,8 @@ const MODULES: &[(&str, &str)] = &[
     ("./pico/core_cycles.mjs", include_str!("core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
     ("./pico/late_alarm.mjs", include_str!("late_alarm.mjs")),
+    ("./pico/mended_core.mjs", include_str!("mended_core.mjs")),
+    ("./pico/quick_core.mjs", include_str!("quick_core.mjs")),
     ("./pico/resets.mjs", include_str!("resets.mjs")),
     ("./pico/slow_contacts.mjs", include_str!("slow_contacts.mjs")),
     ("./pico/uart.mjs", include_str!("uart.mjs")),
@@ -85,13 +89,7 @@ pub(super) fn function(
 fn script() -> String {
     let mut script = SCRIPT.to_owned();
     for (name, text) in MODULES {
-        let mut address = String::from("data:text/javascript,");
-        for byte in text.bytes() {
-            match byte {
-                b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' => address.push(char::from(byte)),
-                _ => address.push_str(&format!("%{byte:02X}")),
-            }
-        }
+        let address = format!("data:text/javascript;base64,{}", BASE64_STANDARD.encode(text));
         script = script.replace(name, &address);
     }
     script
