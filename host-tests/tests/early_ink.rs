@@ -6,7 +6,7 @@
 
 use penup::board_table::PICO;
 use penup::boards::host::{CutFlash, Stamped};
-use penup::machine::{JobSize, State};
+use penup::machine::{Contacts, JobSize, State};
 use penup::plotter::Unobserved;
 use penup::stage::NeverCancel;
 use penup_host_tests::cut_jobs::{
@@ -133,7 +133,7 @@ fn disturbed(bytes: &[u8], milliseconds: u64) -> (Bench, String) {
 
 #[test]
 fn the_status_tells_what_the_machine_does() {
-    let (mut bench, answer) = disturbed(b"?", 400);
+    let (mut bench, answer) = disturbed(b"?", 2500);
     let status = answer.lines().find(|line| line.starts_with('<')).expect("a report");
     assert!(status.starts_with("<Run|MPos:"), "{status}");
     // No line is read before the order is known, so a sender must not wait for an answer.
@@ -162,7 +162,7 @@ fn the_status_tells_what_the_machine_does() {
 #[test]
 fn a_job_is_held_and_goes_on() {
     let (whole, _) = draw(&lattice(), true, MILLISECOND);
-    let (mut bench, answer) = disturbed(b"!", 400);
+    let (mut bench, answer) = disturbed(b"!", 2500);
     assert!(answer.ends_with("ok\n"), "{answer}");
     bench.work(2000);
     assert_eq!(bench.plotter.machine().state(), State::Hold { stopped: true });
@@ -177,7 +177,7 @@ fn a_job_is_held_and_goes_on() {
 
 #[test]
 fn a_job_is_given_up_while_its_order_is_computed() {
-    let (mut bench, answer) = disturbed(b"\x18", 1000);
+    let (mut bench, answer) = disturbed(b"\x18", 3200);
     assert!(answer.contains("error:"), "{answer}");
     bench.finish();
     assert_eq!(bench.plotter.machine().state(), State::Idle);
@@ -189,6 +189,52 @@ fn a_job_is_given_up_while_its_order_is_computed() {
     assert!(answer.ends_with("ok\n"), "{answer}");
     bench.finish();
     assert!(bench.board.trace().changes().len() > before + 1000);
+}
+
+/// While the lines are found, the pen travels to where it will begin. It can be held and the job be
+/// given up meanwhile, and a limit switch stops it.
+#[test]
+fn the_pen_travels_to_the_left_end_meanwhile() {
+    let (whole, _) = draw(&lattice(), true, MILLISECOND);
+    let whole = ink(&drawn(&whole.board.trace().changes()));
+    let (mut bench, answer) = disturbed(b"?", 25);
+    let status = answer.lines().find(|line| line.starts_with('<')).expect("a report");
+    assert!(status.ends_with("|Stage:visibility>"), "{status}");
+    assert!(status.starts_with("<Run|MPos:"), "{status}");
+    assert!(!status.starts_with("<Run|MPos:0.000,0.000,"), "{status}");
+    bench.finish();
+    assert_eq!(ink(&drawn(&bench.board.trace().changes())), whole);
+
+    let (mut bench, answer) = disturbed(b"!", 25);
+    assert!(answer.ends_with("ok\n"), "{answer}");
+    bench.work(2000);
+    assert_eq!(bench.plotter.machine().state(), State::Hold { stopped: true });
+    assert_eq!(drawn(&bench.board.trace().changes()), Run::new());
+    bench.say("~");
+    bench.finish();
+    assert_eq!(ink(&drawn(&bench.board.trace().changes())), whole);
+
+    let (mut bench, answer) = disturbed(b"\x18", 25);
+    assert!(answer.contains("error:"), "{answer}");
+    bench.finish();
+    assert_eq!(bench.plotter.machine().state(), State::Idle);
+    assert_eq!(drawn(&bench.board.trace().changes()), Run::new());
+    let position = bench.plotter.machine().position();
+    assert!(position.y > 0, "{position:?}");
+    let answer = bench.say("$plot\n");
+    assert!(answer.ends_with("ok\n"), "{answer}");
+    bench.finish();
+    assert_eq!(ink(&drawn(&bench.board.trace().changes())), whole);
+
+    let mut bench = loaded(&lattice(), true);
+    bench.board.set_work_ticks(MILLISECOND);
+    assert_eq!(bench.say("$21=1\n"), "ok\n");
+    bench.board.set_contacts(Contacts { x: true, ..Contacts::default() });
+    let answer = bench.say("$plot\n");
+    assert!(answer.contains("error:"), "{answer}");
+    bench.work(100);
+    assert!(matches!(bench.plotter.machine().state(), State::Alarm(_)));
+    assert_eq!(drawn(&bench.board.trace().changes()), Run::new());
 }
 
 /// Draws the job without a cut. Returns its strokes and how many bytes of flash change.

@@ -78,6 +78,8 @@ struct Parts<'s, I> {
     length: &'s mut [u32],
     /// For each part, the number of its odd points.
     odd: &'s mut [I],
+    /// The point furthest to the left, where the choice begins.
+    corner: PagePoint,
 }
 
 /// In the place of a distance: the part has been chosen.
@@ -119,7 +121,7 @@ impl<'s, I: Index> Parts<'s, I> {
                 *odd += I::ONE;
             }
         }
-        Ok(Self { part, far, length: lengths, odd })
+        Ok(Self { part, far, length: lengths, odd, corner })
     }
 
     /// Returns the part that lies nearest as a whole and is not chosen, with the number of its odd
@@ -218,6 +220,7 @@ fn choose<I: Index>(
         return Ok(First::default());
     };
     let mut first = First::default();
+    let corner;
     let (mut odd, mut strokes, mut milliseconds) = (0, 0, 0);
     {
         let mut scratch = scratch.reborrow();
@@ -225,6 +228,7 @@ fn choose<I: Index>(
         let drawing = Drawing { points, segments: &*segments };
         mark_odd(drawing, pen, is_odd);
         let parts = Parts::new(drawing, pen, is_odd, &mut scratch)?;
+        corner = parts.corner;
         while milliseconds < order_takes + SPARE_MILLISECONDS {
             cancel.check()?;
             let Some((part, odd_points, length)) = parts.nearest() else { break };
@@ -250,7 +254,7 @@ fn choose<I: Index>(
         }
     }
     let (chosen, _) = segments.split_at_mut(first.segments);
-    arrange(points, chosen, options, scratch, cancel)?;
+    arrange(points, chosen, corner, options, scratch, cancel)?;
     let spare = milliseconds.saturating_sub(order_takes);
     first.spare_milliseconds = u32::try_from(spare).unwrap_or(u32::MAX);
     first.odd_points = odd;
@@ -260,10 +264,11 @@ fn choose<I: Index>(
 }
 
 /// Orders the segments that are drawn first, and puts them into that order, each from its `from`
-/// end. They end far from where the choice began, which is near the rest.
+/// end. They begin near `corner`, where the choice began, and so where the pen is.
 fn arrange<I: Index>(
     points: &[PagePoint],
     segments: &mut [Segment<I>],
+    corner: PagePoint,
     options: Options,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
@@ -273,7 +278,8 @@ fn arrange<I: Index>(
     let drawing = Drawing { points, segments: &*segments };
     let options = Options { shape: Shape::OpenPath, ..options };
     let mut report = Report::default();
-    order_pens(drawing, options, Anchor::default(), scratch, cancel, tour, &mut report)?;
+    let anchor = Anchor::new(corner, 0);
+    order_pens(drawing, options, anchor, scratch, cancel, tour, &mut report)?;
     for (slot, leg) in arranged.iter_mut().zip(tour) {
         if let Some(segment) = segments.get(leg.segment()) {
             let [from, to] = [segment.from(), segment.to()];
@@ -469,13 +475,17 @@ mod tests {
     }
 
     /// The path of the rest begins where that is worth it, and is improved while the pen is busy.
+    /// The way from the left end to the beginning counts, for the pen comes from there; of a path
+    /// that is not begun early, to its nearer end.
     #[test]
     fn the_pen_travels_no_farther_than_without() {
         let (mut early, mut late) = (0, 0);
         for seed in 10..14 {
-            let (_, _, _, _, report) = order_all::<u32>(500, 1, seed, Options::default());
-            early += report.pen_up;
             let (points, segments) = polylines::<u32>(500, 1, seed);
+            let corner = points.iter().min().copied().unwrap_or_default();
+            let way = |point: u32| u64::from(length(corner, points[point as usize]));
+            let (_, now, _, tour, report) = order_all::<u32>(500, 1, seed, Options::default());
+            early += report.pen_up + way(path(&now, &tour)[0][0]);
             let mut memory = std::vec![0; 1 << 19];
             let mut tour = std::vec![Leg::new(0, false); segments.len()];
             let drawing = Drawing { points: &points, segments: &segments };
@@ -484,6 +494,8 @@ mod tests {
             late += crate::order::order(drawing, options, scratch, &mut NeverCancel, &mut tour)
                 .expect("an order")
                 .pen_up;
+            let path = path(&segments, &tour);
+            late += way(path[0][0]).min(path.last().map_or(0, |leg| way(leg[1])));
         }
         assert!(early < late + late / 100, "{early} and {late}");
     }

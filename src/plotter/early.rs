@@ -6,20 +6,23 @@
 //! drawn depends on the drawing and the settings, and not on how fast the board computes: if the
 //! order is late, the pen waits, raised, behind the first strokes.
 //!
+//! Where the lines take long to find, too, the pen travels to the left end of the drawing meanwhile
+//! ([`Approach`]), where the first strokes will lie.
+//!
 //! A board with flash keeps the drawing and the first strokes before the pen moves, with all that
 //! the order is computed from. When the order is known, it is [added](super::Board::add) to that
 //! while the machine stands with the pen raised, and only then the other strokes are drawn. After a
 //! loss of power before that, the same order is computed again.
 
-use super::job::{Begun, Unordered};
+use super::job::{Begun, Pipeline, Unordered};
 use super::listener::{Listener, MeasuredStrokes};
 use super::{Board, Cursor, Inner, Job, Observer, REPLY_BYTES, Reply, Unobserved, records, report};
 use crate::drawing::PagePoint;
 use crate::index::Index;
-use crate::machine::{JobSize, Measured, State, StrokeTime};
+use crate::machine::{JobSize, Machine, Measured, State, StrokeTime, TargetList};
 use crate::order::{self, Effort, Method, Shape};
 use crate::protocol::{CommandError, RealTime};
-use crate::stage::{Aborted, Cancel};
+use crate::stage::{Aborted, Cancel, Stage};
 
 /// The number of targets that are measured in one turn of the main loop.
 const TARGETS_A_TURN: u32 = 64;
@@ -35,6 +38,88 @@ pub(super) struct Pending<I> {
     measured: Option<Measured>,
     /// The size of the job, once it is measured.
     size: JobSize,
+}
+
+/// Lets the pen travel to where it will probably begin, while the lines of the job are found.
+struct Approach<'l, 'b, 'm, B: Board> {
+    /// Answers the user.
+    listener: &'l mut Listener<'b, B>,
+    /// The machine.
+    machine: &'l mut Machine<'m>,
+    /// Whether the pen has left, and has not arrived yet.
+    is_on_the_way: bool,
+    /// How often the stages have asked since the machine was looked after.
+    checks: u8,
+}
+
+/// The stages ask some thousand times a second. The machine is looked after now and then: its plan
+/// holds for 50 ms at least.
+const CHECKS_BETWEEN: u8 = 8;
+
+impl<B: Board> Approach<'_, '_, '_, B> {
+    /// Waits until the pen has arrived, because flash must not be written while something moves.
+    ///
+    /// # Errors
+    /// [`Aborted`] if the user does not want the job any more, or in an alarm.
+    fn arrive(&mut self) -> Result<(), Aborted> {
+        while self.is_on_the_way {
+            let answered = self.listener.check();
+            self.travel(answered)?;
+            self.listener.board.wait_briefly();
+        }
+        Ok(())
+    }
+
+    /// Lets the pen travel on, and stops it where the user does not want the job any more. Returns
+    /// what the user was `answered`.
+    ///
+    /// # Errors
+    /// [`Aborted`] as `answered`, or in an alarm.
+    #[inline(never)] // Keeps its frame off the stack while the lines are found.
+    fn travel(&mut self, answered: Result<(), Aborted>) -> Result<(), Aborted> {
+        let Self { listener, machine, .. } = self;
+        machine.observe(listener.board.contacts());
+        if answered.is_err() {
+            machine.abort();
+        } else if listener.requests.has(RealTime::HOLD) {
+            machine.hold();
+        }
+        machine.fill(&mut TargetList::new(&[]), listener.board.queue());
+        listener.board.begin_steps();
+        let ([x, y], [_, _, z]) = (machine.position_mm(), listener.position);
+        listener.position = [x, y, z];
+        match machine.state() {
+            State::Alarm(_) => Err(Aborted),
+            State::Idle => {
+                self.is_on_the_way = !machine.is_stopped();
+                answered
+            }
+            _ => answered,
+        }
+    }
+}
+
+impl<B: Board> Cancel for Approach<'_, '_, '_, B> {
+    #[inline(never)] // Keeps its frame off the stack while the lines are found.
+    fn check(&mut self) -> Result<(), Aborted> {
+        let answered = self.listener.check();
+        if !self.is_on_the_way {
+            return answered;
+        }
+        self.checks = (self.checks + 1) % CHECKS_BETWEEN;
+        if self.checks == 0 || answered.is_err() { self.travel(answered) } else { answered }
+    }
+
+    fn enter(&mut self, stage: Stage) {
+        self.listener.enter(stage);
+    }
+
+    fn expect_beginning(&mut self, at: PagePoint) {
+        let may_travel =
+            self.machine.state() == State::Idle && !self.listener.requests.has(RealTime::HOLD);
+        // What lies beyond the travel is refused later, with the reason.
+        self.is_on_the_way = may_travel && self.machine.jog(at, None).is_ok();
+    }
 }
 
 /// Keeps the machine going while the order of a job is computed, and ends the computation when the
@@ -116,7 +201,7 @@ impl<I: Index> Inner<'_, I> {
         &mut self,
         listener: &mut Listener<'_, B>,
     ) -> Result<(), CommandError> {
-        let job = self.begin_job(listener, &mut Unobserved)?;
+        let job = self.begin_job_on_the_way(listener)?;
         if !self.begins_early(job) {
             self.job = job.ordered(self.words, listener)?;
             Self::make_room(listener, records::flash_bytes(&self.job))?;
@@ -140,6 +225,29 @@ impl<I: Index> Inner<'_, I> {
                 Err(error)
             }
         }
+    }
+
+    /// Computes the drawing of `$plot`, in place of the last job, while the pen travels to where it
+    /// will probably begin.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    fn begin_job_on_the_way<B: Board>(
+        &mut self,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<Job<I>, CommandError> {
+        self.forget_job();
+        let (steps, early) = (self.machine.settings().page_steps(), self.early());
+        let pace = self.machine.settings().pace(self.units_per_second());
+        let Self { model, options, words, machine, .. } = self;
+        let mut approach = Approach { listener, machine, is_on_the_way: false, checks: 0 };
+        let (cancel, observer) = (&mut approach, &mut Unobserved);
+        let begun =
+            Pipeline { model, options, steps, pace, early, words, cancel, observer }.begin();
+        if begun.is_ok() {
+            approach.arrive()?;
+        } else if approach.is_on_the_way {
+            approach.machine.abort();
+        }
+        begun
     }
 
     /// Computes the drawing of `$plot`, in place of the last job.
@@ -231,6 +339,10 @@ impl<I: Index> Inner<'_, I> {
         listener: &mut Listener<'_, B>,
     ) -> Result<Job<I>, CommandError> {
         self.act(core::mem::take(&mut listener.requests));
+        // The pen leaves before the order is begun, which asks for the first time only when it has
+        // taken its memory.
+        self.plan(None, listener.board);
+        listener.board.begin_steps();
         let words = core::mem::take(&mut self.words);
         let board = &mut *listener.board;
         let ordered = job.ordered_by(words, |begun, scratch, rest, unordered| {

@@ -53,6 +53,25 @@ pub(super) struct Listener<'b, B: Board> {
     /// The hold or emergency stop that was requested meanwhile. It is carried out when the
     /// computation ends.
     pub(super) requests: RealTime,
+    /// Whether the status was reported since this was last set to false.
+    #[cfg(feature = "early-ink")]
+    pub(super) has_answered: bool,
+}
+
+impl<'b, B: Board> Listener<'b, B> {
+    /// Begins to listen with the first stage.
+    #[inline(always)] // Adds no frame to the stack while the stages run.
+    pub(super) fn new(board: &'b mut B, position: [Value; 3], inches: bool) -> Self {
+        Self {
+            board,
+            position,
+            inches,
+            stage: Stage::View,
+            requests: RealTime::default(),
+            #[cfg(feature = "early-ink")]
+            has_answered: false,
+        }
+    }
 }
 
 impl<B: Board> Cancel for Listener<'_, B> {
@@ -64,6 +83,10 @@ impl<B: Board> Cancel for Listener<'_, B> {
         }
         self.requests = self.requests.and(requests).only(RealTime::HOLD.and(RealTime::EMERGENCY));
         if requests.has(RealTime::STATUS) {
+            #[cfg(feature = "early-ink")]
+            {
+                self.has_answered = true;
+            }
             let stage = match self.stage {
                 Stage::View => "view",
                 Stage::Visibility => "visibility",

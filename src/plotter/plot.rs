@@ -11,8 +11,8 @@ use crate::index::Index;
 use crate::machine::State;
 use crate::order::Pace;
 use crate::protocol::{CommandError, RealTime};
-use crate::stage::{Aborted, Cancel, Stage};
-#[cfg(feature = "early-ink")]
+use crate::stage::{Aborted, Cancel};
+#[cfg(all(feature = "early-ink", feature = "stream", feature = "resume"))]
 use crate::storage::PAGE_BYTES;
 
 /// Which job is drawn.
@@ -54,8 +54,7 @@ impl<I: Index> Inner<'_, I> {
         }
         let [x, y] = self.machine.position_mm();
         let (position, inches) = ([x, y, self.program.z()], self.in_inches());
-        let requests = RealTime::default();
-        let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
+        let mut listener = Listener::new(board, position, inches);
         let begun = match drawing {
             _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
             #[cfg(feature = "tiles")]
@@ -109,8 +108,7 @@ impl<I: Index> Inner<'_, I> {
     pub(super) fn stand<B: Board>(&mut self, board: &mut B) -> Result<(), Aborted> {
         let [x, y] = self.machine.position_mm();
         let (position, inches) = ([x, y, self.program.z()], self.in_inches());
-        let requests = RealTime::default();
-        let mut listener = Listener { board, position, inches, stage: Stage::View, requests };
+        let mut listener = Listener::new(board, position, inches);
         self.settle(&mut listener)?;
         // The rest of a job that has stopped goes on in its log.
         #[cfg(feature = "early-ink")]
@@ -147,8 +145,12 @@ impl<I: Index> Inner<'_, I> {
         // What is answered has left before the next sector is erased.
         const ANSWER_MICROSECONDS: u32 = 10_000;
         while listener.board.erase_ahead(bytes) {
+            listener.has_answered = false;
+            listener.check()?;
             let begun = listener.board.microseconds();
-            while listener.board.microseconds().wrapping_sub(begun) < ANSWER_MICROSECONDS {
+            while listener.has_answered
+                && listener.board.microseconds().wrapping_sub(begun) < ANSWER_MICROSECONDS
+            {
                 listener.check()?;
                 listener.board.wait_briefly();
             }

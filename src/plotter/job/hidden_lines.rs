@@ -4,10 +4,18 @@ use super::pipeline::Found;
 use super::scale::{bounds_of, fit, map_with_curves};
 use super::{Collector, HALF_A_STEP, PageSink, Pipeline, move_to_front};
 use crate::drawing::PackedLine;
+#[cfg(feature = "early-ink")]
+use crate::drawing::PageMap;
+#[cfg(feature = "early-ink")]
+use crate::geometry::{Projection, Vertex};
 use crate::index::Index;
+#[cfg(feature = "early-ink")]
+use crate::model::Elements;
 use crate::model::ModelError;
 use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
+#[cfg(feature = "early-ink")]
+use crate::stage::Cancel;
 use crate::stage::{OutOfScratch, Scratch, Stage};
 use crate::view::{Flattening, Seen, project_scene};
 #[cfg(not(feature = "threads"))]
@@ -20,12 +28,18 @@ use crate::visibility::{self, Scene, Unrounded, VisibilityError};
 /// corners per edge.
 const LIKELY_BYTES: usize = size_of::<PackedLine>() / 3;
 
+/// With fewer corners, the lines are found before the pen would be at their left end.
+#[cfg(feature = "early-ink")]
+const CORNERS_WORTH_A_TRAVEL: usize = 1000;
+
 impl<I: Index> Pipeline<'_, I> {
     /// Projects the model through the camera and finds its visible lines. Handles every model that
     /// is neither a flat plan nor a convex solid without faces.
     #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     pub(super) fn find_visible_lines(&mut self) -> Result<Found, CommandError> {
         let (_, view) = self.camera_view()?;
+        #[cfg(feature = "early-ink")]
+        let is_early = self.early.is_some();
         let Self { model, options, steps, words, cancel, observer, .. } = self;
         let (model, options, steps, words) = (*model, *options, *steps, &mut **words);
         let cancel = &mut **cancel;
@@ -51,6 +65,10 @@ impl<I: Index> Pipeline<'_, I> {
             }
         };
 
+        #[cfg(feature = "early-ink")]
+        if is_early && !is_cut && options.see == VisibilityMode::Faces {
+            expect_left_end(vertices, elements, projection, &map, cancel);
+        }
         cancel.enter(Stage::Visibility);
         let precision = options.precision_of(model);
         let positions = bytemuck::cast_slice(model.vertices());
@@ -97,6 +115,39 @@ impl<I: Index> Pipeline<'_, I> {
         let (lines_at, lines) = lines?;
         move_to_front(words, lines_at, lines);
         Ok(Found { lines, degenerate_faces, joined_edges: 0 })
+    }
+}
+
+/// Tells where the left end of the drawing is, if its lines take long to find: the first strokes of
+/// a job whose pen begins early lie there. It is the vertex whose image is furthest to the left,
+/// for nothing hides that one.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined, its frame would take stack while the lines are found.
+fn expect_left_end<I: Index>(
+    vertices: &[Vertex],
+    elements: Elements<'_, I>,
+    projection: Projection,
+    map: &PageMap,
+    cancel: &mut dyn Cancel,
+) {
+    let used = elements.corners().iter();
+    if used.len() < CORNERS_WORTH_A_TRAVEL {
+        return;
+    }
+    let image = |vertex: &Vertex| match projection {
+        Projection::Perspective => (i64::from(vertex.x), i64::from(vertex.z.max(1))),
+        Projection::Parallel => (i64::from(vertex.x), 1),
+    };
+    let is_left_of = |one: &Vertex, other: &Vertex| {
+        let ((x, w), (other_x, other_w)) = (image(one), image(other));
+        // Both factors have 32 bits.
+        x * other_w < other_x * w
+    };
+    let used = used.filter_map(|corner| vertices.get(corner.vertex().get()));
+    let leftmost = used.reduce(|left, next| if is_left_of(next, left) { next } else { left });
+    if let Some(vertex) = leftmost {
+        let (x, w) = image(vertex);
+        cancel.expect_beginning(map.point(x, vertex.y.into(), w));
     }
 }
 
