@@ -173,6 +173,9 @@ enum Task {
         /// How many changes of those modules that decide what is drawn, always the same ones.
         #[arg(default_value_t = 500)]
         count: u32,
+        /// A portion of them only, such as 2/5, the second of five.
+        #[arg(long)]
+        part: Option<mutants::Part>,
     },
     /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs
     /// them into target/senders (some 30 minutes).
@@ -243,7 +246,9 @@ fn carry_out() -> Result<()> {
             test::power_soak(minutes, seed, long, streamed)?;
         }
         Some(Task::LineSoak { minutes, seed }) => test::line_soak(minutes, seed)?,
-        Some(Task::Mutants { count }) => mutants::run_sample(count)?,
+        Some(Task::Mutants { count, part }) => {
+            mutants::run_sample(count, part.unwrap_or(mutants::Part::WHOLE))?;
+        }
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::Bunny { file }) => large::bunny(file)?,
         Some(Task::Mesh) => large::mesh()?,
