@@ -22,6 +22,10 @@ const FILES: [&str; 9] = [
     "src/storage/**",
 ];
 
+/// What a whole build of the workspace turns on. Of code that is not compiled no change would be
+/// found.
+const FEATURES: &str = "host,threads,tiles";
+
 /// The longest time for the tests of one change, in seconds. One that makes them hang is found.
 /// Without a change they take some four seconds on one busy core.
 const PATIENCE: u32 = 60;
@@ -83,6 +87,7 @@ pub fn run_sample(count: u32, part: Part) -> Result<()> {
     command
         .env("TMPDIR", &folder)
         .args(["--package", "penup", "--profile", "mutants", "--cap-lints", "true"])
+        .args(["--features", FEATURES])
         .args(files)
         .args(["--sharding", "round-robin", "--shard", &format!("{shard}/{shards}")])
         .args(["--timeout", &PATIENCE.to_string(), "--no-shuffle", "--output"])
