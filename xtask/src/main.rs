@@ -156,6 +156,13 @@ enum Task {
         /// Lets the client's `plot --resume` send a large drawing instead.
         #[arg(long)]
         streamed: bool,
+        /// Cuts the power before every byte of each kind of record that is written instead, and at
+        /// 1,000 random instants of a small job (most of an hour).
+        #[arg(long, conflicts_with_all = ["minutes", "streamed", "long"])]
+        bytes: bool,
+        /// Does so for one kind only: settings, parameters, job, points, streamed or model.
+        #[arg(long, requires = "bytes")]
+        only: Option<String>,
     },
     /// Damages lines, makes noise and leaves in the middle of things on both emulated boards, and
     /// measures how long the status is waited for.
@@ -242,7 +249,8 @@ fn carry_out() -> Result<()> {
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
-        Some(Task::PowerSoak { minutes, seed, long, streamed }) => {
+        Some(Task::PowerSoak { seed, bytes: true, only, .. }) => test::byte_cuts(seed, only)?,
+        Some(Task::PowerSoak { minutes, seed, long, streamed, .. }) => {
             test::power_soak(minutes, seed, long, streamed)?;
         }
         Some(Task::LineSoak { minutes, seed }) => test::line_soak(minutes, seed)?,
