@@ -154,7 +154,7 @@ const PORTIONS: [(&str, Portion); 6] = [
 /// A few cuts of a job, in each of its operations.
 #[test]
 fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
-    let few = Effort { bytes: 181, instants: 2, scattered: 1, completes_each: false, complete: 12 };
+    let few = Effort { bytes: 1000, instants: 1, scattered: 0, completes_each: false, complete: 4 };
     let mut board = RecordedPico::start()?;
     cut_job(&mut board, few, &mut Random::new(2211))?;
     eprintln!("{:?}", board.tally);
