@@ -20,6 +20,7 @@ pub mod motion_paths;
 pub mod line_soak;
 pub mod noisy_line;
 pub mod panic_calls;
+pub mod pico_byte_cuts;
 pub mod pico_cuts;
 #[cfg(unix)]
 pub mod pico_terminal;
@@ -38,6 +39,7 @@ pub mod grbl_lines;
 pub mod half_circles;
 pub mod heaviest_jobs;
 pub mod ink;
+pub mod streamed_drawing;
 pub mod transcript;
 pub mod whole_jobs;
 pub mod wish;

@@ -63,6 +63,61 @@ pub fn panic_calls(elf: &[u8]) -> Result<Vec<PanicCall>, Box<dyn Error>> {
     Ok(calls)
 }
 
+/// The end of a check of bounds that has failed: instructions of the image from which on it panics,
+/// whatever the registers are.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct FailedCheck {
+    /// The address of the first of these instructions.
+    pub address: u32,
+    /// Where the panic says that it was, as `file:line:column`.
+    pub place: String,
+}
+
+/// Finds failed checks of bounds in an ELF file for a Cortex-M, in the order of their addresses.
+/// They are those whose last instructions load the place into the register of the third argument,
+/// and move at most one other register, before they call the panic function.
+///
+/// # Errors
+/// The file is no ELF file.
+pub fn failed_checks(elf: &[u8]) -> Result<Vec<FailedCheck>, Box<dyn Error>> {
+    /// `LDR R2, [PC, …]`, and `MOV R0, …` or `MOV R1, …`, without the bits that differ (ARMv6-M
+    /// Architecture Reference Manual, A6.7.27 and A6.7.40).
+    const LOAD_PLACE: u32 = 0x4A00;
+    const MOVE: u32 = 0x4600;
+    let file = object::File::parse(elf)?;
+    let functions = functions(&file)?;
+    let code = Code::new(&file)?;
+    let mut checks = Vec::new();
+    for (start, (_, end)) in &functions {
+        for (call, target) in code.branches(*start, *end) {
+            let Some((callee, _)) = functions.get(&target) else { continue };
+            if !callee.ends_with("panicking::panic_bounds_check") {
+                continue;
+            }
+            let loads = |at: u64| code.half(at).filter(|half| half & 0xFF00 == LOAD_PLACE);
+            let moves = |at: u64| code.half(at).is_some_and(|half| half & 0xFF86 == MOVE);
+            let Some((at, load)) = (loads(call - 2).map(|load| (call - 2, load)))
+                .or_else(|| loads(call - 4).filter(|_| moves(call - 2)).map(|it| (call - 4, it)))
+            else {
+                continue;
+            };
+            // The place is a pointer to the name of a file, its length, the line and the column.
+            let literal = ((at + 4) & !3) + u64::from(4 * (load & 0xFF));
+            let word = |at: u64| Some(code.half(at)? | code.half(at + 2)? << 16);
+            let words = word(literal).and_then(|place| {
+                let place = u64::from(place);
+                Some([word(place)?, word(place + 4)?, word(place + 8)?, word(place + 12)?])
+            });
+            let Some([name, length, line, column]) = words else { continue };
+            let name = code.bytes(name.into(), length as usize).ok_or("no name")?;
+            let name = String::from_utf8_lossy(name);
+            let place = format!("{name}:{line}:{column}");
+            checks.push(FailedCheck { address: at as u32, place });
+        }
+    }
+    Ok(checks)
+}
+
 /// The name and end address of each function, by its address.
 type Functions = BTreeMap<u64, (String, u64)>;
 
@@ -125,11 +180,16 @@ impl<'e> Code<'e> {
         Ok(Self { sections, marks })
     }
 
-    /// The half word at an address.
-    fn half(&self, address: u64) -> Option<u32> {
+    /// So many bytes from an address on.
+    fn bytes(&self, address: u64, count: usize) -> Option<&'e [u8]> {
         let (start, bytes) = self.sections.range(..=address).next_back()?;
         let at = usize::try_from(address - start).ok()?;
-        let half = bytes.get(at..at + 2)?;
+        bytes.get(at..at.checked_add(count)?)
+    }
+
+    /// The half word at an address.
+    fn half(&self, address: u64) -> Option<u32> {
+        let half = self.bytes(address, 2)?;
         Some(u32::from(u16::from_le_bytes(half.try_into().ok()?)))
     }
 

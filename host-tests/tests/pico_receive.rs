@@ -118,6 +118,38 @@ fn the_status_waits_for_one_sector_at_most() -> TestResult {
     Ok(())
 }
 
+/// The defaults of two records are kept, each in a sector of its own.
+#[test]
+fn so_it_does_while_defaults_are_restored() -> TestResult {
+    let mut line = start()?;
+    for text in ["$130=300", "G10 L2 P1 X5"] {
+        assert_eq!(ask_all(&mut line, text)?, ["ok"], "{text}");
+    }
+    line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    line.emulator.take_status_waits();
+    let begun = line.emulator.clock()?;
+    line.emulator.send(b"$RST=*\n")?;
+    while line.status()? != "ok" {}
+    assert!(line.emulator.clock()? - begun > 2 * SLOWEST_ERASE, "two sectors are erased");
+    line.hear_greeting()?;
+    let [_, answered] = line.emulator.take_status_waits();
+    let longest = answered.into_iter().max().unwrap_or_default();
+    assert!(longest > SLOWEST_ERASE / 2, "{longest:?}");
+    assert!(longest < SLOWEST_ERASE + Duration::from_millis(20), "{longest:?}");
+    // Ctrl-X between both leaves nothing that is in force, but not kept.
+    line.emulator.send(b"$130=300\nG10 L2 P1 X5\n$RST=*\n")?;
+    while !line.hear()?.starts_with("[MSG:Restoring defaults") {}
+    line.emulator.send(b"\x18")?;
+    line.hear_greeting()?;
+    line.emulator.cut_power()?;
+    line.hear_greeting()?;
+    let settings = ask_all(&mut line, "$$")?;
+    assert!(settings.iter().any(|line| line.starts_with("$130=420.000 ")), "{settings:?}");
+    let systems = ask_all(&mut line, "$#")?;
+    assert!(systems.iter().any(|line| line.starts_with("[G54:0.000,")), "{systems:?}");
+    Ok(())
+}
+
 /// A sender that ignores the window overruns the ring of the DMA and the queue.
 #[test]
 fn bytes_beyond_every_window_are_refused_not_mistaken() -> TestResult {

@@ -3,15 +3,15 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use penup::plotter::{Board as _, Unobserved};
-use penup::stage::{Aborted, Cancel};
+use penup::plotter::Board as _;
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_early,
 };
 use penup_host_tests::random::Random;
-use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_host_tests::streamed_drawing::StreamedDrawing as Drawing;
+use penup_host_tests::whole_jobs::job_lines;
 use penup_job::pins::PinChange;
-use penup_job::streamed::{Form, StreamedJob};
+use penup_job::streamed::StreamedJob;
 use penup_readers::lines::Lines as _;
 
 /// A pen that takes little time, so that the tests do not either.
@@ -19,45 +19,6 @@ const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];
 
 /// The working memory of the plotter in words: a target that has come takes one.
 const WORDS: usize = 1000;
-
-struct Never;
-
-impl Cancel for Never {
-    fn check(&mut self) -> Result<(), Aborted> {
-        Ok(())
-    }
-}
-
-/// A drawing that a computer has computed.
-struct Drawing {
-    /// The settings of the machine.
-    settings: Vec<String>,
-    /// The plotter in memory that has computed it.
-    bench: Bench,
-}
-
-impl Drawing {
-    /// Computes what these lines describe, whose last is `$plot`.
-    fn of(lines: &[String]) -> Self {
-        let (_, before) = lines.split_last().expect("lines");
-        let mut bench = Bench::new();
-        for line in before {
-            assert!(bench.say(&format!("{line}\n")).ends_with("ok\n"), "{line}");
-        }
-        bench.plotter.compute(&mut Never, &mut Unobserved).expect("a job");
-        let is_of_machine =
-            |line: &&String| line.starts_with('$') && line.as_bytes()[1].is_ascii_digit();
-        Self { settings: before.iter().filter(is_of_machine).cloned().collect(), bench }
-    }
-
-    /// Its lines without the first strokes.
-    fn from(&mut self, strokes: u32) -> StreamedJob {
-        let settings = *self.bench.plotter.machine().settings();
-        let mut path = self.bench.plotter.strokes();
-        assert!(strokes == 0 || path.begin_at(strokes), "so many strokes");
-        StreamedJob::new(&settings, &mut path, Form::Strokes).expect("lines of strokes")
-    }
-}
 
 /// The numbers of a `[STOPPED:id,drawn,all,lost]`, if that is answered to `$stream`.
 fn stopped(plotter: &mut Powered<'_, '_>) -> Option<[u32; 4]> {

@@ -149,3 +149,33 @@ fn fractions_are_written_rounded_and_without_a_negative_zero() {
     assert_eq!(shown(-1, 1, 0), "-1");
     assert_eq!(shown((1 << 30) - 1, 30, 3), "1.000");
 }
+
+#[test]
+fn a_number_is_written_so_that_it_is_read_again() {
+    for text in ["0", "-12", "0.0005", "1.25e3", "-0.1e-9", "123456789012345678"] {
+        let number = Decimal::parse(text).unwrap();
+        let written = format!("{number}");
+        assert_eq!(Decimal::parse(&written), Ok(number), "{text}: {written}");
+    }
+    assert_eq!(format!("{}", Decimal::parse("0.0005").unwrap()), "5e-4");
+}
+
+#[test]
+fn coarser_units_are_rounded_half_away_from_zero() {
+    for (value, bits, expected) in [
+        (7, 0, 7),
+        (1, 1, 1),
+        (5, 2, 1),
+        (6, 2, 2),
+        (7, 2, 2),
+        (-5, 2, -1),
+        (-6, 2, -2),
+        (1000, 4, 63),
+        (i32::MIN, 31, -1),
+        (i32::MAX, 31, 1),
+        (i32::MIN, 1, i32::MIN / 2),
+        (i32::MAX, 32, 0),
+    ] {
+        assert_eq!(shift_right_rounding(value, bits), expected, "{value} >> {bits}");
+    }
+}

@@ -101,3 +101,22 @@ impl<'s, I: Index> Cells<'s, I> {
         (along(position.x, self.corner.x), along(position.y, self.corner.y))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stage::Scratch;
+
+    #[test]
+    fn the_bytes_hold_the_most_cells_and_all_points() {
+        for count in [1, 2, 3, 7, 64, 1001] {
+            let bytes = Cells::<u16>::bytes(count);
+            let mut words = [0; 512];
+            let mut scratch = Scratch::new(&mut words[..bytes.div_ceil(8)]);
+            scratch.take::<u16>(Cells::<u16>::most_cells(count) + 1).unwrap();
+            assert_eq!(scratch.take::<u16>(count).unwrap().len(), count);
+            // Hardly anything is left.
+            assert!(scratch.take::<u64>(2).is_err(), "{count}");
+        }
+    }
+}

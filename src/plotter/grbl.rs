@@ -1,6 +1,8 @@
 //! Grbl's commands for what a program leaves behind: modes, coordinate systems, startup lines and
 //! defaults.
 
+#[cfg(feature = "early-ink")]
+use super::plot::ANSWER_MICROSECONDS;
 use super::program::{Kept, MachinePosition, Order, Parameters, Program, TEXT_LIMIT, Text};
 use super::reply::Reply;
 use super::stream::Task;
@@ -13,6 +15,10 @@ use crate::protocol::{BlockError, CommandError, GCode, Significant};
 
 /// The idleness that ends a program, in microseconds.
 const IDLE_MICROSECONDS: u32 = 1_000_000;
+
+/// Work on the flash that takes less than so many microseconds has kept nobody waiting.
+#[cfg(feature = "early-ink")]
+const UNNOTICED_MICROSECONDS: u32 = 2_000;
 
 /// The index of the text of `$I` among the texts; the startup lines come before it.
 const INFO: usize = 2;
@@ -30,8 +36,12 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Whether a program is open that idleness would end, or drivers are to be switched off, so
-    /// that time must be told.
+    /// that time must be told. So it must be between two works on the flash.
     pub(super) fn is_timing(&self) -> bool {
+        #[cfg(feature = "early-ink")]
+        if matches!(self.task, Some(Task::Restore { .. })) {
+            return true;
+        }
         #[cfg(feature = "driver-pins")]
         if self.machine.driver_rest().is_some() {
             return true;
@@ -313,7 +323,8 @@ impl<I: Index> Inner<'_, I> {
         }
     }
 
-    /// Restores the defaults of the settings, of the coordinate systems, and of the texts.
+    /// Restores the defaults of the settings, of the coordinate systems, and of the texts. Returns
+    /// whether all is kept. If not, a task keeps the rest.
     ///
     /// # Errors
     /// [`CommandError::Busy`], or [`CommandError::NotStored`]: they are in force, but not kept.
@@ -322,7 +333,7 @@ impl<I: Index> Inner<'_, I> {
         &mut self,
         [settings, parameters, texts]: [bool; 3],
         board: &mut B,
-    ) -> Result<(), CommandError> {
+    ) -> Result<bool, CommandError> {
         self.check_idle()?;
         if settings {
             self.machine.restore(Settings::default())?;
@@ -340,8 +351,40 @@ impl<I: Index> Inner<'_, I> {
         #[cfg(feature = "driver-pins")]
         self.set_driver_pins(board);
         Reply(board).line(format_args!("[MSG:Restoring defaults]"));
+        #[cfg(feature = "early-ink")]
+        let begun = board.microseconds();
         records::save_settings(self.machine.settings(), board)?;
-        records::save_parameters(&self.parameters, board)
+        if !parameters && !texts {
+            return Ok(true);
+        }
+        #[cfg(feature = "early-ink")]
+        {
+            let now = board.microseconds();
+            if now.wrapping_sub(begun) >= UNNOTICED_MICROSECONDS {
+                self.task = Some(Task::Restore { since: now });
+                return Ok(false);
+            }
+        }
+        records::save_parameters(&self.parameters, board)?;
+        Ok(true)
+    }
+
+    /// Keeps the parameters after the settings were kept for [`Inner::restore`], if that is the
+    /// task. In between the user is listened to for a moment, unless `at_once`, because a sector of
+    /// flash may take 400 ms to be erased. Returns the outcome, once there is one.
+    #[cfg(feature = "early-ink")]
+    #[inline(never)] // It is called seldom.
+    pub(super) fn keep_rest<B: Board>(
+        &mut self,
+        at_once: bool,
+        board: &mut B,
+    ) -> Option<Result<(), CommandError>> {
+        let Some(Task::Restore { since }) = self.task else { return None };
+        if !at_once && board.microseconds().wrapping_sub(since) < ANSWER_MICROSECONDS {
+            return None;
+        }
+        self.task = None;
+        Some(records::save_parameters(&self.parameters, board))
     }
 }
 

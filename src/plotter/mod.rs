@@ -353,6 +353,11 @@ impl<'m, I: Index> Plotter<'m, I> {
             match self.inner.proceed(board) {
                 Progress::Done(outcome) => self.answer(outcome, board),
                 Progress::More => {}
+                #[cfg(feature = "early-ink")]
+                Progress::Reset => {
+                    self.answer(Ok(()), board);
+                    self.begin_anew(board);
+                }
                 Progress::Waits => return planned || requests != RealTime::default(),
             }
             return true;
@@ -419,9 +424,7 @@ impl<'m, I: Index> Plotter<'m, I> {
             self.answer(outcome, board);
         }
         if resets {
-            self.inner.reset();
-            self.greet(board);
-            self.inner.run_startup_lines(board);
+            self.begin_anew(board);
         }
         if shows_drive {
             board.show_drive();
@@ -535,11 +538,22 @@ impl<'m, I: Index> Plotter<'m, I> {
     /// Forgets unfinished lines, line numbers, overrides, and the modes of G-code, leaves check
     /// mode and sleep, and greets the user.
     fn reset<B: Board>(&mut self, board: &mut B) {
+        // What is in force is kept, too.
+        #[cfg(feature = "early-ink")]
+        if let Some(outcome) = self.inner.keep_rest(true, board) {
+            self.answer(outcome, board);
+        }
         self.readers.iter_mut().for_each(LineReader::clear);
         self.numberings = [Numbering::default(), Numbering::default()];
         self.inner.task = None;
         #[cfg(feature = "hpgl")]
         self.end_hpgl(board);
+        self.begin_anew(board);
+    }
+
+    /// Begins with the modes of a start, and greets the user.
+    #[inline(never)] // Its callers share one copy of the code.
+    fn begin_anew<B: Board>(&mut self, board: &mut B) {
         self.inner.reset();
         self.greet(board);
         self.inner.run_startup_lines(board);
@@ -661,8 +675,8 @@ impl<I: Index> Inner<'_, I> {
                 self.set_info(text, board)?;
             }
             Command::Restore { settings, parameters, texts } => {
-                self.restore([settings, parameters, texts], board)?;
-                return Ok(Next::Reset);
+                let is_over = self.restore([settings, parameters, texts], board)?;
+                return Ok(if is_over { Next::Reset } else { Next::Nothing });
             }
             Command::Assign { name, value } => {
                 if !self.options.set(name, value)? {

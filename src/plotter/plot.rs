@@ -30,6 +30,11 @@ pub(super) enum Drawing {
     },
 }
 
+/// For so many microseconds the user is listened to between two erasures of the flash: what is
+/// answered has left before the next one begins.
+#[cfg(feature = "early-ink")]
+pub(super) const ANSWER_MICROSECONDS: u32 = 10_000;
+
 impl<I: Index> Inner<'_, I> {
     /// Begins a job.
     ///
@@ -142,8 +147,6 @@ impl<I: Index> Inner<'_, I> {
         listener: &mut Listener<'_, B>,
         bytes: u32,
     ) -> Result<(), Aborted> {
-        // What is answered has left before the next sector is erased.
-        const ANSWER_MICROSECONDS: u32 = 10_000;
         while listener.board.erase_ahead(bytes) {
             listener.has_answered = false;
             listener.check()?;

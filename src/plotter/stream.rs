@@ -36,6 +36,12 @@ pub(super) enum Task {
         /// Whether the settings have changed.
         settings: bool,
     },
+    /// Keeps the parameters, a moment after the settings were kept.
+    #[cfg(feature = "early-ink")]
+    Restore {
+        /// When the settings were kept, in microseconds of the board's clock.
+        since: u32,
+    },
     /// Homing: looks for the limit switches.
     Home,
     /// Writes a list, from the row with this index on.
@@ -64,8 +70,11 @@ pub(super) enum Progress {
     Done(Result<(), CommandError>),
     /// A part of the task is done. Call again.
     More,
-    /// The task waits for the machine or for room in the output.
+    /// The task waits for the machine, for time, or for room in the output.
     Waits,
+    /// The task is done, the line can be answered with success, and the plotter begins anew.
+    #[cfg(feature = "early-ink")]
+    Reset,
 }
 
 impl<I: Index> Inner<'_, I> {
@@ -158,6 +167,14 @@ impl<I: Index> Inner<'_, I> {
             }
             self.task = None;
             return Progress::Done(Ok(()));
+        }
+        #[cfg(feature = "early-ink")]
+        if let Some(Task::Restore { .. }) = self.task {
+            return match self.keep_rest(false, board) {
+                None => Progress::Waits,
+                Some(Ok(())) => Progress::Reset,
+                Some(error) => Progress::Done(error),
+            };
         }
         let progress = match self.machine.state() {
             State::Alarm(_) | State::Sleep => Progress::Done(Err(CommandError::Locked)),

@@ -238,3 +238,41 @@ fn checksum(of: u32, notes: &[u8]) -> u32 {
     digest.update(notes);
     digest.finalize()
 }
+
+#[cfg(all(test, feature = "host"))]
+mod tests {
+    use super::*;
+    use crate::boards::host::CutFlash;
+
+    const LOG: Log = Log { start: 4096, bytes: 4096 };
+
+    #[test]
+    fn a_log_has_a_bit_for_each_part_and_point_behind_its_first_page() {
+        // Fifteen pages of 2048 bits.
+        assert_eq!((LOG.limit(), LOG.points_limit()), (23_040, 7_680));
+    }
+
+    #[test]
+    fn what_is_noted_is_read_up_to_the_limits() {
+        let mut flash = CutFlash::new(3 * 4096);
+        LOG.begin(&mut flash, 7, b"notes").unwrap();
+        let read = |flash: &mut CutFlash| {
+            let mut notes = [0; NOTE_BYTES];
+            let (length, noted) = LOG.read(flash, 7, &mut notes).unwrap();
+            assert_eq!(&notes[..length], b"notes");
+            noted
+        };
+        let (mut parts, mut points) = (0, 0);
+        for (next, next_points) in
+            [(1, 0), (2, 1), (9, 3), (2047, 2048), (2049, 2060), (23_040, 7_680)]
+        {
+            LOG.note(&mut flash, parts, next).unwrap();
+            LOG.note_points(&mut flash, points, next_points).unwrap();
+            (parts, points) = (next, next_points);
+            assert_eq!(read(&mut flash), Noted { parts, points });
+        }
+        // Another state has another log.
+        assert!(LOG.read(&mut flash, 8, &mut [0; NOTE_BYTES]).is_none());
+        assert!(flash.bytes[..4096].iter().chain(&flash.bytes[8192..]).all(|byte| *byte == 0xFF));
+    }
+}

@@ -348,6 +348,28 @@ mod tests {
         Camera { pose: Pose::Towards { eye, at, up: None }, lens: Lens::Perspective }
     }
 
+    /// At 45 degrees from the line of sight, x and depth are the same.
+    #[test]
+    fn the_field_is_where_a_diagonal_is_seen() {
+        with_model(&CUBE, |model| {
+            for eye in [[-3.0, -4.0, 2.5], [30.0, 20.0, 10.0]] {
+                let view = View::new(&camera(eye, [0.5; 3]), model).unwrap();
+                let vertex = view.vertex(model.vertices()[6]);
+                let field = view.field(20).unwrap() as f64 / f64::from(1 << 20);
+                let axes = Axes::new(&camera(eye, [0.5; 3])).unwrap();
+                let along = |direction: Direction| {
+                    (0..3).map(|n| (1.0 - axes.origin[n]) * direction[n]).sum::<f64>()
+                };
+                let [right, _, forward] = axes.directions.map(along);
+                // The vertex is seen at right / forward, and the diagonal at 1.
+                let seen = f64::from(vertex.x) / f64::from(vertex.z) / field;
+                assert!((seen - right / forward).abs() < 1e-4, "{seen} {}", right / forward);
+            }
+            let parallel = Camera { lens: Lens::Orthographic, ..camera([3.0; 3], [0.5; 3]) };
+            assert_eq!(View::new(&parallel, model).unwrap().field(20), None);
+        });
+    }
+
     #[test]
     fn images_are_those_of_the_formula() {
         const OBLIQUE: Lens = Lens::Oblique { angle: 30.0, ratio: 0.5 };

@@ -156,6 +156,13 @@ enum Task {
         /// Lets the client's `plot --resume` send a large drawing instead.
         #[arg(long)]
         streamed: bool,
+        /// Cuts the power before every byte of each kind of record that is written instead, and at
+        /// 1,000 random instants of a small job (most of an hour).
+        #[arg(long, conflicts_with_all = ["minutes", "streamed", "long"])]
+        bytes: bool,
+        /// Does so for one kind only: settings, parameters, job, points, streamed or model.
+        #[arg(long, requires = "bytes")]
+        only: Option<String>,
     },
     /// Damages lines, makes noise and leaves in the middle of things on both emulated boards, and
     /// measures how long the status is waited for.
@@ -173,6 +180,9 @@ enum Task {
         /// How many changes of those modules that decide what is drawn, always the same ones.
         #[arg(default_value_t = 500)]
         count: u32,
+        /// A portion of them only, such as 2/5, the second of five.
+        #[arg(long)]
+        part: Option<mutants::Part>,
     },
     /// Tries cncjs, bCNC, grbl-streamer, gscrib and vpype with the emulated boards; it installs
     /// them into target/senders (some 30 minutes).
@@ -239,11 +249,14 @@ fn carry_out() -> Result<()> {
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
-        Some(Task::PowerSoak { minutes, seed, long, streamed }) => {
+        Some(Task::PowerSoak { seed, bytes: true, only, .. }) => test::byte_cuts(seed, only)?,
+        Some(Task::PowerSoak { minutes, seed, long, streamed, .. }) => {
             test::power_soak(minutes, seed, long, streamed)?;
         }
         Some(Task::LineSoak { minutes, seed }) => test::line_soak(minutes, seed)?,
-        Some(Task::Mutants { count }) => mutants::run_sample(count)?,
+        Some(Task::Mutants { count, part }) => {
+            mutants::run_sample(count, part.unwrap_or(mutants::Part::WHOLE))?;
+        }
         Some(Task::Lattice7) => test::lattice7()?,
         Some(Task::Bunny { file }) => large::bunny(file)?,
         Some(Task::Mesh) => large::mesh()?,

@@ -1,8 +1,10 @@
 //! Changes the library in small ways, and looks for changes that its unit tests do not find.
 
+use std::fs;
 use std::process::Command;
+use std::str::FromStr;
 
-use anyhow::{Result, ensure};
+use anyhow::{Context, Result, ensure};
 
 use crate::command::{cargo, describe, output, run};
 
@@ -20,15 +22,51 @@ const FILES: [&str; 9] = [
     "src/storage/**",
 ];
 
-/// The longest time for the tests of one change, in seconds. One that makes them hang is found.
-const PATIENCE: u32 = 120;
+/// What a whole build of the workspace turns on. Of code that is not compiled no change would be
+/// found.
+const FEATURES: &str = "host,threads,tiles";
 
-/// Tries about `count` changes, spread evenly over all that there are, and prints those that no
-/// test finds. The same count gives the same changes. The list stays in target/mutants.out.
+/// The longest time for the tests of one change, in seconds. One that makes them hang is found.
+/// Without a change they take some four seconds on one busy core.
+const PATIENCE: u32 = 60;
+
+/// A portion of the sample: number `number`, from 1, of `of` portions of the same size.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Part {
+    number: usize,
+    of: usize,
+}
+
+impl Part {
+    /// The whole sample.
+    pub const WHOLE: Self = Self { number: 1, of: 1 };
+
+    /// Which of cargo-mutants' shards of all changes it is, and of how many, if the sample is every
+    /// `step`th change, from the first on: every `of`th of these, from number `number` on.
+    fn shard(self, step: usize) -> (usize, usize) {
+        ((self.number - 1) * step, self.of * step)
+    }
+}
+
+impl FromStr for Part {
+    type Err = anyhow::Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let portion = text.split_once('/').and_then(|(number, of)| {
+            let (number, of): (usize, usize) = (number.parse().ok()?, of.parse().ok()?);
+            ((1..=of).contains(&number) && of <= 1000).then_some(Self { number, of })
+        });
+        portion.context("a portion is written as 2/5, the second of five (at most 1000)")
+    }
+}
+
+/// Tries about `count` changes, spread evenly over all that there are, or a portion of them, and
+/// prints those that no test finds. The same count gives the same changes, and all portions
+/// together are the whole. The lists stay in target/mutants.
 ///
 /// # Errors
 /// `cargo-mutants` is missing, the tests fail without a change, or a change is not found.
-pub fn run_sample(count: u32) -> Result<()> {
+pub fn run_sample(count: u32, part: Part) -> Result<()> {
     ensure!(
         mutants().arg("--version").output().is_ok_and(|out| out.status.success()),
         "this needs cargo-mutants; install it with\ncargo install cargo-mutants --locked"
@@ -37,14 +75,23 @@ pub fn run_sample(count: u32) -> Result<()> {
     let files = FILES.iter().flat_map(|file| ["--file", file]);
     let list: Vec<&str> = list.into_iter().chain(files.clone()).collect();
     let all = output("cargo", &list).map_or(0, |text| text.lines().count());
-    let shards = all.div_ceil(count.max(1) as usize).max(1);
-    say!("penup: one change in {shards} of {all}")?;
+    ensure!(all > 0, "cargo-mutants lists no change");
+    let step = all.div_ceil(count.max(1) as usize).max(1);
+    let (shard, shards) = part.shard(step);
+    say!("penup: one change in {step} of {all}, portion {} of {}", part.number, part.of)?;
+    // The copy of the workspace lies beside what is built, because it fills a small /tmp.
+    let folder = crate::root().join("target/mutants");
+    let output = folder.join(format!("{}-of-{}", part.number, part.of));
+    fs::create_dir_all(&output).with_context(|| format!("cannot make {}", output.display()))?;
     let mut command = mutants();
     command
-        .args(["--package", "penup"])
+        .env("TMPDIR", &folder)
+        .args(["--package", "penup", "--profile", "mutants", "--cap-lints", "true"])
+        .args(["--features", FEATURES])
         .args(files)
-        .args(["--sharding", "round-robin", "--shard", &format!("0/{shards}")])
-        .args(["--timeout", &PATIENCE.to_string(), "--output", "target", "--no-shuffle"])
+        .args(["--sharding", "round-robin", "--shard", &format!("{shard}/{shards}")])
+        .args(["--timeout", &PATIENCE.to_string(), "--no-shuffle", "--output"])
+        .arg(&output)
         .args(["--", "--lib"]);
     say!("penup: {}", describe(&command))?;
     run(&mut command)
@@ -55,4 +102,30 @@ fn mutants() -> Command {
     let mut command = cargo();
     command.current_dir(crate::root()).arg("mutants");
     command
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_portions_are_the_whole_sample() {
+        let chosen = |part: Part, step| {
+            let (shard, shards) = part.shard(step);
+            (0..1000).filter(move |change| change % shards == shard)
+        };
+        let parts = (1..=4).map(|number| Part { number, of: 4 });
+        let mut together: Vec<usize> = parts.flat_map(|part| chosen(part, 7)).collect();
+        together.sort_unstable();
+        assert_eq!(together, chosen(Part::WHOLE, 7).collect::<Vec<_>>());
+        assert_eq!(together, (0..1000).step_by(7).collect::<Vec<_>>());
+    }
+
+    #[test]
+    fn a_portion_that_does_not_exist_is_refused() {
+        assert!("2/5".parse::<Part>().is_ok_and(|part| part == Part { number: 2, of: 5 }));
+        for text in ["", "2", "0/5", "6/5", "1/0", "a/5", "1/1001", "-1/5"] {
+            assert!(text.parse::<Part>().is_err(), "{text}");
+        }
+    }
 }

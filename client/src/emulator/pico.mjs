@@ -23,15 +23,18 @@
 // onto the drive that the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of
 // flash (the cycle) stay low or high from now on, 36 the main loop goes on at an address, with the
 // stack used up (1) or as it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate
-// (the cycle), 48 the next setting of the clock's alarm is late by so many milliseconds. Out: 0 a
-// byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was
+// (the cycle), 38 the host resets the bus so many times (the value) at random (a seed in the
+// cycle's place), 48 the next setting of the clock's alarm is late by so many milliseconds. Out: 0
+// a byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the log, 4 the chip was
 // reset (0 by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed
 // function has returned (its number, the cycles in the cycle's place), 7 so many bytes of the stack
 // have not been used since the chip began (in the cycle's place), 32 the boot ROM shows its drive,
 // 33 a character of the serial number that the USB host reads, after a 0, 34 flash has returned
 // garbage, 35 the status was asked for at the serial line, and so many cycles later (in the cycle's
 // place) the first byte of the answer (0) or all of it (1) had left, 36 so often the records in
-// flash were read.
+// flash were read, 37 a recorded operation of the flash, an erasure (1) or a page (0), began at
+// that cycle, 38 from which place it goes on (the upper 32 bits) and how many bytes it changes (the
+// lower 16), 39 so many operations were recorded.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -44,6 +47,7 @@ import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
 import { attachFlashChip } from './pico/flash_chip.mjs';
+import { FlashRecord } from './pico/flash_record.mjs';
 import { delayAlarm } from './pico/late_alarm.mjs';
 import { mendCore, refuseMisaligned } from './pico/mended_core.mjs';
 import { Marks, quickCore } from './pico/quick_core.mjs';
@@ -93,6 +97,12 @@ const GARBLED = 34;
 const ANSWERED = 35;
 const READS = 14;
 const WERE_READ = 36;
+const RECORD_FLASH = 15;
+const BOOT_WITHIN = 16;
+const BOOT_SCATTERED = 17;
+const OPERATION_BEGAN = 37;
+const OPERATION_CHANGES = 38;
+const OPERATIONS = 39;
 const GO_ON = -1;
 const DELAY_ALARM = 48;
 /** Nanoseconds by which the next settings of the clock's alarm are late. */
@@ -104,6 +114,7 @@ const STAYS_LOW = 34;
 const STAYS_HIGH = 35;
 const JUMP = 36;
 const USB_LINE = 37;
+const USB_RESETS = 38;
 const BOOTSEL = 32;
 const USB_SERIAL = 33;
 const output = Buffer.alloc(1 << 16);
@@ -183,15 +194,47 @@ function changeFlash(from, count, change) {
   }
 }
 
+/** What is done to the flash. */
+const flashRecord = new FlashRecord();
+
+function noteFlash(isErasure, from, count, microseconds, change) {
+  const [begins, lasts] = [now() + flashNanos / NANOS, (microseconds * 1000) / NANOS];
+  flashRecord.note(isErasure, from, count, Math.round(begins), lasts, chip.flash, change);
+}
+
+/** Ends the record, and tells what was done. */
+function tellFlashRecord() {
+  flashRecord.end();
+  for (const { isErasure, start, cycle, changes } of flashRecord.operations) {
+    report(OPERATION_BEGAN, isErasure ? 1 : 0, Math.round(cycle));
+    report(OPERATION_CHANGES, 0, start * 2 ** 16 + changes.length);
+  }
+  report(OPERATIONS, 0, flashRecord.operations.length);
+}
+
+/** The power comes back, and finds the flash as it was within a recorded operation. */
+function bootWithin({ what, value, number, low }) {
+  const flash =
+    what === BOOT_WITHIN
+      ? flashRecord.flashWithin(number, low, value)
+      : flashRecord.flashScattered(number, value, low);
+  chip.flash.set(flash);
+  cutPower();
+}
+
 function serveRom(number) {
   const [first, second, third] = core.registers;
   if (number === ERASE) {
-    changeFlash(first, second, () => 0xff);
+    const erase = () => 0xff;
+    noteFlash(true, first, second, sectorMicroseconds, erase);
+    changeFlash(first, second, erase);
     flashNanos += (second / 4096) * sectorMicroseconds * 1000;
   } else if (number === FLUSH_CACHE) {
     xip.flush();
   } else if (number === PROGRAM) {
-    changeFlash(first, third, (at, before) => before & chip.readUint8(second + at - first));
+    const write = (at, before) => before & chip.readUint8(second + at - first);
+    noteFlash(false, first, third, PAGE_MICROSECONDS, write);
+    changeFlash(first, third, write);
     flashNanos += (third / 256) * PAGE_MICROSECONDS * 1000;
   } else if (number === USB_BOOT) {
     const { scratchData } = chip.peripherals[WATCHDOG];
@@ -405,6 +448,8 @@ const stalls = [];
 let hungAt = 0;
 /** Where it is made to go on. */
 let jumpTo = 0;
+/** What decides when the USB host resets the bus. */
+const resetSeeds = [];
 
 function stall(hundredths) {
   const cycle = now();
@@ -548,9 +593,19 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === DELAY_ALARM) alarmDelays.push(entry.value * 1e6);
     else if (rest[at] === STALL) stalls.push({ place: entry.cycle, hundredths: entry.value });
     else if (rest[at] === CUT_FLASH) flashBudget = entry.cycle;
+    else if (rest[at] === RECORD_FLASH) {
+      if (entry.value) flashRecord.begin(chip.flash);
+      else tellFlashRecord();
+    } else if (rest[at] === BOOT_WITHIN || rest[at] === BOOT_SCATTERED) {
+      const [number, low] = [Math.floor(entry.cycle / 2 ** 24), entry.cycle % 2 ** 24];
+      bootWithin({ what: rest[at], value: entry.value, number, low });
+    }
     else if (rest[at] === STAYS_LOW) wear(entry.cycle, entry.value, false);
     else if (rest[at] === STAYS_HIGH) wear(entry.cycle, entry.value, true);
-    else if (rest[at] === JUMP) {
+    else if (rest[at] === USB_RESETS) {
+      resetSeeds.push(entry.cycle);
+      events.push({ what: USB_RESETS, value: entry.value, cycle: 0 });
+    } else if (rest[at] === JUMP) {
       jumpTo = entry.cycle & ~1;
       events.push({ what: JUMP, value: entry.value, cycle: 0 });
     }
@@ -607,6 +662,10 @@ function takeInput(cycle) {
     }
     if (what === USB_HOST) {
       usb.act(value);
+      continue;
+    }
+    if (what === USB_RESETS) {
+      usb.storm(value, resetSeeds.shift() ?? 0);
       continue;
     }
     setInput(value & 0x7f, value >= 0x80);

@@ -1,17 +1,19 @@
 //! Emulates a Raspberry Pi Pico in rp2040js through the script `pico.mjs`, which describes the
 //! protocol between both.
 
+mod flash;
 mod process;
 mod record;
 mod servo;
 
+pub use flash::FlashOperation;
 use process::{
     PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
 };
 use record::{
     CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG, JUMP, PIN, READS,
     RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2,
-    USB, USB_HOST, USB_LINE, at,
+    USB, USB_HOST, USB_LINE, USB_RESETS, at,
 };
 
 use super::running::{Running, Shared};
@@ -357,6 +359,16 @@ impl Pico {
     /// The emulator has ended.
     pub fn suspend_usb(&mut self, suspends: bool) -> io::Result<()> {
         self.send(USB_HOST, if suspends { 4 } else { 5 }, 0)
+    }
+
+    /// Makes the USB host reset the bus `count` times (at most 255), each for 10 microseconds to 20
+    /// milliseconds and 20 microseconds to 100 milliseconds after the one before, and then find the
+    /// device again. `seed` decides the times. What was sent and the device has not taken is lost.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn reset_usb(&mut self, count: u8, seed: u32) -> io::Result<()> {
+        self.send(USB_RESETS, count, u64::from(seed))
     }
 
     /// Makes a program on the USB host open or close the port (DTR) at `rate` baud. The host opens

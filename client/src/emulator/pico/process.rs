@@ -1,9 +1,10 @@
 //! The process of the emulator of the Pico, and the threads that read its output.
 
 use super::BOARD;
+use super::flash::FlashOperation;
 use super::record::{
-    ANSWERED, BOOTSEL, GARBLED, LOG, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL,
-    UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
+    ANSWERED, BOOTSEL, GARBLED, LOG, OPERATION_BEGAN, OPERATION_CHANGES, OPERATIONS, PIN,
+    RECORD_BYTES, RESET, RETURNED, Record, SERIAL, UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
 };
 use super::servo::Servo;
 use crate::emulator::EmulatorError;
@@ -27,6 +28,7 @@ const SCRIPT: &str = include_str!("../pico.mjs");
 const MODULES: &[(&str, &str)] = &[
     ("./pico/core_cycles.mjs", include_str!("core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
+    ("./pico/flash_record.mjs", include_str!("flash_record.mjs")),
     ("./pico/late_alarm.mjs", include_str!("late_alarm.mjs")),
     ("./pico/mended_core.mjs", include_str!("mended_core.mjs")),
     ("./pico/quick_core.mjs", include_str!("quick_core.mjs")),
@@ -41,6 +43,10 @@ const MODULES: &[(&str, &str)] = &[
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
 /// The number of the emulator's own lines that are kept.
 const SAID_LINES: usize = 20;
+
+/// Messages whose `cycle` is something other than the present cycle.
+const NO_TIMES: [u8; 7] =
+    [RETURNED, UNUSED_STACK, ANSWERED, WERE_READ, OPERATION_BEGAN, OPERATION_CHANGES, OPERATIONS];
 
 /// What the reader threads have learnt from the emulator.
 #[derive(Default)]
@@ -61,6 +67,10 @@ pub(super) struct State {
     pub(super) record_reads: Option<u64>,
     /// How often flash has returned garbage.
     pub(super) garbled: u32,
+    /// The recorded operations of the flash, as they come.
+    pub(super) operations: Vec<FlashOperation>,
+    /// How many were recorded, when all have come.
+    pub(super) operation_count: Option<u64>,
     /// Whether the boot ROM shows its drive and waits for an image.
     pub(super) shows_drive: bool,
     /// The serial number that the USB host has read.
@@ -206,7 +216,7 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
         state.ended = count == 0;
         for bytes in buffer[..whole].as_chunks().0 {
             let record = Record::from_bytes(*bytes);
-            if ![RETURNED, UNUSED_STACK, ANSWERED, WERE_READ].contains(&record.what) {
+            if !NO_TIMES.contains(&record.what) {
                 state.cycles = record.cycle;
             }
             match record.what {
@@ -222,6 +232,18 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                 }
                 GARBLED => state.garbled += 1,
                 WERE_READ => state.record_reads = Some(record.cycle),
+                OPERATION_BEGAN => state.operations.push(FlashOperation {
+                    began: at(record.cycle),
+                    is_erasure: record.value == 1,
+                    ..FlashOperation::default()
+                }),
+                OPERATION_CHANGES => {
+                    if let Some(last) = state.operations.last_mut() {
+                        last.offset = (record.cycle >> 16) as u32;
+                        last.changes = (record.cycle & 0xFFFF) as u32;
+                    }
+                }
+                OPERATIONS => state.operation_count = Some(record.cycle),
                 ANSWERED => state.waits[usize::from(record.value & 1)].push(at(record.cycle)),
                 BOOTSEL => state.shows_drive = true,
                 USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),

@@ -61,6 +61,16 @@ const HOST = {
   HAS_NO_POWER: 8,
 };
 
+/** Numbers from 0 to 1 without a pattern, the same for the same seed. */
+function* numbers(seed) {
+  for (let state = (seed ^ 0x6c078965) | 1; ; ) {
+    state ^= state << 13;
+    state ^= state >>> 17;
+    state ^= state << 5;
+    yield (state >>> 0) / 2 ** 32;
+  }
+}
+
 export class Usb {
   /** What the host is plugged into, takes and holds; outlives the chip's resets. */
   isPlugged = false;
@@ -94,7 +104,7 @@ export class Usb {
   resetController() {
     Object.assign(this, {
       address: 0, main: 0, sie: 0, status: 0, buffers: 0, stallArm: 0, muxing: 0, power: 0,
-      direct: 0, override: 0,
+      direct: 0, override: 0, isStepDue: false,
       enabled: 0, forced: 0, frame: 0, frameBegan: false, isHung: false, raised: false,
     });
     this.isFramed = false;
@@ -115,6 +125,13 @@ export class Usb {
     alarm.schedule(Math.ceil(nanos / CYCLE) * CYCLE);
   }
 
+  /** Does the same whatever happens on the bus meanwhile, unless the chip is another one then. */
+  later(nanos, work) {
+    const { chip } = this;
+    const alarm = chip.clock.createAlarm(() => chip === this.chip && work());
+    alarm.schedule(Math.ceil(nanos / CYCLE) * CYCLE);
+  }
+
   // --- The registers ---
 
   raw() {
@@ -127,8 +144,13 @@ export class Usb {
     this.chip.setInterrupt(5, ((this.raw() & this.enabled) | this.forced) !== 0);
   }
 
+  /** Whether the controller looks at the wires, and not at pins that stand for them. */
+  seesWires() {
+    return !(this.muxing & TO_PAD) || (this.muxing & TO_PHY) !== 0;
+  }
+
   line() {
-    if (this.muxing & TO_PAD && !(this.muxing & TO_PHY)) {
+    if (!this.seesWires()) {
       const { ctrl } = this.chip.gpio[15];
       const [output, input] = [(ctrl >> 12) & 3, (ctrl >> 16) & 3];
       return (ctrl & 0x1f) === 8 && output === 2 && input === 3 ? J : 0;
@@ -192,6 +214,8 @@ export class Usb {
           console.error('the host sees the device leave: nothing pulls D+ up');
           this.isPlugged = false;
         }
+        // A reset that the controller could not see, because it looked at the pins, is still on.
+        if (this.isBusReset && this.seesWires() && !(this.status & STATUS.RESET)) this.seeReset();
         if (this.line() === J) this.connectIfIdle();
         break;
       case REGISTER.POWER: this.power = apply(this.power); break;
@@ -314,9 +338,10 @@ export class Usb {
 
   connectIfIdle() {
     const wasForced = this.muxing & TO_PAD;
-    if (this.status & STATUS.CONNECTED || this.isBusReset || (this.isBusy && !wasForced)) return;
+    if (this.status & STATUS.CONNECTED || this.line() !== J) return;
+    if (this.isBusy && !wasForced) return;
     this.after(IDLE_TO_CONNECT, () => {
-      if (this.isBusReset || this.line() !== J || (this.muxing & TO_PAD) !== wasForced) return;
+      if (this.line() !== J || (this.muxing & TO_PAD) !== wasForced) return;
       this.status |= STATUS.CONNECTED;
       this.interrupt();
     });
@@ -337,16 +362,60 @@ export class Usb {
     this.after(20 * MILLISECOND, () => this.beginFrames());
   }
 
-  /** Finds the device and opens its port. */
-  async enumerate() {
-    const { generation } = this;
-    this.isBusReset = true;
-    this.isConfigured = this.isFramed = this.isTaking = this.isOffering = false;
+  seeReset() {
     this.status = (this.status & ~STATUS.CONNECTED) | STATUS.RESET;
     this.interrupt();
-    await this.pause(10 * MILLISECOND);
+  }
+
+  /** Both wires are low from now on: whatever was on its way is not any more. */
+  beginReset() {
+    this.generation++;
+    this.isBusReset = true;
+    this.isConfigured = this.isFramed = this.isTaking = this.isOffering = false;
+    this.isStepDue = false;
+    this.transfer = null;
+    // The controller may not see it. Its address and its buffers stay as they are until the
+    // program changes them.
+    if (this.seesWires()) this.seeReset();
+  }
+
+  endReset() {
     this.isBusReset = false;
     this.connectIfIdle();
+  }
+
+  /**
+   * The host resets the bus so many times, each time before it has found the device, or when it has
+   * just done so, and then finds it. The times are random, by a seed. What the program at the host
+   * had sent and was not taken is lost: its port has gone.
+   */
+  storm(count, seed) {
+    const random = numbers(seed);
+    const time = (least, factor) => least * factor ** random.next().value;
+    this.bytes.length = 0;
+    if (!count) return this.enumerate();
+    this.beginReset();
+    // From 10 microseconds to 20 milliseconds; a host that keeps to the rules takes 10 ms at least.
+    this.later(time(10 * MICROSECOND, 2000), () => {
+      this.endReset();
+      this.search();
+      // Sometimes it gives up early, before or while it finds the device; sometimes it is through.
+      const next = Math.floor(random.next().value * 2 ** 24);
+      this.later(time(20 * MICROSECOND, 5000), () => this.storm(count - 1, next));
+    });
+  }
+
+  /** Finds the device and opens its port. */
+  async enumerate() {
+    this.beginReset();
+    await this.pause(10 * MILLISECOND);
+    this.endReset();
+    await this.search();
+  }
+
+  /** Finds the device behind a reset. */
+  async search() {
+    const { generation } = this;
     await this.pause(MILLISECOND);
     this.beginFrames();
     await this.pause(4 * MILLISECOND);
@@ -356,7 +425,8 @@ export class Usb {
     if (!device) {
       // It did not hear, or is not ready: again.
       this.isFramed = false;
-      return this.after(10 * MILLISECOND, () => this.enumerate());
+      this.after(10 * MILLISECOND, () => this.enumerate());
+      return;
     }
     await this.request([0, 5, 1, 0, 0, 0, 0, 0]);
     this.hostAddress = 1;

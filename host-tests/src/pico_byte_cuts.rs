@@ -1,0 +1,477 @@
+//! Cuts of the emulated Pico's power before every byte that it writes to its flash.
+//!
+//! A run without a cut is recorded once: what is done to the flash, and what the pins draw. Each
+//! cut is then a start with the flash as it was at some point of the record. So thousands of cuts
+//! take minutes, and none of them depends on when a line arrives.
+//!
+//! Between two operations, the start shows the state that the operations before have brought about:
+//! what the board says and answers. A start from within an operation must show the state before it
+//! or the one behind it, and nothing else. What the states must be is checked by each scenario.
+
+mod scenarios;
+
+pub use scenarios::{KeptJob, OldOrNew, SentDrawing, UploadedModel};
+
+use crate::cut_jobs::strokes_of;
+use crate::emulated_jobs::Line;
+use crate::pico_cuts::Run;
+use crate::random::Random;
+use penup_client::emulator::{EmulatedBoard as _, FlashOperation, Pico, PinChange, image_path};
+use std::collections::{BTreeMap, BTreeSet};
+use std::error::Error;
+use std::time::Duration;
+
+type Result<T = ()> = std::result::Result<T, Box<dyn Error>>;
+
+/// Where the records begin in the flash. Before them lies a model that is too large for the memory.
+const RECORDS: u32 = 1760 << 10;
+/// How long a sector is erased, and how long a page is written.
+const OPERATION_TIME: [Duration; 2] = [Duration::from_micros(400), Duration::from_millis(45)];
+
+/// What a board shows when it has started: its messages, how far a job has come, and the answers to
+/// the questions of a scenario.
+pub type Shown = Vec<String>;
+
+/// A point of a record at which the power goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Cut {
+    /// Between two operations: so many are done.
+    Between(u32),
+    /// When so many bytes of an operation have changed, and those bits of the next one that are in
+    /// the mask.
+    Within(u32, u32, u8),
+    /// When each bit that an operation changes has changed with a probability of so many in 256,
+    /// by a seed.
+    Scattered(u32, u8, u32),
+}
+
+impl Cut {
+    /// The number of operations that are done.
+    fn done(self) -> u32 {
+        let (Self::Between(done) | Self::Within(done, ..) | Self::Scattered(done, ..)) = self;
+        done
+    }
+}
+
+/// How often something has been done.
+#[derive(Debug, Clone, Default)]
+pub struct Tally {
+    /// Starts behind a cut, by what was written.
+    pub cuts: BTreeMap<&'static str, u32>,
+    /// Starts behind a cut at a random instant of a job.
+    pub instants: u32,
+    /// Jobs that were completed and whose ink was compared.
+    pub completed: u32,
+}
+
+impl Tally {
+    /// All starts behind a cut.
+    pub fn all(&self) -> u32 {
+        self.cuts.values().sum::<u32>() + self.instants
+    }
+}
+
+/// What is tried.
+#[derive(Debug, Clone, Copy)]
+pub struct Effort {
+    /// Each how manyth byte of a page the power goes before; 1 for every byte.
+    pub bytes: u32,
+    /// The number of cuts at random instants.
+    pub instants: u32,
+    /// The number of cuts of each page and sector after which bits at random have changed.
+    pub scattered: usize,
+    /// Whether the first cut of each operation and outcome is completed.
+    pub completes_each: bool,
+    /// One cut in so many is completed besides.
+    pub complete: i32,
+}
+
+/// A board whose power is cut at points of a record.
+pub struct RecordedPico {
+    line: Line<Pico>,
+    /// The operations of the record.
+    pub operations: Vec<FlashOperation>,
+    /// The changes of the pins in the recorded run, until nothing moved any more.
+    changes: Vec<PinChange>,
+    /// What has been done.
+    pub tally: Tally,
+}
+
+/// What a scenario asks of a board that has started, and how it judges what is drawn then.
+pub trait Scenario {
+    /// The lines that are sent after a start, whose answers belong to what is shown.
+    fn questions(&self) -> &[&str];
+
+    /// Checks what is shown between the operations: before the first one, behind the first one, and
+    /// so on.
+    ///
+    /// # Panics
+    /// Panics if it is not as it must be.
+    fn judge(&self, operations: &[FlashOperation], states: &[Shown]);
+
+    /// What distinguishes cuts with the same outcome, by the number of operations that are done.
+    fn class(&self, done: u32) -> u32 {
+        done
+    }
+
+    /// Completes on a board that has started what has been begun, and judges all that has been
+    /// drawn. `drawn` are the strokes before the cut. Returns whether there was anything to do.
+    ///
+    /// # Errors
+    /// The emulator fails, or the board answers what it must not.
+    ///
+    /// # Panics
+    /// Panics if what is drawn is not what it must be.
+    fn complete(&mut self, board: &mut RecordedPico, shown: &Shown, drawn: Run) -> Result<bool>;
+}
+
+impl RecordedPico {
+    /// Starts the board.
+    ///
+    /// # Errors
+    /// It does not start.
+    pub fn start() -> Result<Self> {
+        let line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+        let (operations, changes) = (Vec::new(), Vec::new());
+        Ok(Self { line, operations, changes, tally: Tally::default() })
+    }
+
+    /// Sends a line and returns the lines of the answer, the last of which is `ok` or an error.
+    ///
+    /// # Errors
+    /// The emulator fails.
+    pub fn ask(&mut self, text: &str) -> Result<Vec<String>> {
+        let mut heard = vec![self.line.ask(text)?];
+        while heard.last().is_some_and(|last| last != "ok" && !last.starts_with("error:")) {
+            heard.push(self.line.hear()?);
+        }
+        heard.retain(|line| !line.is_empty());
+        Ok(heard)
+    }
+
+    /// Sends lines, each of which must be accepted.
+    ///
+    /// # Errors
+    /// The emulator fails, or a line is refused.
+    pub fn order<'l>(&mut self, lines: impl IntoIterator<Item = &'l str>) -> Result {
+        for text in lines {
+            let answer = self.ask(text)?;
+            if answer.last().is_none_or(|last| last != "ok") {
+                return Err(format!("{text}: {answer:?}").into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Sends lines that the board takes at once, some at a time, each of which must be accepted.
+    ///
+    /// # Errors
+    /// As [`RecordedPico::order`].
+    pub fn order_many(&mut self, lines: &[String]) -> Result {
+        for some in lines.chunks(8) {
+            self.line.emulator.send(format!("{}\n", some.join("\n")).as_bytes())?;
+            for text in some {
+                let mut answer = self.line.hear()?;
+                while answer.starts_with('[') {
+                    answer = self.line.hear()?;
+                }
+                if answer != "ok" {
+                    return Err(format!("{text}: {answer}").into());
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Cuts the power and restores it, with the flash as it is.
+    ///
+    /// # Errors
+    /// The board does not start.
+    pub fn restart(&mut self) -> Result {
+        self.line.emulator.cut_power()?;
+        self.line.hear_greeting()
+    }
+
+    /// Waits until nothing moves any more.
+    ///
+    /// # Errors
+    /// The emulator fails, or the board restarts or reports what it must not.
+    pub fn finish(&mut self) -> Result {
+        loop {
+            let status = self.line.status()?;
+            if status.starts_with("<Idle") && !status.contains("|Stage:") {
+                return Ok(());
+            }
+            let is_status = status.starts_with('<');
+            if status.starts_with("Grbl") || status.starts_with("ALARM") {
+                return Err(format!("while a job is drawn: {status}").into());
+            }
+            if is_status && status.contains("|Late:") {
+                return Err(format!("the queue ran empty while steps were due: {status}").into());
+            }
+        }
+    }
+
+    /// The strokes that the pins have drawn since they were asked for last.
+    ///
+    /// # Errors
+    /// The emulator fails.
+    pub fn drawn(&mut self) -> Result<Run> {
+        Ok(strokes_of(self.line.emulator.pin_changes()?))
+    }
+
+    /// Records what is done to the flash while `work` is done, and until nothing moves any more.
+    ///
+    /// # Errors
+    /// The emulator fails, or the work does.
+    pub fn record(&mut self, work: impl FnOnce(&mut Self) -> Result) -> Result {
+        self.line.emulator.pin_changes()?;
+        self.line.emulator.record_flash()?;
+        work(self)?;
+        self.finish()?;
+        self.operations = self.line.emulator.end_flash_record()?;
+        self.changes = self.line.emulator.pin_changes()?;
+        Ok(())
+    }
+
+    /// The strokes of the record up to an instant.
+    fn drawn_until(&self, instant: Duration) -> Run {
+        strokes_of(self.changes.iter().take_while(|change| change.at < instant).copied())
+    }
+
+    /// When the power goes at a cut: at the beginning of the operation, because the machine stands
+    /// while it lasts.
+    fn instant(&self, cut: Cut) -> Duration {
+        let operation = self.operations.get(cut.done() as usize);
+        operation.map_or(Duration::MAX, |operation| operation.began)
+    }
+
+    /// Starts the board behind a cut, and returns what it shows.
+    fn boot(&mut self, cut: Cut, questions: &[&str]) -> Result<Shown> {
+        self.line.forget();
+        let emulator = &mut self.line.emulator;
+        match cut {
+            Cut::Between(done) => emulator.boot_within(done, 0, 0)?,
+            Cut::Within(number, bytes, mask) => emulator.boot_within(number, bytes, mask)?,
+            Cut::Scattered(number, share, seed) => emulator.boot_scattered(number, share, seed)?,
+        }
+        self.line.hear_greeting()?;
+        self.line.emulator.send(b"?")?;
+        let mut shown = Shown::new();
+        loop {
+            let heard = self.line.hear()?;
+            if !heard.starts_with('<') {
+                shown.push(heard);
+                continue;
+            }
+            let state = heard.trim_start_matches('<').split('|').next().unwrap_or_default();
+            let stopped = heard.split('|').find(|field| field.starts_with("Stopped:"));
+            shown.push(state.to_owned());
+            shown.extend(stopped.map(|field| field.trim_end_matches('>').to_owned()));
+            break;
+        }
+        for question in questions {
+            shown.extend(self.ask(question)?);
+        }
+        shown.retain(|line| !line.is_empty());
+        Ok(shown)
+    }
+
+    /// Cuts the power at all points of the record that `effort` asks for, and judges what is shown
+    /// and drawn.
+    ///
+    /// # Errors
+    /// The emulator fails, or the board answers what it must not.
+    ///
+    /// # Panics
+    /// Panics if something is not as it must be.
+    pub fn try_all(
+        &mut self,
+        scenario: &mut dyn Scenario,
+        effort: Effort,
+        random: &mut Random,
+    ) -> Result {
+        let operations = self.operations.clone();
+        let questions: Vec<String> =
+            scenario.questions().iter().map(|text| (*text).to_owned()).collect();
+        let questions: Vec<&str> = questions.iter().map(String::as_str).collect();
+        let mut states: Vec<Shown> = Vec::new();
+        for done in 0..=operations.len() as u32 {
+            states.push(self.boot(Cut::Between(done), &questions)?);
+            let last = operations.len() - 1;
+            let place = operations.get(done as usize).unwrap_or(&operations[last]);
+            *self.tally.cuts.entry(name_of(place)).or_default() += 1;
+        }
+        scenario.judge(&operations, &states);
+        let mut seen = BTreeSet::new();
+        for (number, operation) in (0..).zip(&operations) {
+            for cut in cuts_within(number, operation, effort, random) {
+                self.try_one(scenario, cut, &states, &mut seen, effort, random)?;
+                *self.tally.cuts.entry(name_of(operation)).or_default() += 1;
+            }
+        }
+        // What was done before the last operation, and behind it.
+        for cut in [Cut::Between(0), Cut::Between(operations.len() as u32)] {
+            self.try_one(scenario, cut, &states, &mut seen, effort, random)?;
+        }
+        Ok(())
+    }
+
+    /// Cuts the power at random instants of the record, a third of them within an operation, and
+    /// judges what is shown and drawn.
+    ///
+    /// # Errors
+    /// As [`RecordedPico::try_all`].
+    ///
+    /// # Panics
+    /// As [`RecordedPico::try_all`].
+    pub fn try_instants(
+        &mut self,
+        scenario: &mut dyn Scenario,
+        effort: Effort,
+        random: &mut Random,
+    ) -> Result {
+        let operations = self.operations.clone();
+        let mut states: Vec<Option<Shown>> = vec![None; operations.len() + 1];
+        let begin = operations[0].began;
+        let end = self.changes.last().map_or(begin, |change| change.at);
+        for _ in 0..effort.instants {
+            let instant = if random.once_in(3) {
+                let operation = operations[random.below(operations.len() as u64) as usize];
+                let lasts = OPERATION_TIME[usize::from(operation.is_erasure)];
+                operation.began + share_of(lasts, random)
+            } else {
+                begin + share_of(end - begin, random)
+            };
+            let begun = operations.iter().take_while(|it| it.began <= instant).count();
+            let cut = match begun.checked_sub(1).map(|last| (last as u32, operations[last])) {
+                Some((number, last)) => {
+                    let lasts = OPERATION_TIME[usize::from(last.is_erasure)].as_micros();
+                    let passed = (instant - last.began).as_micros();
+                    if passed < lasts {
+                        let share = (256 * passed / lasts) as u8;
+                        Cut::Scattered(number, share, random.below(1 << 24) as u32)
+                    } else {
+                        Cut::Between(number + 1)
+                    }
+                }
+                None => Cut::Between(0),
+            };
+            for done in [cut.done(), (cut.done() + 1).min(operations.len() as u32)] {
+                if states[done as usize].is_none() {
+                    let state = self.boot(Cut::Between(done), &[])?;
+                    states[done as usize] = Some(state);
+                }
+            }
+            let shown = self.boot(cut, &[])?;
+            assert_shown(cut, &shown, |at| states[at as usize].as_ref());
+            self.tally.instants += 1;
+            if random.once_in(effort.complete) {
+                self.boot(cut, &[])?;
+                self.line.emulator.pin_changes()?;
+                let drawn = self.drawn_until(instant);
+                if scenario.complete(self, &shown, drawn)? {
+                    self.tally.completed += 1;
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Cuts the power once. A cut whose outcome is new for its operation is completed, and so are
+    /// some others.
+    fn try_one(
+        &mut self,
+        scenario: &mut dyn Scenario,
+        cut: Cut,
+        states: &[Shown],
+        seen: &mut BTreeSet<(u32, Shown)>,
+        effort: Effort,
+        random: &mut Random,
+    ) -> Result {
+        let questions: Vec<String> =
+            scenario.questions().iter().map(|text| (*text).to_owned()).collect();
+        let questions: Vec<&str> = questions.iter().map(String::as_str).collect();
+        let shown = self.boot(cut, &questions)?;
+        assert_shown(cut, &shown, |at| states.get(at as usize));
+        let is_new = seen.insert((scenario.class(cut.done()), shown.clone()));
+        if (is_new && effort.completes_each) || random.once_in(effort.complete) {
+            self.boot(cut, &[])?;
+            self.line.emulator.pin_changes()?;
+            let drawn = self.drawn_until(self.instant(cut));
+            let completed = scenario.complete(self, &shown, drawn);
+            if completed.map_err(|error| format!("behind {cut:?}: {error}"))? {
+                self.tally.completed += 1;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Checks that a board shows the state before the operation of a cut, or the one behind it.
+///
+/// # Panics
+/// Panics if it shows another one.
+fn assert_shown<'s>(cut: Cut, shown: &Shown, state: impl Fn(u32) -> Option<&'s Shown>) {
+    let before = state(cut.done());
+    let behind = if matches!(cut, Cut::Between(_)) { None } else { state(cut.done() + 1) };
+    assert!(
+        Some(shown) == before || Some(shown) == behind,
+        "behind {cut:?}: {shown:#?}, neither {before:#?} nor {behind:#?}"
+    );
+}
+
+/// A random part of a time.
+fn share_of(time: Duration, random: &mut Random) -> Duration {
+    Duration::from_micros(random.below(time.as_micros() as u64 + 1))
+}
+
+/// The cuts within an operation: of a page before each `step`th byte, and within some of them; of a
+/// sector before some bytes; and of both with bits at random.
+fn cuts_within(
+    number: u32,
+    operation: &FlashOperation,
+    effort: Effort,
+    random: &mut Random,
+) -> Vec<Cut> {
+    /// In a sector, and in a page of a large model, one byte is like the others.
+    const SELDOM: u32 = 97;
+    let is_large = operation.offset < RECORDS && operation.changes > 64;
+    let step = effort.bytes * if operation.is_erasure || is_large { SELDOM } else { 1 };
+    let mut cuts = Vec::new();
+    let mut bytes: Vec<u32> = (0..operation.changes).step_by(step as usize).collect();
+    bytes.extend(operation.changes.checked_sub(1));
+    bytes.dedup();
+    for byte in bytes {
+        cuts.push(Cut::Within(number, byte, 0));
+        if random.once_in(8) {
+            cuts.push(Cut::Within(number, byte, 1 + random.below(255) as u8));
+        }
+    }
+    let scattered = if is_large { 1 } else { effort.scattered };
+    for share in [128, 4, 252, 64, 192].into_iter().take(scattered) {
+        cuts.push(Cut::Scattered(number, share, random.below(1 << 24) as u32));
+    }
+    cuts
+}
+
+/// What is written there.
+fn name_of(operation: &FlashOperation) -> &'static str {
+    const SECTOR: u32 = 4096;
+    let job = RECORDS + 2 * SECTOR;
+    let parameters = job + 2 * ((128 << 10) + SECTOR);
+    let logs = parameters + 2 * SECTOR;
+    match (operation.offset, operation.is_erasure) {
+        (..RECORDS, true) => "model: sectors",
+        (..RECORDS, false) => "model: pages",
+        (at, true) if at < job => "settings: sectors",
+        (at, false) if at < job => "settings: pages",
+        (at, true) if at < parameters => "jobs: sectors",
+        (at, false) if at < parameters => "jobs: pages",
+        (at, true) if at < logs => "parameters: sectors",
+        (at, false) if at < logs => "parameters: pages",
+        (_, true) => "logs: sectors",
+        (_, false) if operation.changes > 1 => "logs: fronts",
+        (_, false) => "logs: strokes and points",
+    }
+}

@@ -1,0 +1,51 @@
+//! Drawings that a computer has computed and sends stroke by stroke.
+
+use crate::whole_jobs::Bench;
+use penup::plotter::Unobserved;
+use penup::stage::{Aborted, Cancel};
+use penup_job::streamed::{Form, StreamedJob};
+
+struct Never;
+
+impl Cancel for Never {
+    fn check(&mut self) -> Result<(), Aborted> {
+        Ok(())
+    }
+}
+
+/// A drawing that a computer has computed.
+pub struct StreamedDrawing {
+    /// The settings of the machine.
+    pub settings: Vec<String>,
+    /// The plotter in memory that has computed it.
+    bench: Bench,
+}
+
+impl StreamedDrawing {
+    /// Computes what these lines describe, whose last is `$plot`.
+    ///
+    /// # Panics
+    /// Panics if a line is refused or nothing can be drawn.
+    pub fn of(lines: &[String]) -> Self {
+        let (_, before) = lines.split_last().expect("lines");
+        let mut bench = Bench::new();
+        for line in before {
+            assert!(bench.say(&format!("{line}\n")).ends_with("ok\n"), "{line}");
+        }
+        bench.plotter.compute(&mut Never, &mut Unobserved).expect("a job");
+        let is_of_machine =
+            |line: &&String| line.starts_with('$') && line.as_bytes()[1].is_ascii_digit();
+        Self { settings: before.iter().filter(is_of_machine).cloned().collect(), bench }
+    }
+
+    /// Its lines without the first strokes.
+    ///
+    /// # Panics
+    /// Panics if it has not so many strokes.
+    pub fn from(&mut self, strokes: u32) -> StreamedJob {
+        let settings = *self.bench.plotter.machine().settings();
+        let mut path = self.bench.plotter.strokes();
+        assert!(strokes == 0 || path.begin_at(strokes), "so many strokes");
+        StreamedJob::new(&settings, &mut path, Form::Strokes).expect("lines of strokes")
+    }
+}
