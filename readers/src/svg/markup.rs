@@ -58,7 +58,7 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let (mut copied, mut number) = (0, 0_u32);
     for node in document.descendants() {
         let is_traced =
-            is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text"]);
+            is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text", "image"]);
         let is_traced =
             is_traced && node.attribute("id").is_none() && node.parent_element().is_some();
         let style = node.attribute_node("style").and_then(|style| {
@@ -203,6 +203,9 @@ impl<'a, 'input> Markup<'a, 'input> {
                 }
                 &mut texts
             } else if is_one_of(node, &["image"]) {
+                if drawn.contains(&node.id()) {
+                    continue;
+                }
                 &mut images
             } else if is_one_of(node, &["foreignObject"]) && !is_within(node, &["switch"]) {
                 &mut foreign
@@ -227,7 +230,7 @@ impl<'a, 'input> Markup<'a, 'input> {
             false => "not drawn, because a page has no fonts: open the file with penup page",
         };
         texts.say(&mut said, ["text is", "texts are"], what);
-        images.say(&mut said, ["image is", "images are"], "not drawn");
+        images.say(&mut said, ["image is", "images are"], "not drawn: only those that are SVG are");
         let what = "not drawn: it is not SVG";
         foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
         let what = "not drawn as a whole: there is an error in the data, and the rest is left out";
@@ -250,6 +253,18 @@ impl<'a, 'input> Markup<'a, 'input> {
     /// Whether the element or one that contains it says by itself that it is not shown.
     pub(super) fn is_hidden(&self, element: NodeId) -> bool {
         self.node(element).is_some_and(is_hidden)
+    }
+
+    /// Whether the element is an image.
+    pub(super) fn is_image(&self, element: NodeId) -> bool {
+        self.node(element).is_some_and(|node| is_one_of(node, &["image"]))
+    }
+
+    /// Whether the colours of an element are mixed as light is.
+    pub(super) fn is_linear(&self, element: NodeId) -> bool {
+        let node = self.node(element);
+        let value = node.and_then(|node| property(node, "color-interpolation"));
+        value == Some("linearRGB")
     }
 
     /// Whether the width of an element's stroke, and with it the length of its dashes, is the same
@@ -293,9 +308,21 @@ impl Count {
     }
 }
 
-/// Whether the file has a text.
+/// Whether the file has a text, or perhaps an SVG as an image, which may have one.
 pub(super) fn has_text(document: &Document<'_>) -> bool {
     document.descendants().any(|node| is_one_of(node, &["text"]))
+        || references_of_images(document).any(|address| address.contains("svg"))
+}
+
+/// The number of images that are files of their own.
+pub(super) fn references_to_files(document: &Document<'_>) -> usize {
+    references_of_images(document).filter(|address| !address.starts_with("data:")).count()
+}
+
+/// Where the images of a file are.
+fn references_of_images<'a>(document: &'a Document<'_>) -> impl Iterator<Item = &'a str> {
+    let images = document.descendants().filter(|node| is_one_of(*node, &["image"]));
+    images.filter_map(|image| Some(image.attributes().find(|it| it.name() == "href")?.value()))
 }
 
 /// Whether a text has letters.

@@ -374,7 +374,7 @@ fn what_is_not_drawn_is_counted() {
         "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
          <image href='a.png' width='9' height='9'/>\
          \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
-         <mask id='m'><rect width='5' height='5' fill='#fff'/></mask>\
+         <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'><image href='b.png'/></mask>\
          <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
     );
     assert_eq!(
@@ -382,12 +382,13 @@ fn what_is_not_drawn_is_counted() {
         [
             "2 texts are not drawn, because a page has no fonts: open the file with penup page \
              (the first in line 2)",
-            "1 image is not drawn (line 3)",
+            "1 image is not drawn: only those that are SVG are (line 3)",
             "1 path is not drawn as a whole: there is an error in the data, and the rest is left \
              out (line 4)",
             "2 elements are not drawn: hidden, or without a size or points, or with one in a \
              unit that is not read, or a reference to nothing (the first in line 5)",
-            "1 mask is not applied: what it hides is drawn",
+            "1 mask is not applied, because of a gradient, an image, a pattern or a filter: what \
+             it hides is drawn",
             "1 line is not drawn, because a dot has no length",
         ]
     );
@@ -496,5 +497,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
 
 mod clips;
 mod css;
+mod embedded;
+mod masks;
 #[cfg(feature = "text")]
 mod texts;
