@@ -44,7 +44,7 @@ pub(crate) struct Shade {
 
 impl Shade {
     /// It lets all light through, whatever lies below.
-    const CLEAR: Self = Self { light: 1.0, alpha: 1.0 };
+    pub(crate) const CLEAR: Self = Self { light: 1.0, alpha: 1.0 };
 }
 
 /// The union of some parts, or what some parts of a mask let through.

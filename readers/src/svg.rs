@@ -194,7 +194,7 @@ fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
         (
             drawing.masks,
             ["mask is", "masks are"],
-            "not applied, because of a gradient, an image, a pattern or a filter: what it hides is \
+            "not applied as a whole: what a gradient, an image, a pattern or a filter hides is \
              drawn",
         ),
         (drawing.filters, ["filter is", "filters are"], "not applied"),

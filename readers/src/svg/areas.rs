@@ -2,8 +2,9 @@
 //!
 //! A pen draws a line or does not. So a mask leaves what it lets at least half of the light
 //! through: the luminance of its colours, or their opacity alone (`mask-type`). Its shapes may hide
-//! each other, and strokes count with their width. A mask is not applied if it has an image, a
-//! pattern, a filter, or a gradient that is neither dark nor light all over.
+//! each other, and strokes count with their width. An image, a pattern, or a gradient that is
+//! neither dark nor light all over lets all light through, and the user is told. A mask with a
+//! filter, or a group that is see-through, is not applied.
 
 use super::drawing::{Drawing, affine, is_even_odd};
 use super::flatten::{Arcs, Polyline, TooManyPoints, flatten};
@@ -23,10 +24,19 @@ struct Light {
     is_linear: bool,
 }
 
+/// A mask while its shapes are laid on each other.
+#[derive(Debug)]
+struct Layers {
+    light: Light,
+    region: Region,
+    /// Whether something in it hides what is drawn.
+    is_soft: bool,
+}
+
 /// A mask cannot be applied.
 enum Refusal {
     TooManyPoints,
-    /// It lets a part of the light through that is not the same all over.
+    /// It has what no region is like.
     Soft,
 }
 
@@ -80,7 +90,8 @@ impl Drawing<'_, '_, '_> {
         Ok(())
     }
 
-    /// Appends what a mask leaves, and those that mask it. Returns how many are not applied.
+    /// Appends what a mask leaves, and those that mask it. Returns how many are not applied, or not
+    /// as a whole.
     ///
     /// # Errors
     /// There are too many points for the memory.
@@ -97,19 +108,16 @@ impl Drawing<'_, '_, '_> {
                 is_alpha: this.kind() == MaskType::Alpha,
                 is_linear: element.is_some_and(|element| self.markup.is_linear(element)),
             };
-            let mut region = Region::default();
-            match self.layers(this.root(), to_page, &Regions::default(), (1.0, light), &mut region)
-            {
+            let mut layers = Layers { light, region: Region::default(), is_soft: false };
+            match self.layers(this.root(), to_page, &Regions::default(), 1.0, &mut layers) {
                 Ok(()) => {
+                    soft += usize::from(layers.is_soft);
                     let rect = this.rect();
-                    let (left, right) = (f64::from(rect.left()), f64::from(rect.right()));
-                    let (top, bottom) = (f64::from(rect.top()), f64::from(rect.bottom()));
-                    let corners = [(left, top), (right, top), (right, bottom), (left, bottom)];
-                    let corners = corners.map(|(x, y)| to_page * Point::new(x, y));
+                    let low = [rect.left(), rect.top()].map(f64::from);
+                    let high = [rect.right(), rect.bottom()].map(f64::from);
                     let mut bounds = Region::default();
-                    let outline = corners.iter().map(|corner| [corner.x, corner.y]).collect();
-                    bounds.add(vec![outline], false, Vec::new());
-                    areas.0.extend([Arc::new(region), Arc::new(bounds)]);
+                    bounds.add(vec![rectangle(low, high, to_page)], false, Vec::new());
+                    areas.0.extend([Arc::new(layers.region), Arc::new(bounds)]);
                 }
                 Err(Refusal::Soft) => soft += 1,
                 Err(Refusal::TooManyPoints) => return Err(TooManyPoints),
@@ -125,8 +133,8 @@ impl Drawing<'_, '_, '_> {
         group: &Group,
         to_page: Affine,
         within: &Regions,
-        (opacity, light): (f64, Light),
-        region: &mut Region,
+        opacity: f64,
+        layers: &mut Layers,
     ) -> Result<(), Refusal> {
         let own = f64::from(group.opacity().get());
         if own == 0.0 {
@@ -142,21 +150,25 @@ impl Drawing<'_, '_, '_> {
         let to_page = to_page * affine(group.transform());
         let mut within = within.clone();
         self.clip(group.clip_path(), to_page, &mut within)?;
-        if self.mask(group.mask(), to_page, &mut within)? > 0 {
-            return Err(Refusal::Soft);
-        }
-        let shade = (opacity * own, light);
+        layers.is_soft |= self.mask(group.mask(), to_page, &mut within)? > 0;
+        let opacity = opacity * own;
         for node in group.children() {
             match node {
-                Node::Group(group) => self.layers(group, to_page, &within, shade, region)?,
+                Node::Group(group) => self.layers(group, to_page, &within, opacity, layers)?,
                 Node::Text(text) => {
-                    self.layers(text.flattened(), to_page, &within, shade, region)?;
+                    self.layers(text.flattened(), to_page, &within, opacity, layers)?;
                 }
                 Node::Path(path) if path.is_visible() => {
-                    self.layer(path, to_page, &within, shade, region)?;
+                    self.layer(path, to_page, &within, opacity, layers)?;
                 }
                 Node::Path(_) => {}
-                Node::Image(_) => return Err(Refusal::Soft),
+                Node::Image(image) if image.is_visible() => {
+                    layers.is_soft = true;
+                    let size = [image.size().width(), image.size().height()].map(f64::from);
+                    let outline = rectangle([0.0, 0.0], size, to_page);
+                    layers.region.add(vec![outline], false, within.0.clone());
+                }
+                Node::Image(_) => {}
             }
         }
         Ok(())
@@ -168,18 +180,18 @@ impl Drawing<'_, '_, '_> {
         path: &Path,
         to_page: Affine,
         within: &Regions,
-        (opacity, light): (f64, Light),
-        region: &mut Region,
+        opacity: f64,
+        layers: &mut Layers,
     ) -> Result<(), Refusal> {
         let mut fill = None;
         if let Some(paint) = path.fill() {
-            let shade = shade(paint.paint(), opacity * f64::from(paint.opacity().get()), light)?;
+            let shade = layers.shade(paint.paint(), opacity * f64::from(paint.opacity().get()));
             let outlines = flatten(path.data(), to_page, Arcs::Quarters, &mut self.budget)?;
             fill = Some((outlines, is_even_odd(path), shade));
         }
         let mut stroke = None;
         if let Some(paint) = path.stroke() {
-            let shade = shade(paint.paint(), opacity * f64::from(paint.opacity().get()), light)?;
+            let shade = layers.shade(paint.paint(), opacity * f64::from(paint.opacity().get()));
             let scale = to_page.determinant().abs().sqrt() * 100.0;
             let mut pen = paint.to_tiny_skia();
             let dash = pen.dash.take();
@@ -196,7 +208,7 @@ impl Drawing<'_, '_, '_> {
         };
         for (outlines, is_even_odd, shade) in both.into_iter().flatten() {
             let outlines = outlines.iter().map(Polyline::positions).collect();
-            region.add_shade(outlines, is_even_odd, within.0.clone(), shade);
+            layers.region.add_shade(outlines, is_even_odd, within.0.clone(), shade);
         }
         Ok(())
     }
@@ -215,31 +227,36 @@ fn painted(group: &Group) -> usize {
     group.children().iter().map(of_node).sum()
 }
 
-/// What a paint of this opacity adds to a mask.
-fn shade(paint: &Paint, opacity: f64, light: Light) -> Result<Shade, Refusal> {
-    let of_colour = |colour: Color| if light.is_alpha { 1.0 } else { luminance(colour, light) };
-    match paint {
-        Paint::Color(colour) => Ok(Shade { light: of_colour(*colour), alpha: opacity }),
-        Paint::LinearGradient(gradient) => of_stops(gradient.stops(), opacity, of_colour),
-        Paint::RadialGradient(gradient) => of_stops(gradient.stops(), opacity, of_colour),
-        Paint::Pattern(_) => Err(Refusal::Soft),
+impl Layers {
+    /// What a paint of this opacity adds.
+    fn shade(&mut self, paint: &Paint, opacity: f64) -> Shade {
+        let light = self.light;
+        let of_colour = |colour: Color| if light.is_alpha { 1.0 } else { luminance(colour, light) };
+        let shade = match paint {
+            Paint::Color(colour) => Some(Shade { light: of_colour(*colour), alpha: opacity }),
+            Paint::LinearGradient(gradient) => of_stops(gradient.stops(), opacity, of_colour),
+            Paint::RadialGradient(gradient) => of_stops(gradient.stops(), opacity, of_colour),
+            Paint::Pattern(_) => None,
+        };
+        self.is_soft |= shade.is_none();
+        shade.unwrap_or(Shade::CLEAR)
     }
 }
 
-/// What a gradient adds to a mask: it must be opaque, and all of it dark or all of it light.
-fn of_stops(
-    stops: &[Stop],
-    opacity: f64,
-    of_colour: impl Fn(Color) -> f64,
-) -> Result<Shade, Refusal> {
+/// What a gradient adds to a mask; `None` if it is not opaque, or neither dark nor light all over.
+fn of_stops(stops: &[Stop], opacity: f64, of_colour: impl Fn(Color) -> f64) -> Option<Shade> {
     let is_opaque = opacity == 1.0 && stops.iter().all(|stop| stop.opacity().get() == 1.0);
     let mut lights = stops.iter().map(|stop| of_colour(stop.color()) >= 0.5);
-    match lights.next() {
-        Some(first) if is_opaque && lights.all(|other| other == first) => {
-            Ok(Shade { light: f64::from(u8::from(first)), alpha: 1.0 })
-        }
-        _ => Err(Refusal::Soft),
-    }
+    let first = lights.next()?;
+    let is_plain = is_opaque && lights.all(|other| other == first);
+    is_plain.then(|| Shade { light: f64::from(u8::from(first)), alpha: 1.0 })
+}
+
+/// The corners of a rectangle on the page.
+pub(super) fn rectangle(low: [f64; 2], high: [f64; 2], to_page: Affine) -> Vec<[f64; 2]> {
+    let corners = [low, [high[0], low[1]], high, [low[0], high[1]]];
+    let on_page = corners.map(|[x, y]| to_page * Point::new(x, y));
+    on_page.iter().map(|corner| [corner.x, corner.y]).collect()
 }
 
 /// How light a colour is, from 0 to 1, as masks of SVG count it.

@@ -1,5 +1,6 @@
 //! Collects what the tree of `usvg` draws, as polylines on the page.
 
+use super::areas::rectangle;
 use super::clip::ConvexArea;
 use super::flatten::{Arcs, Polyline, TooManyPoints, flatten};
 use super::markup::Markup;
@@ -68,7 +69,7 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) patterns: usize,
     /// The number of images that are not drawn, in an SVG that is an image.
     pub(super) nested_images: usize,
-    /// The number of masks that are not applied.
+    /// The number of masks that are not applied, or not as a whole.
     pub(super) masks: usize,
     /// The number of filters that are not applied.
     pub(super) filters: usize,
@@ -182,13 +183,9 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         self.seen.extend(outside.element.filter(|_| !outside.is_nested));
         let mut context = Context { is_nested: true, ..outside.clone() };
         let size = tree.size();
-        let corners = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| {
-            let (x, y) = (x * f64::from(size.width()), y * f64::from(size.height()));
-            let corner = context.to_page * Point::new(x, y);
-            [corner.x, corner.y]
-        });
+        let size = [size.width(), size.height()].map(f64::from);
         let mut page = Region::default();
-        page.add(vec![corners.to_vec()], false, Vec::new());
+        page.add(vec![rectangle([0.0, 0.0], size, context.to_page)], false, Vec::new());
         context.areas.0.push(Arc::new(page));
         self.group(tree.root(), &context)
     }

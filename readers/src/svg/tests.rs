@@ -374,7 +374,7 @@ fn what_is_not_drawn_is_counted() {
         "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
          <image href='a.png' width='9' height='9'/>\
          \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
-         <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'><image href='b.png'/></mask>\
+         <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'><image href='b.png' y='5' width='9' height='9'/></mask>\
          <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
     );
     assert_eq!(
@@ -387,8 +387,8 @@ fn what_is_not_drawn_is_counted() {
              out (line 4)",
             "2 elements are not drawn: hidden, or without a size or points, or with one in a \
              unit that is not read, or a reference to nothing (the first in line 5)",
-            "1 mask is not applied, because of a gradient, an image, a pattern or a filter: what \
-             it hides is drawn",
+            "1 mask is not applied as a whole: what a gradient, an image, a pattern or a filter \
+             hides is drawn",
             "1 line is not drawn, because a dot has no length",
         ]
     );

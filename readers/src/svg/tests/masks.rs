@@ -103,22 +103,27 @@ fn the_border_of_a_mask_is_an_outline_of_what_is_only_filled_once() {
 }
 
 #[test]
-fn a_soft_mask_is_named_and_what_it_hides_is_drawn() {
-    let fade = "<linearGradient id='l'><stop stop-color='white'/><stop offset='1'/>\
-                </linearGradient>";
-    for contents in [
-        "<rect width='100' height='100' fill='url(#l)'/>",
-        "<image href='data:image/png;base64,iVBORw0KGgo=' width='100' height='100'/>\
-         <rect width='100' height='100' fill='white' filter='url(#b)'/>",
-        "<g opacity='.7'><rect width='9' height='9' fill='#fff'/><circle r='9'/></g>",
+fn what_a_soft_mask_may_hide_is_drawn_and_named() {
+    let defined = "<linearGradient id='l'><stop stop-color='white'/><stop offset='1'/>\
+                   </linearGradient><filter id='b'><feGaussianBlur stdDeviation='3'/></filter>";
+    for (contents, left) in [
+        ("<rect x='20' width='60' height='100' fill='url(#l)'/>", [20.0, 80.0]),
+        (
+            "<image href='data:image/png;base64,iVBORw0KGgo=' x='20' width='60' height='100' \
+          preserveAspectRatio='none'/>",
+            [20.0, 80.0],
+        ),
+        ("<rect x='20' width='60' height='100' fill='white' filter='url(#b)'/>", [0.0, 100.0]),
+        (
+            "<g opacity='.7'><rect width='9' height='9' fill='#fff'/><circle r='9'/></g>",
+            [0.0, 100.0],
+        ),
     ] {
-        let blur = "<filter id='b'><feGaussianBlur stdDeviation='3'/></filter>";
-        let mask = format!(
-            "{fade}{blur}<mask id='m' maskUnits='userSpaceOnUse' width='100' height='100'>{contents}</mask>"
-        );
-        let contents = read(&masked(&mask)).expect("an SVG");
-        assert_eq!(polylines(&contents)[0].1, [[0.0, 50.0], [100.0, 50.0]]);
-        let notes = contents.notes();
-        assert!(notes[0].starts_with("1 mask is not applied, because"), "{notes:?}");
+        let attributes = "maskUnits='userSpaceOnUse' width='100' height='100'";
+        let mask = format!("{defined}<mask id='m' {attributes}>{contents}</mask>");
+        let read = read(&masked(&mask)).expect("an SVG");
+        assert_eq!(polylines(&read)[0].1, [[left[0], 50.0], [left[1], 50.0]], "{contents}");
+        let notes = read.notes();
+        assert!(notes[0].starts_with("1 mask is not applied as a whole"), "{notes:?}");
     }
 }
