@@ -109,8 +109,58 @@ pub fn parse(
 fn fonts_of_this_computer() -> Database {
     let mut fonts = Database::new();
     fonts.load_system_fonts();
+    let installed = |names: &[&str]| {
+        let is_there = |name: &&str| {
+            let mut families = fonts.faces().flat_map(|face| &face.families);
+            families.any(|(family, _)| family == name)
+        };
+        names.iter().copied().find(is_there).map(str::to_owned)
+    };
+    let [plain, serif, fixed] = [&SANS_SERIF[..], &SERIF, &MONOSPACE].map(installed);
+    if let Some(family) = plain {
+        fonts.set_sans_serif_family(family);
+    }
+    if let Some(family) = serif {
+        fonts.set_serif_family(family);
+    }
+    if let Some(family) = fixed {
+        fonts.set_monospace_family(family);
+    }
     fonts
 }
+
+/// The families that serve as fonts without serifs, the first that is installed before the others.
+const SANS_SERIF: [&str; 7] = [
+    "Arial",
+    "Helvetica",
+    "Liberation Sans",
+    "Nimbus Sans",
+    "DejaVu Sans",
+    "Noto Sans",
+    "FreeSans",
+];
+
+/// The families that serve as fonts with serifs.
+const SERIF: [&str; 7] = [
+    "Times New Roman",
+    "Times",
+    "Liberation Serif",
+    "Nimbus Roman",
+    "DejaVu Serif",
+    "Noto Serif",
+    "FreeSerif",
+];
+
+/// The families that serve as fonts whose letters are equally wide.
+const MONOSPACE: [&str; 7] = [
+    "Courier New",
+    "Courier",
+    "Liberation Mono",
+    "Nimbus Mono PS",
+    "DejaVu Sans Mono",
+    "Noto Sans Mono",
+    "FreeMono",
+];
 
 fn open(path: &Path) -> io::Result<(File, Metadata)> {
     let file = File::open(path)?;

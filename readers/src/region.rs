@@ -65,6 +65,8 @@ struct Part {
     rows: Vec<Vec<u32>>,
     low: f64,
     row: f64,
+    /// The least and the greatest x.
+    width: [f64; 2],
 }
 
 impl Region {
@@ -142,7 +144,12 @@ impl Part {
         // A part without height has one row.
         let row = ((high - low) / count as f64).max(f64::MIN_POSITIVE);
         let (shade, rows) = (Shade::CLEAR, Vec::new());
-        let mut part = Self { outlines, is_even_odd, within, shade, sides, rows, low, row };
+        let places = || sides.iter().flatten().map(|point| point[0]);
+        let width = [
+            places().fold(f64::INFINITY, f64::min) - SLACK,
+            places().fold(f64::NEG_INFINITY, f64::max) + SLACK,
+        ];
+        let mut part = Self { outlines, is_even_odd, within, shade, sides, rows, low, row, width };
         let mut rows = vec![Vec::new(); count];
         for (number, [from, to]) in (0..).zip(&part.sides) {
             let range = part.rows_between(from[1].min(to[1]), from[1].max(to[1]), count);
@@ -167,6 +174,9 @@ impl Part {
     }
 
     fn contains(&self, point: Point) -> bool {
+        if !(self.width[0]..=self.width[1]).contains(&point[0]) {
+            return false;
+        }
         let rows = self.rows_between(point[1], point[1], self.rows.len());
         let sides = self.rows.get(rows.start).filter(|_| !rows.is_empty()).into_iter().flatten();
         let mut turns = 0_i32;
@@ -191,6 +201,9 @@ impl Part {
         at: &mut Vec<f64>,
         budget: &mut usize,
     ) -> Option<()> {
+        if from[0].max(to[0]) < self.width[0] || from[0].min(to[0]) > self.width[1] {
+            return Some(());
+        }
         let way = minus(to, from);
         let square = dot(way, way);
         let (low, high) = (from[1].min(to[1]) - SLACK, from[1].max(to[1]) + SLACK);

@@ -117,9 +117,9 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let markup = Markup::new(&document);
     let with_areas = arrangement.hatch.is_some();
     let drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
-        "the SVG has too many points, too large clip paths, or a curve of kilometres: leave it \
-         out"
-        .to_owned()
+        "the SVG has too many points, too large clip paths or masks, or a curve of kilometres: \
+         leave it out"
+            .to_owned()
     })?;
     let mut plan = Plan::new(file.to_owned());
     let mut areas = Vec::new();

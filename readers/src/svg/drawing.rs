@@ -25,6 +25,9 @@ const SLACK: f64 = 0.01;
 /// The most points before points are left out. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
 
+/// The most work at clip paths and masks: a minute of an old computer.
+const MOST_WORK: usize = 300_000_000;
+
 /// A path of the drawing.
 #[derive(Debug)]
 pub(super) struct Shape {
@@ -51,6 +54,8 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     with_areas: bool,
     /// How many points more fit in memory.
     pub(super) budget: usize,
+    /// How much work at clip paths and masks is left.
+    work: usize,
     /// The paths in the order of the file.
     pub(super) shapes: Vec<Shape>,
     /// The elements that were found in the tree.
@@ -111,6 +116,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             page,
             with_areas,
             budget: MOST_POINTS,
+            work: MOST_WORK,
             shapes: Vec::new(),
             seen: HashSet::new(),
             invisible: 0,
@@ -342,7 +348,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             let points = polyline.positions();
             match points.first().filter(|_| length(&points) == 0.0) {
                 Some(dot) => parts.extend(areas.contain(*dot).then_some(points)),
-                None => parts.extend(areas.cut(&points, &mut self.budget)?),
+                None => parts.extend(areas.cut(&points, &mut self.work)?),
             }
         }
         if is_only_filled {
@@ -351,7 +357,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             shape.add(outlines, is_even_odd(path), Vec::new());
             let page = &self.page;
             let is_beyond = |[x, y]: [f64; 2]| page.depth(Point::new(x, y)) < SLACK;
-            parts.extend(areas.borders_within(&Arc::new(shape), is_beyond, &mut self.budget)?);
+            parts.extend(areas.borders_within(&Arc::new(shape), is_beyond, &mut self.work)?);
         }
         let of_points = |points: Vec<[f64; 2]>| {
             let points = points.into_iter().map(|[x, y]| Point::new(x, y)).collect();
