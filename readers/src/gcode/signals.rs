@@ -142,7 +142,7 @@ fn between_most_visited(levels: &[Option<f64>]) -> Option<f64> {
     let groups = visited.chunk_by(|one, other| (one - other).abs() < SAME);
     let mut counts: Vec<(usize, f64)> =
         groups.filter_map(|group| Some((group.len(), *group.first()?))).collect();
-    counts.sort_by(|one, other| other.0.cmp(&one.0));
+    counts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
     match counts.as_slice() {
         [(_, one), (_, other), ..] => Some(f64::midpoint(*one, *other)),
         _ => None,
