@@ -2,6 +2,7 @@
 
 use crate::error::Error;
 use fontdb::Database;
+use penup_readers::files::Files;
 use penup_readers::fonts::Fonts;
 use penup_readers::{
     Arrangement, BEGINNING, ReadError, SIZE_LIMIT, SourceFile, check_beginning, takes_deep_stack,
@@ -45,7 +46,38 @@ pub fn read(path: &Path, arrangement: &Arrangement) -> Result<SourceFile, Error>
     }
     let rest = SIZE_LIMIT - bytes.len() as u64;
     file.take(rest).read_to_end(&mut bytes).map_err(unreadable)?;
-    Ok(parse(name, bytes, arrangement)?)
+    let folder = path.parent().map(Path::to_path_buf).unwrap_or_default();
+    let files = Files::read_by(move |path| referred(&folder, path));
+    Ok(parse(name, bytes, &arrangement.clone().with_files(files))?)
+}
+
+/// The contents of the SVG to which a file in `folder` refers; `None` if there is none at this
+/// path.
+fn referred(folder: &Path, path: &str) -> Option<Vec<u8>> {
+    let path = path.strip_prefix("file://").unwrap_or(path);
+    let path = folder.join(without_percents(path)?);
+    let is_svg = path.extension()?.eq_ignore_ascii_case("svg");
+    if !is_svg {
+        return None;
+    }
+    // A device or a pipe may have no end.
+    let about = std::fs::metadata(&path).ok()?;
+    if about.is_file() { std::fs::read(&path).ok() } else { None }
+}
+
+/// A path in which letters may stand as `%` and two hexadecimal digits; `None` if they are no
+/// UTF-8.
+fn without_percents(path: &str) -> Option<String> {
+    let mut bytes = Vec::new();
+    let mut rest = path.as_bytes();
+    while let Some((byte, after)) = rest.split_first() {
+        let digits = after.get(..2).and_then(|digits| std::str::from_utf8(digits).ok());
+        let code = digits.and_then(|digits| u8::from_str_radix(digits, 16).ok());
+        let code = code.filter(|_| *byte == b'%');
+        bytes.push(code.unwrap_or(*byte));
+        rest = if code.is_some() { after.get(2..)? } else { after };
+    }
+    String::from_utf8(bytes).ok()
 }
 
 /// Checks `bytes`, the contents of a file called `name`, and arranges its plan. A file that may be
@@ -77,8 +109,58 @@ pub fn parse(
 fn fonts_of_this_computer() -> Database {
     let mut fonts = Database::new();
     fonts.load_system_fonts();
+    let installed = |names: &[&str]| {
+        let is_there = |name: &&str| {
+            let mut families = fonts.faces().flat_map(|face| &face.families);
+            families.any(|(family, _)| family == name)
+        };
+        names.iter().copied().find(is_there).map(str::to_owned)
+    };
+    let [plain, serif, fixed] = [&SANS_SERIF[..], &SERIF, &MONOSPACE].map(installed);
+    if let Some(family) = plain {
+        fonts.set_sans_serif_family(family);
+    }
+    if let Some(family) = serif {
+        fonts.set_serif_family(family);
+    }
+    if let Some(family) = fixed {
+        fonts.set_monospace_family(family);
+    }
     fonts
 }
+
+/// The families that serve as fonts without serifs, the first that is installed before the others.
+const SANS_SERIF: [&str; 7] = [
+    "Arial",
+    "Helvetica",
+    "Liberation Sans",
+    "Nimbus Sans",
+    "DejaVu Sans",
+    "Noto Sans",
+    "FreeSans",
+];
+
+/// The families that serve as fonts with serifs.
+const SERIF: [&str; 7] = [
+    "Times New Roman",
+    "Times",
+    "Liberation Serif",
+    "Nimbus Roman",
+    "DejaVu Serif",
+    "Noto Serif",
+    "FreeSerif",
+];
+
+/// The families that serve as fonts whose letters are equally wide.
+const MONOSPACE: [&str; 7] = [
+    "Courier New",
+    "Courier",
+    "Liberation Mono",
+    "Nimbus Mono PS",
+    "DejaVu Sans Mono",
+    "Noto Sans Mono",
+    "FreeMono",
+];
 
 fn open(path: &Path) -> io::Result<(File, Metadata)> {
     let file = File::open(path)?;

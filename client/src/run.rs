@@ -294,7 +294,10 @@ impl Source {
             corner.iter().take(axes).map(part).collect::<Vec<_>>().join(", ")
         });
         let (what, unit) = if self.is_plan { ("drawing", " mm") } else { ("model", "") };
-        outcome.text += &format!("; the {what} reaches from {low} to {high}{unit}");
+        // What is drawn of a solid lies elsewhere, of course.
+        let is_scaled = self.is_plan && self.settings.value("fit") == Some("on");
+        let before = if is_scaled { "before it is fitted to the page, " } else { "" };
+        outcome.text += &format!("; {before}the {what} reaches from {low} to {high}{unit}");
         if let Value::Object(fields) = &mut outcome.json {
             fields.insert("bounds".to_owned(), json!(corners));
         }

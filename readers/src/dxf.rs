@@ -1,12 +1,15 @@
 //! Reads the text form of DXF as plans: lines, polylines with bulges, arcs, circles, ellipses and
-//! splines, points, level faces and dimensions, also in blocks, as they are seen from above.
+//! splines, points, level faces and dimensions, also in blocks, as they are seen from above, with
+//! the dashes of their line types.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
 //! refuses the binary form, and a file that does not consist of pairs of a code and a value.
 
 mod curves;
+mod dashes;
 mod document;
+mod space;
 
 use super::arrange::Arrangement;
 use super::counted;
@@ -15,7 +18,9 @@ use super::format::{Contents, Format};
 use super::plan::{Plan, Point, number_in};
 use crate::lines::Origin;
 use curves::{Affine, Curve, Spline};
+use dashes::dashed;
 use document::{Document, Entity, Refusal, document, number, pairs};
+use space::Plane;
 use std::collections::{BTreeMap, HashMap, HashSet};
 
 /// The format itself.
@@ -51,6 +56,10 @@ struct Drawing<'d, 'a> {
     /// The number of entities of a kind that are not drawn, and the line of the first.
     skipped: BTreeMap<String, (usize, usize)>,
     points: usize,
+    /// The length of a unit of the file in mm.
+    unit: f64,
+    /// The number of lines with too many dashes.
+    undashed: usize,
 }
 
 impl<'d, 'a> Drawing<'d, 'a> {
@@ -79,10 +88,12 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 ("0", Some(outer)) => outer,
                 (own, _) => own,
             };
-            if self.document.hidden.contains(layer) {
+            if self.document.is_hidden(layer) {
                 self.skip("entities on layers that are off or frozen", entity.line);
             } else if entity.number(67, 0.0)? != 0.0 {
                 self.skip("entities in paper space", entity.line);
+            } else if entity.number(60, 0.0)? != 0.0 {
+                self.skip("invisible entities", entity.line);
             } else {
                 let vertices = entities.get(first..at).unwrap_or_default();
                 self.entity(entity, vertices, to_page, layer, depth)?;
@@ -99,19 +110,19 @@ impl<'d, 'a> Drawing<'d, 'a> {
         layer: &'a str,
         depth: usize,
     ) -> Result<(), Refusal> {
-        // What was drawn from below is mirrored.
-        let normal = [entity.number(210, 0.0)?, entity.number(220, 0.0)?, entity.number(230, 1.0)?];
-        let is_level = normal[0].hypot(normal[1]) < 1e-9;
-        let mirrored = Affine([-1.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
-        let is_planar = !matches!(entity.kind, "LINE" | "ELLIPSE" | "SPLINE");
-        let to_page = match is_planar && normal[2] < 0.0 {
-            true => to_page.after(mirrored),
-            false => to_page,
+        let up = [entity.number(210, 0.0)?, entity.number(220, 0.0)?, entity.number(230, 1.0)?];
+        let plane = Plane::of(up);
+        // The points of these are those of the world, whatever is up.
+        let is_planar = match entity.kind {
+            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" => false,
+            "POLYLINE" => entity.flags()? & (8 | 16 | 64) == 0,
+            _ => true,
         };
-        if is_planar && !is_level {
-            self.skip(&format!("{}, tilted", entity.kind), entity.line);
-            return Ok(());
-        }
+        let height = match entity.kind {
+            "LWPOLYLINE" => entity.number(38, 0.0)?,
+            _ => entity.number(30, 0.0)?,
+        };
+        let to_page = if is_planar { to_page.after(plane.seen(height)) } else { to_page };
         let curve = match entity.kind {
             "LINE" => Curve::polyline(&[entity.point(10)?, entity.point(11)?]),
             "LWPOLYLINE" => bulged(&light(entity)?, entity.flags()? & 1 == 1),
@@ -140,8 +151,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "ELLIPSE" => {
                 let [start, end] =
                     [entity.number(41, 0.0)?, entity.number(42, std::f64::consts::TAU)?];
-                let ratio = entity.number(40, 1.0)? * normal[2].signum();
-                Curve::ellipse(entity.point(10)?, entity.point(11)?, ratio, [start, end])
+                let ratio = entity.number(40, 1.0)?;
+                let long = entity.point_in_space(11)?;
+                let short = plane.turned(long).map(|part| part * ratio);
+                let axes = [[long[0], long[1]], [short[0], short[1]]];
+                Curve::ellipse(entity.point(10)?, axes, [start, end])
             }
             "SPLINE" => {
                 let spline = Spline {
@@ -159,7 +173,12 @@ impl<'d, 'a> Drawing<'d, 'a> {
             }
             "POINT" => Curve::polyline(&[entity.point(10)?]),
             "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {
-                Some(outline) => Curve::polyline(&outline),
+                Some(sides) => {
+                    for side in sides {
+                        self.draw(entity, layer, to_page, &Curve::polyline(&side))?;
+                    }
+                    return Ok(());
+                }
                 None => {
                     self.skip(&format!("{}, not level", entity.kind), entity.line);
                     return Ok(());
@@ -177,10 +196,38 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 return Ok(());
             }
         };
+        self.draw(entity, layer, to_page, &curve)
+    }
+
+    /// Draws a curve of an entity, with its line type.
+    fn draw(
+        &mut self,
+        entity: &'d Entity<'a>,
+        layer: &'a str,
+        to_page: Affine,
+        curve: &Curve,
+    ) -> Result<(), Refusal> {
         let too_many = || (entity.line, "the file has too many points to be drawn".to_owned());
         let points = curve.flattened(to_page, MOST_POINTS - self.points).ok_or_else(too_many)?;
-        self.points += points.len();
-        self.strokes.push((entity.line, entity.kind, layer, points));
+        let lengths = self.document.dashes(entity, layer)?;
+        let lengths: Vec<f64> = lengths.into_iter().map(|length| length * self.unit).collect();
+        let pieces = match lengths.is_empty() {
+            true => vec![points],
+            false => match dashed(points.clone(), &lengths) {
+                Some(pieces) => pieces,
+                None => {
+                    self.undashed += 1;
+                    vec![points]
+                }
+            },
+        };
+        for points in pieces {
+            self.points += points.len();
+            if self.points > MOST_POINTS {
+                return Err(too_many());
+            }
+            self.strokes.push((entity.line, entity.kind, layer, points));
+        }
         Ok(())
     }
 
@@ -220,7 +267,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
 
     /// The block that an entity names: its base point and its entities.
     fn block(&self, entity: &Entity<'_>) -> Option<&'d (Point, Vec<Entity<'a>>)> {
-        self.document.blocks.get(entity.text(2).unwrap_or_default())
+        self.document.block(entity.text(2).unwrap_or_default())
     }
 
     /// Draws the entities of a block.
@@ -243,13 +290,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
     }
 }
 
-/// The closed outline of a face or of a filled triangle or quadrilateral, whose corners stand
-/// crosswise except in a face; `None` if it is not level.
-fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Point>>, Refusal> {
-    let order: [i32; 5] = match entity.kind {
-        "3DFACE" => [10, 11, 12, 13, 10],
-        _ => [10, 11, 13, 12, 10],
-    };
+/// The sides of a face that are visible, or the closed outline of a filled triangle or
+/// quadrilateral, whose corners stand crosswise; `None` if it is not level.
+fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Vec<Point>>>, Refusal> {
+    let is_face = entity.kind == "3DFACE";
+    let order: [i32; 4] = if is_face { [10, 11, 12, 13] } else { [10, 11, 13, 12] };
     let last = if entity.text(13).is_some() { 13 } else { 12 };
     let mut corners = Vec::new();
     for code in order {
@@ -260,8 +305,19 @@ fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Point>>, Refusal> {
         }
         corners.push(entity.point(code)?);
     }
-    corners.dedup();
-    Ok(Some(corners))
+    let hidden = if is_face { entity.flags()? } else { 0 };
+    let mut sides: Vec<Vec<Point>> = Vec::new();
+    let ends = corners.iter().cycle().skip(1);
+    for (number, (from, to)) in corners.iter().zip(ends).enumerate() {
+        if hidden & (1 << number) != 0 || from == to {
+            continue;
+        }
+        match sides.last_mut() {
+            Some(side) if side.last() == Some(from) => side.push(*to),
+            _ => sides.push(vec![*from, *to]),
+        }
+    }
+    Ok(Some(sides))
 }
 
 /// The corners of a polyline of the new form, each with the bulge of the side that follows.
@@ -348,6 +404,8 @@ impl Format for Dxf {
             strokes: Vec::new(),
             skipped: BTreeMap::new(),
             points: 0,
+            unit,
+            undashed: 0,
         };
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
         drawing.all(&document.entities, to_page, None, 0).map_err(in_line)?;
@@ -383,12 +441,24 @@ impl Format for Dxf {
             .iter()
             .map(|(what, (count, line))| match count {
                 1 => {
-                    let what = what.replacen("entities ", "entity ", 1);
+                    let what = what.replacen("entities", "entity", 1);
                     format!("1 {what} is not drawn (line {line})")
                 }
                 _ => format!("{count} {what} are not drawn (the first in line {line})"),
             })
             .collect();
+        for (number, nouns, what) in [
+            (
+                document.clipped,
+                ["inserted block is", "inserted blocks are"],
+                "clipped in the file (XCLIP), which is not obeyed: the whole is drawn",
+            ),
+            (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
+        ] {
+            if number > 0 {
+                notes.push(format!("{} {what}", counted(number, nouns)));
+            }
+        }
         if document.unit.unwrap_or(0) == 0 {
             notes.push("the file does not say its unit: it is taken as mm".to_owned());
         }

@@ -1,14 +1,12 @@
 //! Reads G-code as a plan: what the pen draws, not how the machine of the program moved.
 //!
 //! [`Interpreter`] follows the modes of the program and gives its moves, each with the signals that
-//! may lift a pen. Which of them does is decided on the whole program, in this order: the angle of
-//! a servo (`M280`, `M300`), the height Z, the spindle or laser (`M3`, `M4`, `M5` and its power S),
-//! or, if none of these changes between moves, G1 to G3 draw and G0 does not. Of the two levels
-//! of a signal, that of most moves by G0 is up; without such moves the higher Z is up, and for a
-//! servo the level of the first move. A laser with the power 0 does not draw.
+//! may lift a pen. [`signals`] decides on the whole program which of them does.
 //!
 //! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
 //! reader refuses arcs that do not exist, and numbers that it cannot read.
+
+mod signals;
 
 use super::arrange::Arrangement;
 use super::error::ReadError;
@@ -33,6 +31,8 @@ const MOST_POINTS: usize = 10_000_000;
 struct Signals {
     servo: Option<f64>,
     height: Option<f64>,
+    /// Whether the height has grown when it changed last: 1.0, or -1.0 if it has not.
+    growth: Option<f64>,
     /// Whether the spindle is on; `None` if the program has not said.
     spindle: Option<bool>,
     power: Option<f64>,
@@ -74,6 +74,8 @@ struct Interpreter {
     signals: Signals,
     moves: Vec<Move>,
     points: usize,
+    /// Whether a height was given as such, and not as a distance.
+    has_absolute_heights: bool,
     /// The words that were not obeyed, with their count and the first line.
     unknown: BTreeMap<String, (usize, usize)>,
 }
@@ -94,6 +96,7 @@ impl Interpreter {
             signals: Signals::default(),
             moves: Vec::new(),
             points: 0,
+            has_absolute_heights: false,
             unknown: BTreeMap::new(),
         }
     }
@@ -173,7 +176,12 @@ impl Interpreter {
             Some(value) => origin[axis] + value * unit,
         };
         if value('Z').is_some() {
+            let before = self.height;
             self.height = target('Z', 2, self.height);
+            self.has_absolute_heights |= !is_relative;
+            if self.height != before {
+                self.signals.growth = Some((self.height - before).signum());
+            }
             self.signals.height = Some(self.height);
         }
         let to = [target('X', 0, self.at[0]), target('Y', 1, self.at[1])];
@@ -289,47 +297,6 @@ fn words(text: &str) -> Result<Vec<(char, f64)>, Refusal> {
     Ok(words)
 }
 
-/// Decides for each move whether it draws.
-fn inked(moves: &[Move]) -> Vec<bool> {
-    let by_level = |level: &dyn Fn(&Signals) -> Option<f64>, high_is_up: Option<bool>| {
-        let levels: Vec<Option<f64>> = moves.iter().map(|it| level(&it.signals)).collect();
-        let known = || levels.iter().copied().flatten();
-        let least = known().fold(f64::INFINITY, f64::min);
-        let greatest = known().fold(f64::NEG_INFINITY, f64::max);
-        if greatest - least < 1e-6 || known().next().is_none() {
-            return None;
-        }
-        let middle = f64::midpoint(least, greatest);
-        // The way by G0 at either level says which of them is up.
-        let rapid = |high: bool| -> f64 {
-            let at_level = |level: &Option<f64>| level.is_some_and(|it| (it > middle) == high);
-            let pairs = moves.iter().zip(&levels);
-            let rapid = pairs.filter(|(it, level)| it.is_rapid && at_level(level));
-            rapid.map(|(it, _)| it.length()).sum()
-        };
-        let first = || known().next().is_some_and(|level| level > middle);
-        let high_is_up = match (rapid(true), rapid(false)) {
-            (high, low) if high != low => high > low,
-            _ => high_is_up.unwrap_or_else(first),
-        };
-        // Before the first level the pen is up.
-        let draws = |level: &Option<f64>| level.is_some_and(|it| (it > middle) != high_is_up);
-        Some(levels.iter().map(draws).collect::<Vec<bool>>())
-    };
-    let spindle = || {
-        let is_on = |it: &Move| it.signals.spindle == Some(true) && it.signals.power != Some(0.0);
-        let draws: Vec<bool> = moves.iter().map(is_on).collect();
-        // A spindle that only runs before the first move lifts no pen.
-        (draws.contains(&true) && draws.contains(&false)).then_some(draws)
-    };
-    let power = |signals: &Signals| signals.spindle.filter(|on| *on).and(signals.power);
-    by_level(&|signals| signals.servo, None)
-        .or_else(|| by_level(&|signals| signals.height, Some(true)))
-        .or_else(spindle)
-        .or_else(|| by_level(&power, None))
-        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect())
-}
-
 impl Format for GCode {
     fn name(&self) -> &'static str {
         "G-code"
@@ -376,7 +343,7 @@ impl Format for GCode {
             }
         }
         let mut plan = Plan::new(file.clone());
-        let drawn = inked(&interpreter.moves);
+        let drawn = signals::inked(&interpreter.moves, interpreter.has_absolute_heights);
         let mut pairs = interpreter.moves.iter().zip(drawn).filter(|(_, draws)| *draws).peekable();
         while let Some((first, _)) = pairs.next() {
             let mut points = first.points.clone();

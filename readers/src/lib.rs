@@ -16,6 +16,7 @@ mod arrange;
 #[cfg(feature = "dxf")]
 mod dxf;
 mod error;
+pub mod files;
 pub mod fonts;
 mod format;
 mod gcode;

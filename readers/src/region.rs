@@ -1,13 +1,16 @@
 //! Areas of any form, and what they leave of lines.
 //!
 //! A region is the union of parts, each of which is what its outlines surround by the rule of
-//! filling. Whether a line is inside is asked of the middle of each of its pieces between two
+//! filling. The parts of a mask lie on each other instead: a dark one hides what those below let
+//! through, and the region is where at least half of the light comes through. Whether a line is inside is asked of the middle of each of its pieces between two
 //! crossings, so no crossing is ever taken for an entry or an exit. A line along the border is
 //! inside.
 
 #![cfg_attr(not(feature = "svg"), expect(dead_code, reason = "only SVG files have clip paths"))]
 
 use crate::plan::Point;
+use std::cell::RefCell;
+use std::collections::HashSet;
 use std::sync::Arc;
 
 /// How far outside of a region a line may lie without being cut, in mm: less than is written.
@@ -22,11 +25,29 @@ const MOST_ROWS: usize = 4096;
 /// How many tests of a side take as long as a point of a curve.
 const TESTS: usize = 64;
 
+/// The least part of the light that comes through a mask where it hides nothing: a half, less what
+/// single precision adds.
+const HALF: f64 = 0.5 - 1e-6;
+
 /// The work is more than the budget.
 #[derive(Debug)]
 pub(crate) struct TooMuch;
 
-/// The union of some parts.
+/// What a part of a mask adds to those below it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Shade {
+    /// How much light comes through where it is opaque, 0 to 1.
+    pub(crate) light: f64,
+    /// How much of what lies below it covers, 0 to 1.
+    pub(crate) alpha: f64,
+}
+
+impl Shade {
+    /// It lets all light through, whatever lies below.
+    pub(crate) const CLEAR: Self = Self { light: 1.0, alpha: 1.0 };
+}
+
+/// The union of some parts, or what some parts of a mask let through.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Region {
     parts: Vec<Part>,
@@ -38,11 +59,14 @@ struct Part {
     outlines: Vec<Vec<Point>>,
     is_even_odd: bool,
     within: Vec<Arc<Region>>,
+    shade: Shade,
     sides: Vec<[Point; 2]>,
     /// The sides that reach into each row, and the least y and the height of the rows.
     rows: Vec<Vec<u32>>,
     low: f64,
     row: f64,
+    /// The least and the greatest x.
+    width: [f64; 2],
 }
 
 impl Region {
@@ -54,12 +78,31 @@ impl Region {
         is_even_odd: bool,
         within: Vec<Arc<Region>>,
     ) {
-        self.parts.push(Part::new(outlines, is_even_odd, within));
+        self.add_shade(outlines, is_even_odd, within, Shade::CLEAR);
+    }
+
+    /// Lays a part of a mask on those that were added before; see [`Region::add`].
+    pub(crate) fn add_shade(
+        &mut self,
+        outlines: Vec<Vec<Point>>,
+        is_even_odd: bool,
+        within: Vec<Arc<Region>>,
+        shade: Shade,
+    ) {
+        self.parts.push(Part { shade, ..Part::new(outlines, is_even_odd, within) });
     }
 
     /// Whether a point is inside; one on the border may be or not.
     pub(crate) fn contains(&self, point: Point) -> bool {
-        self.parts.iter().any(|part| part.contains(point))
+        let (mut light, mut uncovered) = (0.0, 1.0);
+        for part in self.parts.iter().rev().filter(|part| part.contains(point)) {
+            light += uncovered * part.shade.alpha * part.shade.light;
+            uncovered *= 1.0 - part.shade.alpha;
+            if uncovered == 0.0 {
+                break;
+            }
+        }
+        light >= HALF
     }
 
     /// Whether a line through `point` is inside, to whose left `left` leads by [`SLACK`].
@@ -100,7 +143,13 @@ impl Part {
         let count = (sides.len() / 2).clamp(1, MOST_ROWS);
         // A part without height has one row.
         let row = ((high - low) / count as f64).max(f64::MIN_POSITIVE);
-        let mut part = Self { outlines, is_even_odd, within, sides, rows: Vec::new(), low, row };
+        let (shade, rows) = (Shade::CLEAR, Vec::new());
+        let places = || sides.iter().flatten().map(|point| point[0]);
+        let width = [
+            places().fold(f64::INFINITY, f64::min) - SLACK,
+            places().fold(f64::NEG_INFINITY, f64::max) + SLACK,
+        ];
+        let mut part = Self { outlines, is_even_odd, within, shade, sides, rows, low, row, width };
         let mut rows = vec![Vec::new(); count];
         for (number, [from, to]) in (0..).zip(&part.sides) {
             let range = part.rows_between(from[1].min(to[1]), from[1].max(to[1]), count);
@@ -125,6 +174,9 @@ impl Part {
     }
 
     fn contains(&self, point: Point) -> bool {
+        if !(self.width[0]..=self.width[1]).contains(&point[0]) {
+            return false;
+        }
         let rows = self.rows_between(point[1], point[1], self.rows.len());
         let sides = self.rows.get(rows.start).filter(|_| !rows.is_empty()).into_iter().flatten();
         let mut turns = 0_i32;
@@ -149,6 +201,9 @@ impl Part {
         at: &mut Vec<f64>,
         budget: &mut usize,
     ) -> Option<()> {
+        if from[0].max(to[0]) < self.width[0] || from[0].min(to[0]) > self.width[1] {
+            return Some(());
+        }
         let way = minus(to, from);
         let square = dot(way, way);
         let (low, high) = (from[1].min(to[1]) - SLACK, from[1].max(to[1]) + SLACK);
@@ -219,13 +274,18 @@ impl Regions {
         for (number, region) in self.0.iter().enumerate() {
             // Where two borders lie on each other, the first one counts.
             let (before, others) = self.0.split_at(number);
+            // So it is where two parts of the same region have one border.
+            let found = RefCell::new(HashSet::new());
             let keeps = |at: Point, left: Point| {
                 let both = beside(at, left);
                 let is_inside = both
                     .iter()
                     .all(|it| shape.contains(*it) && before.iter().all(|area| area.contains(*it)));
                 let [one, other] = both.map(|it| others.iter().all(|area| area.contains(it)));
-                is_inside && one != other && !both.into_iter().any(&is_free)
+                is_inside
+                    && one != other
+                    && !both.into_iter().any(&is_free)
+                    && found.borrow_mut().insert(cell(at, left))
             };
             for outline in region.outlines() {
                 borders.extend(pieces(outline, &all, keeps, budget)?);
@@ -313,6 +373,14 @@ fn pairs(points: &[Point]) -> impl Iterator<Item = [Point; 2]> {
 /// The points to the left and to the right of a line through `point`.
 fn beside(point: Point, left: Point) -> [Point; 2] {
     [[point[0] + left[0], point[1] + left[1]], minus(point, left)]
+}
+
+/// What is the same for two lines through a point in the same direction or its opposite.
+fn cell(point: Point, left: Point) -> [i64; 4] {
+    let sign = if (left[0], left[1]) < (0.0, 0.0) { -1.0 } else { 1.0 };
+    let direction = left.map(|part| (sign * part / SLACK * 1e3).round() as i64);
+    let place = point.map(|part| (part / SLACK).round() as i64);
+    [place[0], place[1], direction[0], direction[1]]
 }
 
 fn minus(a: Point, b: Point) -> Point {

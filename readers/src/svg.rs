@@ -9,16 +9,19 @@
 //! a dot with round or square ends is a very short line; a shape that is only filled is drawn as
 //! its outline. What has neither is not drawn. Texts are drawn as the outlines of their letters, if
 //! the caller knows fonts. Clip paths cut lines off, and are a part of the outline of what is only
-//! filled. Images, masks, filters and patterns are counted, and the user is told.
+//! filled, and so do masks ([`areas`]). An image that is an SVG is drawn ([`embedded`]). Other
+//! images, filters and patterns are counted, and the user is told.
 //!
 //! The names of layers may hold the codes of AxiDraw ([`axidraw`]).
 //!
 //! The reader refuses files that are no SVG, have nothing to draw, or have more points than fit in
 //! memory.
 
+mod areas;
 mod axidraw;
 mod clip;
 mod drawing;
+mod embedded;
 mod flatten;
 mod markup;
 mod pens;
@@ -34,10 +37,12 @@ use super::plan::{Area, Plan};
 use crate::page::Page;
 use crate::region::length;
 use drawing::{Drawing, PIXEL};
+use embedded::Embedded;
 use markup::Markup;
+use std::sync::Arc;
 use text::TextFonts;
 use usvg::roxmltree::Error as XmlError;
-use usvg::{Error, ImageHrefResolver, Options, Tree};
+use usvg::{Error, Options, Tree};
 
 /// The format itself.
 #[derive(Debug)]
@@ -91,14 +96,9 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let not_xml = |error| format!("this is not a well-formed SVG: {error}");
     let text = markup::with_ids(text, &markup::parsed(text).map_err(not_xml)?);
     let document = markup::parsed(&text).map_err(not_xml)?;
-    let mut options = Options {
-        // Neither is an image drawn, nor any other file read.
-        image_href_resolver: ImageHrefResolver {
-            resolve_data: Box::new(|_, _, _| None),
-            resolve_string: Box::new(|_, _| None),
-        },
-        ..Options::default()
-    };
+    let mut options = Options::default();
+    let embedded = Arc::new(Embedded::default());
+    embedded.serve(&mut options, arrangement.files.clone());
     let fonts = markup::has_text(&document).then(|| TextFonts::find(arrangement.fonts)).flatten();
     if let Some(fonts) = &fonts {
         fonts.serve(&mut options);
@@ -117,9 +117,9 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let markup = Markup::new(&document);
     let with_areas = arrangement.hatch.is_some();
     let drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
-        "the SVG has too many points, too large clip paths, or a curve of kilometres: leave it \
-         out"
-        .to_owned()
+        "the SVG has too many points, too large clip paths or masks, or a curve of kilometres: \
+         leave it out"
+            .to_owned()
     })?;
     let mut plan = Plan::new(file.to_owned());
     let mut areas = Vec::new();
@@ -143,6 +143,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     plan.layers = chosen.layers;
     plan.areas = Some(areas);
     let mut notes = markup.left_out(&drawing.seen, fonts.is_some());
+    notes.extend(embedded.notes(fonts.is_some()));
     notes.extend(fonts.iter().flat_map(|fonts| fonts.notes(&drawing.texts)));
     notes.extend(pens::not_obeyed(&marks));
     notes.extend(not_as_it_is(&drawing));
@@ -185,7 +186,17 @@ fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
             ["path has", "paths have"],
             "a pattern, which is not drawn: only the path is",
         ),
-        (drawing.masks, ["mask is", "masks are"], "not applied: what it hides is drawn"),
+        (
+            drawing.nested_images,
+            ["image in an SVG that is an image is", "images in an SVG that is an image are"],
+            "not drawn",
+        ),
+        (
+            drawing.masks,
+            ["mask is", "masks are"],
+            "not applied as a whole: what a gradient, an image, a pattern or a filter hides is \
+             drawn",
+        ),
         (drawing.filters, ["filter is", "filters are"], "not applied"),
         (
             drawing.strokeless,

@@ -31,7 +31,7 @@ struct Corpus {
 const HPGL: &[&str] = &["hpg", "hpgl", "plt"];
 
 /// The collections.
-const CORPORA: [Corpus; 14] = [
+const CORPORA: [Corpus; 21] = [
     Corpus {
         name: "resvg",
         repository: "linebender/resvg",
@@ -54,6 +54,48 @@ const CORPORA: [Corpus; 14] = [
         name: "dxf",
         repository: "skymakerolof/dxf",
         commit: "9895f4f23dbda0ce504dc7b5cc1715a3c66f5ba8",
+        extensions: &["dxf"],
+    },
+    Corpus {
+        name: "axidraw",
+        repository: "evil-mad/axidraw",
+        commit: "a0df054f41f8e3ae8d408e08e7b2656968e375f1",
+        extensions: &["svg"],
+    },
+    Corpus {
+        name: "inkcut",
+        repository: "inkcut/inkcut",
+        commit: "c7a0c68980d03444f03bc019a3b4d82202efea32",
+        extensions: &["svg"],
+    },
+    Corpus {
+        name: "kibot",
+        repository: "INTI-CMNB/KiBot",
+        commit: "7362376188c458db5d38f5bee256d4cd52ee16b8",
+        extensions: &["svg"],
+    },
+    Corpus {
+        name: "drawio",
+        repository: "jgraph/drawio-diagrams",
+        commit: "4e36051b6d58c12fa3e6f105f6b28cd093ee9bad",
+        extensions: &["svg"],
+    },
+    Corpus {
+        name: "logos",
+        repository: "gilbarbara/logos",
+        commit: "42037415f0df19cd82b3853c18a967a81783f921",
+        extensions: &["svg"],
+    },
+    Corpus {
+        name: "openscad",
+        repository: "openscad/openscad",
+        commit: "e4fdec49730103274a4e21c2390b9a12882f01aa",
+        extensions: &["dxf", "svg"],
+    },
+    Corpus {
+        name: "ezdxf",
+        repository: "mozman/ezdxf",
+        commit: "5ffc690746f1a993ff0c10f4dcd408b4ecedde59",
         extensions: &["dxf"],
     },
     Corpus {

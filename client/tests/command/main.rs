@@ -167,6 +167,8 @@ fn a_plan_is_arranged_before_it_is_drawn() {
     near(&["--hatch", "3,0"], 160.0 + 520.0);
     let (_, said) = drawn(&["--center"]);
     assert!(said.contains("reaches from 85, 128.5 to 125, 168.5 mm"), "{said}");
+    let (_, said) = drawn(&["--fit"]);
+    assert!(said.contains("before it is fitted to the page, the drawing reaches"), "{said}");
     let (code, _, noted) = penup(folder.path(), &["preview", "square.gcode", "--layer", "7"]);
     assert_eq!((code, noted.contains("there is no layer \"7\"")), (Some(1), true), "{noted}");
 }

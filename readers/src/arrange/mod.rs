@@ -21,6 +21,7 @@ mod table;
 pub(crate) use crop::clip_outline;
 pub use table::{PLAN_OPTIONS, PlanOption};
 
+use crate::files::Files;
 use crate::fonts::Fonts;
 use crate::page::{A4, Page};
 use crate::plan::{Plan, Point};
@@ -60,6 +61,8 @@ pub(crate) struct Hatch {
 pub struct Arrangement {
     /// The fonts in which texts are drawn.
     pub(crate) fonts: Fonts,
+    /// The files to which the file refers.
+    pub(crate) files: Files,
     /// The page that the user has named.
     page: Option<Page>,
     turn: Turn,
@@ -88,6 +91,12 @@ impl Arrangement {
     #[must_use]
     pub fn with_fonts(self, fonts: Fonts) -> Self {
         Self { fonts, ..self }
+    }
+
+    /// The same, with these files for what refers to files.
+    #[must_use]
+    pub fn with_files(self, files: Files) -> Self {
+        Self { files, ..self }
     }
 
     /// Whether the user says what stays free on each side of the page.

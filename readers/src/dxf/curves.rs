@@ -112,17 +112,11 @@ impl Curve {
         Self::elliptic(centre, axes, start.to_radians(), turn.to_radians())
     }
 
-    /// An arc of an ellipse with this longer half axis, the `ratio` of the other to it, and these
-    /// angles in radians.
-    pub(super) fn ellipse(
-        centre: Point,
-        [x, y]: Point,
-        ratio: f64,
-        [start, end]: [f64; 2],
-    ) -> Self {
+    /// An arc of an ellipse with these half axes and angles in radians.
+    pub(super) fn ellipse(centre: Point, axes: [Point; 2], [start, end]: [f64; 2]) -> Self {
         let turn = (end - start).rem_euclid(TAU);
         let turn = if turn < 1e-9 { TAU } else { turn };
-        Self::elliptic(centre, [[x, y], [-y * ratio, x * ratio]], start, turn)
+        Self::elliptic(centre, axes, start, turn)
     }
 
     fn elliptic(centre: Point, axes: [Point; 2], start: f64, turn: f64) -> Self {

@@ -40,6 +40,11 @@ impl<'a> Entity<'a> {
         Ok([self.number(code, 0.0)?, self.number(code + 10, 0.0)?])
     }
 
+    pub(super) fn point_in_space(&self, code: i32) -> Result<[f64; 3], Refusal> {
+        let [x, y] = self.point(code)?;
+        Ok([x, y, self.number(code + 20, 0.0)?])
+    }
+
     pub(super) fn points(&self, code: i32) -> Result<Vec<Point>, Refusal> {
         let (x, y) = (self.numbers(code)?, self.numbers(code + 10)?);
         if x.len() != y.len() {
@@ -68,11 +73,45 @@ pub(super) fn number(pair: Pair<'_>) -> Result<f64, Refusal> {
 #[derive(Debug, Default)]
 pub(super) struct Document<'a> {
     pub(super) unit: Option<i64>,
-    /// The layers that are not drawn.
-    pub(super) hidden: HashSet<&'a str>,
+    /// The layers that are not drawn, in capitals: names do not depend on them.
+    hidden: HashSet<String>,
     /// The blocks with their base points.
-    pub(super) blocks: HashMap<&'a str, (Point, Vec<Entity<'a>>)>,
+    blocks: HashMap<String, (Point, Vec<Entity<'a>>)>,
+    /// The line types that are not continuous: the lengths of dashes, above 0, and gaps, below 0.
+    line_types: HashMap<String, Vec<f64>>,
+    /// The line types of layers.
+    types_of_layers: HashMap<String, &'a str>,
+    /// By what the lengths of line types are multiplied.
+    type_scale: f64,
+    /// The number of inserted blocks of which only a part is shown.
+    pub(super) clipped: usize,
     pub(super) entities: Vec<Entity<'a>>,
+}
+
+impl<'a> Document<'a> {
+    /// Whether a layer is off or frozen.
+    pub(super) fn is_hidden(&self, layer: &str) -> bool {
+        self.hidden.contains(&layer.to_uppercase())
+    }
+
+    /// The block with this name: its base point and its entities.
+    pub(super) fn block(&self, name: &str) -> Option<&(Point, Vec<Entity<'a>>)> {
+        self.blocks.get(&name.to_uppercase())
+    }
+
+    /// The lengths of the dashes and gaps of an entity on this layer, in units of the file; empty
+    /// if its line is continuous.
+    ///
+    /// # Errors
+    /// The scale of the entity is no number.
+    pub(super) fn dashes(&self, entity: &Entity<'a>, layer: &str) -> Result<Vec<f64>, Refusal> {
+        let of_layer = || self.types_of_layers.get(&layer.to_uppercase()).copied();
+        let own = entity.text(6).filter(|name| !name.eq_ignore_ascii_case("BYLAYER"));
+        let name = own.or_else(of_layer).unwrap_or_default();
+        let scale = self.type_scale * entity.number(48, 1.0)?;
+        let lengths = self.line_types.get(&name.to_uppercase());
+        Ok(lengths.into_iter().flatten().map(|length| length * scale).collect())
+    }
 }
 
 /// The pairs of a file.
@@ -108,33 +147,49 @@ pub(super) fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
 }
 
 pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> {
-    let mut document = Document::default();
+    let mut document = Document { type_scale: 1.0, ..Document::default() };
     let starts: Vec<usize> = (0..pairs.len())
         .filter(|&at| pairs[at].code == 0 && pairs[at].value == "SECTION")
         .collect();
-    for (number, &start) in starts.iter().enumerate() {
-        let end = starts.get(number + 1).copied().unwrap_or(pairs.len());
+    for (index, &start) in starts.iter().enumerate() {
+        let end = starts.get(index + 1).copied().unwrap_or(pairs.len());
         let section = &pairs[start..end];
         match section.get(1).map(|pair| pair.value) {
             Some("HEADER") => {
                 let mut after = section.iter().skip_while(|pair| pair.value != "$INSUNITS");
                 let unit = after.nth(1).filter(|pair| pair.code == 70);
                 document.unit = unit.map(|pair| number_of(*pair)).transpose()?;
+                let mut after = section.iter().skip_while(|pair| pair.value != "$LTSCALE");
+                if let Some(scale) = after.nth(1).filter(|pair| pair.code == 40) {
+                    document.type_scale = number(*scale)?;
+                }
             }
             Some("TABLES") => {
-                for layer in entities(section).iter().filter(|it| it.kind == "LAYER") {
-                    let is_hidden = layer.number(62, 7.0)? < 0.0 || layer.flags()? & 1 == 1;
-                    document.hidden.extend(layer.text(2).filter(|_| is_hidden));
+                for entry in &entities(section) {
+                    let Some(name) = entry.text(2).map(str::to_uppercase) else { continue };
+                    match entry.kind {
+                        "LAYER" => {
+                            let is_off = entry.number(62, 7.0)? < 0.0 || entry.flags()? & 1 == 1;
+                            document.hidden.extend(is_off.then(|| name.clone()));
+                            let line = entry.text(6);
+                            document.types_of_layers.extend(line.map(|line| (name, line)));
+                        }
+                        "LTYPE" => {
+                            let lengths = entry.numbers(49)?;
+                            document.line_types.insert(name, lengths);
+                        }
+                        _ => {}
+                    }
                 }
             }
             Some("BLOCKS") => {
-                let mut block: Option<&str> = None;
+                let mut block: Option<String> = None;
                 for entity in entities(section) {
-                    match (entity.kind, block) {
+                    match (entity.kind, &block) {
                         ("BLOCK", _) => {
-                            let name = entity.text(2).unwrap_or_default();
+                            let name = entity.text(2).unwrap_or_default().to_uppercase();
                             let base = entity.point(10)?;
-                            document.blocks.insert(name, (base, Vec::new()));
+                            document.blocks.insert(name.clone(), (base, Vec::new()));
                             block = Some(name);
                         }
                         ("ENDBLK" | "ENDSEC" | "SECTION", _) => block = None,
@@ -150,6 +205,14 @@ pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> 
             Some("ENTITIES") => {
                 let is_own = |it: &Entity<'_>| !matches!(it.kind, "SECTION" | "ENDSEC" | "EOF");
                 document.entities = entities(section).into_iter().filter(is_own).collect();
+            }
+            Some("OBJECTS") => {
+                // Each belongs to one block that is inserted.
+                for object in &entities(section) {
+                    let is_filter = object.kind == "SPATIAL_FILTER";
+                    let is_on = is_filter && object.number(71, 1.0)? != 0.0;
+                    document.clipped += usize::from(is_on);
+                }
             }
             _ => {}
         }

@@ -146,22 +146,22 @@ fn what_is_not_drawn_is_counted() {
         "4",
         tables,
         "0 LINE 8 a 10 0 20 0 11 9 21 0 0 TEXT 8 a 1 hello 0 TEXT 8 a 1 you 0 LINE 8 off 10 0 \
-         0 LINE 8 cold 10 0 0 LINE 67 1 10 0 0 CIRCLE 40 5 210 1 230 0 0 INSERT 2 none",
+         0 LINE 8 cold 10 0 0 LINE 67 1 10 0 0 LINE 60 1 11 5 0 INSERT 2 none",
     );
     let said = notes("a.dxf", text.as_bytes());
     let kinds: Vec<&str> = said.iter().filter_map(|it| it.split(" (").next()).collect();
     assert_eq!(
         kinds,
         [
-            "1 CIRCLE, tilted is not drawn",
             "1 INSERT of an unknown block is not drawn",
             "2 TEXT are not drawn",
             "1 entity in paper space is not drawn",
             "2 entities on layers that are off or frozen are not drawn",
+            "1 invisible entity is not drawn",
         ]
     );
     let line = text.lines().position(|line| line == "TEXT").expect("a text") + 1;
-    assert!(said[2].ends_with(&format!("(the first in line {line})")), "{said:?}");
+    assert!(said[1].ends_with(&format!("(the first in line {line})")), "{said:?}");
 }
 
 #[test]
@@ -224,4 +224,56 @@ fn points_faces_and_dimensions_are_drawn() {
         matches!(said.as_slice(), [note] if note.starts_with("1 DIMENSION is not")),
         "{said:?}"
     );
+}
+
+#[test]
+fn tilted_entities_are_seen_from_above() {
+    // A circle about the x axis of the world is a line along its y.
+    let points: Vec<[f64; 2]> =
+        strokes(&dxf("4", "", "0 CIRCLE 10 7 20 0 30 3 40 5 210 1 220 0 230 0"))
+            .into_iter()
+            .flat_map(|(_, points)| points)
+            .collect();
+    let ends = points
+        .iter()
+        .fold([f64::MAX, f64::MIN], |[low, high], point| [low.min(point[1]), high.max(point[1])]);
+    assert!(points.iter().all(|point| point[0] == 3.0), "{points:?}");
+    assert!((ends[0] - 2.0).abs() < 0.005 && (ends[1] - 12.0).abs() < 0.005, "{ends:?}");
+    // The short half axis of an ellipse whose plane is upright points up.
+    let upright =
+        "0 ELLIPSE 10 0 20 0 11 4 21 0 40 0.5 41 0 42 3.141592653589793 210 0 220 1 230 0";
+    let points = strokes(&dxf("4", "", upright)).remove(0).1;
+    assert!(points.iter().all(|point| point[1] == 0.0), "{points:?}");
+}
+
+#[test]
+fn names_have_no_capitals_and_line_types_have_dashes() {
+    let tables = "0 SECTION 2 TABLES 0 LTYPE 2 Dashed 49 2 49 -1 \
+                  0 LAYER 2 Off 62 -7 0 LAYER 2 hid 62 7 6 DASHED 0 ENDTAB 0 ENDSEC \
+                  0 SECTION 2 BLOCKS 0 BLOCK 2 Tick 0 LINE 8 hid 11 4 0 ENDBLK 0 ENDSEC";
+    let drawn = |entities: &str| -> Vec<Vec<[f64; 2]>> {
+        let strokes = strokes(&dxf("4", tables, entities));
+        strokes.into_iter().map(|(_, points)| points).collect()
+    };
+    let dashes = vec![vec![[0.0, 0.0], [2.0, 0.0]], vec![[3.0, 0.0], [4.0, 0.0]]];
+    assert_eq!(drawn("0 INSERT 2 TICK 0 LINE 8 OFF 11 9"), dashes);
+    assert_eq!(drawn("0 LINE 8 a 6 dashed 11 4"), dashes);
+    assert_eq!(drawn("0 LINE 8 hid 6 dashed 48 2 11 6"), [[[0.0, 0.0], [4.0, 0.0]]]);
+    assert_eq!(drawn("0 LINE 8 hid 6 CONTINUOUS 11 4"), [[[0.0, 0.0], [4.0, 0.0]]]);
+    let clipped = dxf("4", "0 SECTION 2 OBJECTS 0 FILTER 71 1 0 ENDSEC", "0 LINE 11 4");
+    let said = notes("a.dxf", clipped.replace("FILTER", "SPATIAL_FILTER").as_bytes());
+    assert!(said[0].starts_with("1 inserted block is clipped"), "{said:?}");
+}
+
+#[test]
+fn sides_of_a_face_may_be_invisible() {
+    let face = |flags: &str| {
+        let corners = "10 0 20 0 11 4 21 0 12 4 22 2 13 0 23 2";
+        let text = dxf("4", "", &format!("0 LINE 10 9 11 9 21 9 0 3DFACE 70 {flags} {corners}"));
+        let strokes = strokes(&text).split_off(1);
+        strokes.into_iter().map(|(_, points)| points).collect::<Vec<_>>()
+    };
+    assert_eq!(face("1"), [[[4.0, 0.0], [4.0, 2.0], [0.0, 2.0], [0.0, 0.0]]]);
+    assert_eq!(face("10"), [[[0.0, 0.0], [4.0, 0.0]], [[4.0, 2.0], [0.0, 2.0]]]);
+    assert!(face("15").is_empty());
 }

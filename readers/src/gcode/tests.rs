@@ -53,6 +53,55 @@ fn the_pen_is_found_in_every_dialect() {
     assert_eq!(strokes(&routed), expected);
 }
 
+/// What programs write draws their figure and nothing else, whatever lifts the pen.
+#[test]
+fn files_of_many_programs_draw_their_figure() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/../host-tests/tests/dialects");
+    let read = |name: &str| std::fs::read_to_string(format!("{folder}/{name}")).expect("a file");
+    let figure = |downward: bool| -> Vec<Vec<[f64; 2]>> {
+        let svg = read("figure.svg");
+        let points = |list: &str| {
+            let of_point = |point: &str| {
+                let (x, y) = point.split_once(',').expect("x,y");
+                let [x, y]: [f64; 2] = [x, y].map(|it| it.parse().expect("a number"));
+                [x, if downward { y } else { 80.0 - y }]
+            };
+            list.split(' ').map(of_point).collect()
+        };
+        svg.split("points=\"").skip(1).filter_map(|it| it.split('"').next()).map(points).collect()
+    };
+    let mut tried = 0;
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let name = entry.expect("an entry").file_name().into_string().expect("a name");
+        if name.ends_with(".rs") || name.ends_with(".svg") {
+            continue;
+        }
+        let downward = ["ninja", "step_motor"].iter().any(|it| name.contains(it));
+        let (drawn, expected) = (strokes(&read(&name)), figure(downward));
+        assert_eq!(drawn.len(), expected.len(), "{name}: {drawn:?}");
+        for (stroke, line) in drawn.iter().zip(&expected) {
+            assert_eq!(stroke.len(), line.len(), "{name}: {stroke:?}");
+            for (own, other) in stroke.iter().zip(line) {
+                let off = (own[0] - other[0]).hypot(own[1] - other[1]);
+                assert!(off < 1.0 / 80.0, "{name}: {own:?} is not {other:?}");
+            }
+        }
+        tried += 1;
+    }
+    assert_eq!(tried, 14);
+}
+
+#[test]
+fn a_program_may_travel_at_several_heights_and_draw_at_several() {
+    let line = vec![vec![[10.0, 10.0], [20.0, 10.0], [20.0, 20.0]], vec![[30.0, 5.0], [40.0, 5.0]]];
+    let milled = "G0 Z15\nG0 X10 Y10\nG0 Z5\nG1 Z-1\nG1 X20\nG1 Z-2\nG1 Y20\nG0 Z5\n\
+                  G0 X30 Y5\nG1 Z-1\nG1 X40\nG0 Z15\nG0 X0 Y0\n";
+    assert_eq!(strokes(milled), line);
+    // A laser of two powers, which G0 does not light.
+    let laser = "M5\nG0 X10 Y10\nM3 S200\nG1 X20\nG1 Y20 S100\nM5\nG0 X30 Y5\nM3\nG1 X40\nM5\n";
+    assert_eq!(strokes(laser), line);
+}
+
 #[test]
 fn units_modes_offsets_and_comments_are_obeyed() {
     let inches =

@@ -1,5 +1,6 @@
 //! Collects what the tree of `usvg` draws, as polylines on the page.
 
+use super::areas::rectangle;
 use super::clip::ConvexArea;
 use super::flatten::{Arcs, Polyline, TooManyPoints, flatten};
 use super::markup::Markup;
@@ -12,7 +13,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use usvg::roxmltree::NodeId;
 use usvg::tiny_skia_path::StrokeDash;
-use usvg::{ClipPath, FillRule, Group, LineCap, Node, Paint, Path, Text, Transform, Tree};
+use usvg::{FillRule, Group, Image, ImageKind, LineCap, Node, Paint, Path, Text, Transform, Tree};
 
 /// The length of a pixel of CSS in mm: there are 96 in an inch.
 pub(super) const PIXEL: f64 = 25.4 / 96.0;
@@ -23,6 +24,9 @@ const SLACK: f64 = 0.01;
 
 /// The most points before points are left out. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
+
+/// The most work at clip paths and masks: a minute of an old computer.
+const MOST_WORK: usize = 300_000_000;
 
 /// A path of the drawing.
 #[derive(Debug)]
@@ -45,10 +49,13 @@ pub(super) struct Shape {
 /// All paths of an SVG, and what could not be drawn as the file says.
 #[derive(Debug)]
 pub(super) struct Drawing<'a, 'input, 'tree> {
-    markup: &'a Markup<'a, 'input>,
+    pub(super) markup: &'a Markup<'a, 'input>,
     page: ConvexArea,
     with_areas: bool,
-    budget: usize,
+    /// How many points more fit in memory.
+    pub(super) budget: usize,
+    /// How much work at clip paths and masks is left.
+    work: usize,
     /// The paths in the order of the file.
     pub(super) shapes: Vec<Shape>,
     /// The elements that were found in the tree.
@@ -65,7 +72,9 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) backgrounds: usize,
     /// The number of paths with a pattern, which is not drawn.
     pub(super) patterns: usize,
-    /// The number of masks that are not applied.
+    /// The number of images that are not drawn, in an SVG that is an image.
+    pub(super) nested_images: usize,
+    /// The number of masks that are not applied, or not as a whole.
     pub(super) masks: usize,
     /// The number of filters that are not applied.
     pub(super) filters: usize,
@@ -84,6 +93,8 @@ struct Context {
     element: Option<NodeId>,
     /// Whether it is the outline of letters.
     is_text: bool,
+    /// Whether it belongs to an SVG that is an image in the file.
+    is_nested: bool,
 }
 
 impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
@@ -105,6 +116,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             page,
             with_areas,
             budget: MOST_POINTS,
+            work: MOST_WORK,
             shapes: Vec::new(),
             seen: HashSet::new(),
             invisible: 0,
@@ -113,48 +125,86 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             cut: 0,
             backgrounds: 0,
             patterns: 0,
+            nested_images: 0,
             masks: 0,
             filters: 0,
             undashed: 0,
             texts: Vec::new(),
         };
         let to_page = Affine::new([PIXEL, 0.0, 0.0, -PIXEL, 0.0, height]);
-        let context = Context { to_page, areas: Regions::default(), element: None, is_text: false };
+        let context = Context {
+            to_page,
+            areas: Regions::default(),
+            element: None,
+            is_text: false,
+            is_nested: false,
+        };
         drawing.group(tree.root(), &context)?;
         Ok(drawing)
     }
 
     fn group(&mut self, group: &'tree Group, outside: &Context) -> Result<(), TooManyPoints> {
         let mut context = outside.clone();
-        if let Some(element) = self.markup.element(group.id()) {
-            self.seen.insert(element);
+        if let Some(element) = self.element(group.id(), outside) {
+            // An image is not seen before it turns out to be one that is drawn.
+            if !self.markup.is_image(element) {
+                self.seen.insert(element);
+            }
             context.element = Some(element);
         }
         context.to_page *= affine(group.transform());
         if group.opacity().get() == 0.0 {
             self.invisible += 1;
-            self.see_all(group);
+            if !outside.is_nested {
+                self.see_all(group);
+            }
             return Ok(());
         }
         self.filters += group.filters().len();
-        self.masks += usize::from(group.mask().is_some());
-        self.clip(group.clip_path(), context.to_page, &mut context.areas)?;
+        let to_page = context.to_page;
+        self.clip(group.clip_path(), to_page, &mut context.areas)?;
+        self.masks += self.mask(group.mask(), to_page, &mut context.areas)?;
         for node in group.children() {
             match node {
                 Node::Group(group) => self.group(group, &context)?,
                 Node::Path(path) => self.path(path, &context)?,
                 Node::Text(text) => self.text(text, &context)?,
-                // They are counted in the markup.
-                Node::Image(_) => {}
+                Node::Image(image) => self.image(image, &context)?,
             }
         }
         Ok(())
     }
 
+    /// Draws an SVG that stands as an image in another one, whose page cuts it. The markup counts
+    /// other images of the file.
+    fn image(&mut self, image: &'tree Image, outside: &Context) -> Result<(), TooManyPoints> {
+        if !image.is_visible() {
+            self.invisible += 1;
+            return Ok(());
+        }
+        let ImageKind::SVG(tree) = image.kind() else {
+            self.nested_images += usize::from(outside.is_nested);
+            return Ok(());
+        };
+        self.seen.extend(outside.element.filter(|_| !outside.is_nested));
+        let mut context = Context { is_nested: true, ..outside.clone() };
+        let size = tree.size();
+        let size = [size.width(), size.height()].map(f64::from);
+        let mut page = Region::default();
+        page.add(vec![rectangle([0.0, 0.0], size, context.to_page)], false, Vec::new());
+        context.areas.0.push(Arc::new(page));
+        self.group(tree.root(), &context)
+    }
+
+    /// The element of the file with this `id`. Those of an SVG within it are not of the file.
+    fn element(&self, id: &str, context: &Context) -> Option<NodeId> {
+        if context.is_nested { None } else { self.markup.element(id) }
+    }
+
     /// Draws the outlines of the letters of a text.
     fn text(&mut self, text: &'tree Text, outside: &Context) -> Result<(), TooManyPoints> {
         let mut context = Context { is_text: true, ..outside.clone() };
-        if let Some(element) = self.markup.element(text.id()) {
+        if let Some(element) = self.element(text.id(), outside) {
             self.seen.insert(element);
             context.element = Some(element);
         }
@@ -172,51 +222,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         }
     }
 
-    /// Appends what a clip path leaves, and those that clip it.
-    fn clip(
-        &mut self,
-        mut clip: Option<&ClipPath>,
-        to_page: Affine,
-        areas: &mut Regions,
-    ) -> Result<(), TooManyPoints> {
-        while let Some(path) = clip {
-            let mut region = Region::default();
-            let to_path = to_page * affine(path.transform());
-            self.region(path.root(), to_path, &Regions::default(), &mut region)?;
-            areas.0.push(Arc::new(region));
-            clip = path.clip_path();
-        }
-        Ok(())
-    }
-
-    /// Adds the shapes of a group in a clip path to the region that it leaves.
-    fn region(
-        &mut self,
-        group: &Group,
-        to_page: Affine,
-        within: &Regions,
-        region: &mut Region,
-    ) -> Result<(), TooManyPoints> {
-        let to_page = to_page * affine(group.transform());
-        let mut within = within.clone();
-        self.clip(group.clip_path(), to_page, &mut within)?;
-        for node in group.children() {
-            match node {
-                Node::Group(group) => self.region(group, to_page, &within, region)?,
-                Node::Text(text) => self.region(text.flattened(), to_page, &within, region)?,
-                Node::Path(path) if path.is_visible() => {
-                    let outlines = flatten(path.data(), to_page, Arcs::Quarters, &mut self.budget)?;
-                    let outlines = outlines.iter().map(Polyline::positions).collect();
-                    region.add(outlines, is_even_odd(path), within.0.clone());
-                }
-                Node::Path(_) | Node::Image(_) => {}
-            }
-        }
-        Ok(())
-    }
-
     fn path(&mut self, path: &Path, context: &Context) -> Result<(), TooManyPoints> {
-        let own = self.markup.element(path.id());
+        let own = self.element(path.id(), context);
         self.seen.extend(own);
         let stroke = path.stroke().filter(|stroke| stroke.opacity().get() > 0.0);
         let fill = path.fill().filter(|fill| fill.opacity().get() > 0.0);
@@ -341,7 +348,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             let points = polyline.positions();
             match points.first().filter(|_| length(&points) == 0.0) {
                 Some(dot) => parts.extend(areas.contain(*dot).then_some(points)),
-                None => parts.extend(areas.cut(&points, &mut self.budget)?),
+                None => parts.extend(areas.cut(&points, &mut self.work)?),
             }
         }
         if is_only_filled {
@@ -350,7 +357,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             shape.add(outlines, is_even_odd(path), Vec::new());
             let page = &self.page;
             let is_beyond = |[x, y]: [f64; 2]| page.depth(Point::new(x, y)) < SLACK;
-            parts.extend(areas.borders_within(&Arc::new(shape), is_beyond, &mut self.budget)?);
+            parts.extend(areas.borders_within(&Arc::new(shape), is_beyond, &mut self.work)?);
         }
         let of_points = |points: Vec<[f64; 2]>| {
             let points = points.into_iter().map(|[x, y]| Point::new(x, y)).collect();
@@ -379,7 +386,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
 }
 
 /// Whether what a path fills is decided by the number of outlines around it.
-fn is_even_odd(path: &Path) -> bool {
+pub(super) fn is_even_odd(path: &Path) -> bool {
     path.fill().is_some_and(|fill| fill.rule() == FillRule::EvenOdd)
 }
 
@@ -388,7 +395,7 @@ fn is_white(paint: &Paint) -> bool {
     matches!(paint, Paint::Color(colour) if [colour.red, colour.green, colour.blue] == [255; 3])
 }
 
-fn affine(transform: Transform) -> Affine {
+pub(super) fn affine(transform: Transform) -> Affine {
     let Transform { sx, kx, ky, sy, tx, ty } = transform;
     Affine::new([sx, ky, kx, sy, tx, ty].map(f64::from))
 }

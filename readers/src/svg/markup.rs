@@ -8,6 +8,7 @@ use super::flatten::Arcs;
 use super::pens::Layer;
 use super::unread;
 use std::collections::{HashMap, HashSet};
+use std::ops::Range;
 use usvg::roxmltree::{Document, Error, Node, NodeId, ParsingOptions};
 
 /// The elements that are drawn as paths.
@@ -31,6 +32,9 @@ const NOT_DRAWN: [&str; 13] = [
     "metadata",
 ];
 
+/// A feature of SVG 1.1 that is there. SVG 2 asks for none.
+const FEATURE: &str = "http://www.w3.org/TR/SVG11/feature#Shape";
+
 const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
 
 /// Parses the text of an SVG.
@@ -50,7 +54,8 @@ pub(super) fn is_one_of(node: Node<'_, '_>, names: &[&str]) -> bool {
 }
 
 /// A copy of `text` in which every group, reference, shape and text has an `id`, and transforms in
-/// `style` attributes have the form that they have in SVG.
+/// `style` attributes have the form that they have in SVG. In a `switch` no `foreignObject` is
+/// chosen, and features of SVG that are asked for are there, as in a browser.
 pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let own: HashSet<&str> =
         document.descendants().filter_map(|node| node.attribute("id")).collect();
@@ -58,15 +63,21 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let (mut copied, mut number) = (0, 0_u32);
     for node in document.descendants() {
         let is_traced =
-            is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text"]);
+            is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text", "image"]);
         let is_traced =
             is_traced && node.attribute("id").is_none() && node.parent_element().is_some();
-        let style = node.attribute_node("style").and_then(|style| {
-            let value =
-                text.get(style.range_value()).filter(|value| value.contains("transform"))?;
-            Some((style.range_value(), with_plain_transform(value)?))
-        });
-        if !is_traced && style.is_none() {
+        let mut edits: Vec<(Range<usize>, String)> = Vec::new();
+        if let Some(style) = node.attribute_node("style")
+            && let Some(value) = text.get(style.range_value())
+            && value.contains("transform")
+        {
+            edits.extend(with_plain_transform(value).map(|value| (style.range_value(), value)));
+        }
+        let is_foreign = is_one_of(node, &["foreignObject"]);
+        let own_condition = node.attribute_node("requiredFeatures").filter(|_| !is_foreign);
+        edits.extend(own_condition.map(|it| (it.range_value(), FEATURE.to_owned())));
+        let is_left_out = is_foreign && node.attribute("requiredExtensions").is_none();
+        if !is_traced && !is_left_out && edits.is_empty() {
             continue;
         }
         // The name of an element ends at a space, a slash or an angle bracket. The contents of an
@@ -78,6 +89,9 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         let end = start + 1 + name;
         copy.push_str(text.get(copied..end).unwrap_or_default());
         copied = end;
+        if is_left_out {
+            copy.push_str(" requiredExtensions=\"penup\"");
+        }
         if is_traced {
             let id = loop {
                 number += 1;
@@ -88,10 +102,13 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
             };
             copy.push_str(&format!(" id=\"{id}\""));
         }
-        if let Some((range, style)) = style.filter(|(range, _)| range.start >= copied) {
-            copy.push_str(text.get(copied..range.start).unwrap_or_default());
-            copy.push_str(&style);
-            copied = range.end;
+        edits.sort_by_key(|(range, _)| range.start);
+        for (range, value) in edits {
+            if range.start >= copied {
+                copy.push_str(text.get(copied..range.start).unwrap_or_default());
+                copy.push_str(&value);
+                copied = range.end;
+            }
         }
     }
     copy.push_str(text.get(copied..).unwrap_or_default());
@@ -192,6 +209,7 @@ impl<'a, 'input> Markup<'a, 'input> {
         let mut foreign = Count::default();
         let mut broken = Count::default();
         let mut missing = Count::default();
+        let mut shortened = Count::default();
         for node in self.document.descendants() {
             if !node.is_element() || is_within(node, &["clipPath", "mask", "pattern"]) {
                 continue;
@@ -203,9 +221,16 @@ impl<'a, 'input> Markup<'a, 'input> {
                 }
                 &mut texts
             } else if is_one_of(node, &["image"]) {
+                if drawn.contains(&node.id()) {
+                    continue;
+                }
                 &mut images
-            } else if is_one_of(node, &["foreignObject"]) && !is_within(node, &["switch"]) {
-                &mut foreign
+            } else if is_one_of(node, &["foreignObject"]) {
+                match has_other_letters(node) {
+                    None => &mut foreign,
+                    Some(true) => &mut shortened,
+                    Some(false) => continue,
+                }
             } else if is_one_of(node, &["path"]) && has_error(node) {
                 &mut broken
             } else if (is_one_of(node, &SHAPES) || is_one_of(node, &["use"]))
@@ -227,9 +252,13 @@ impl<'a, 'input> Markup<'a, 'input> {
             false => "not drawn, because a page has no fonts: open the file with penup page",
         };
         texts.say(&mut said, ["text is", "texts are"], what);
-        images.say(&mut said, ["image is", "images are"], "not drawn");
+        images.say(&mut said, ["image is", "images are"], "not drawn: only those that are SVG are");
         let what = "not drawn: it is not SVG";
         foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
+        let what = "drawn as another text, which the file has for programs that read no HTML: \
+                    draw.io shortens it so, unless text is exported without formatting and word \
+                    wrap";
+        shortened.say(&mut said, ["text in HTML is", "texts in HTML are"], what);
         let what = "not drawn as a whole: there is an error in the data, and the rest is left out";
         broken.say(&mut said, ["path is", "paths are"], what);
         let what = "not drawn: hidden, or without a size or points, or with one in a unit that is \
@@ -250,6 +279,18 @@ impl<'a, 'input> Markup<'a, 'input> {
     /// Whether the element or one that contains it says by itself that it is not shown.
     pub(super) fn is_hidden(&self, element: NodeId) -> bool {
         self.node(element).is_some_and(is_hidden)
+    }
+
+    /// Whether the element is an image.
+    pub(super) fn is_image(&self, element: NodeId) -> bool {
+        self.node(element).is_some_and(|node| is_one_of(node, &["image"]))
+    }
+
+    /// Whether the colours of an element are mixed as light is.
+    pub(super) fn is_linear(&self, element: NodeId) -> bool {
+        let node = self.node(element);
+        let value = node.and_then(|node| property(node, "color-interpolation"));
+        value == Some("linearRGB")
     }
 
     /// Whether the width of an element's stroke, and with it the length of its dashes, is the same
@@ -293,9 +334,34 @@ impl Count {
     }
 }
 
-/// Whether the file has a text.
+/// Whether the file has a text, or perhaps an SVG as an image, which may have one.
 pub(super) fn has_text(document: &Document<'_>) -> bool {
     document.descendants().any(|node| is_one_of(node, &["text"]))
+        || references_of_images(document).any(|address| address.contains("svg"))
+}
+
+/// The number of images that are files of their own.
+pub(super) fn references_to_files(document: &Document<'_>) -> usize {
+    references_of_images(document).filter(|address| !address.starts_with("data:")).count()
+}
+
+/// Where the images of a file are.
+fn references_of_images<'a>(document: &'a Document<'_>) -> impl Iterator<Item = &'a str> {
+    let images = document.descendants().filter(|node| is_one_of(*node, &["image"]));
+    images.filter_map(|image| Some(image.attributes().find(|it| it.name() == "href")?.value()))
+}
+
+/// Whether the letters of a `foreignObject` are others than those of what is drawn instead, if it
+/// has any; `None` if nothing is.
+fn has_other_letters(foreign: Node<'_, '_>) -> Option<bool> {
+    let switch = foreign.parent_element().filter(|parent| is_one_of(*parent, &["switch"]))?;
+    let letters = |node: Node<'_, '_>| -> String {
+        let all = node.descendants().filter(Node::is_text).filter_map(|node| node.text());
+        all.flat_map(str::chars).filter(|letter| !letter.is_whitespace()).collect()
+    };
+    let own = letters(foreign);
+    let others = switch.children().filter(|node| node.is_element() && *node != foreign);
+    Some(!own.is_empty() && !others.map(letters).any(|other| other == own))
 }
 
 /// Whether a text has letters.

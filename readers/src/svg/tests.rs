@@ -374,7 +374,7 @@ fn what_is_not_drawn_is_counted() {
         "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
          <image href='a.png' width='9' height='9'/>\
          \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
-         <mask id='m'><rect width='5' height='5' fill='#fff'/></mask>\
+         <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'><image href='b.png' y='5' width='9' height='9'/></mask>\
          <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
     );
     assert_eq!(
@@ -382,35 +382,16 @@ fn what_is_not_drawn_is_counted() {
         [
             "2 texts are not drawn, because a page has no fonts: open the file with penup page \
              (the first in line 2)",
-            "1 image is not drawn (line 3)",
+            "1 image is not drawn: only those that are SVG are (line 3)",
             "1 path is not drawn as a whole: there is an error in the data, and the rest is left \
              out (line 4)",
             "2 elements are not drawn: hidden, or without a size or points, or with one in a \
              unit that is not read, or a reference to nothing (the first in line 5)",
-            "1 mask is not applied: what it hides is drawn",
+            "1 mask is not applied as a whole: what a gradient, an image, a pattern or a filter \
+             hides is drawn",
             "1 line is not drawn, because a dot has no length",
         ]
     );
-}
-
-#[test]
-fn dots_with_round_or_square_ends_are_drawn_as_very_short_lines() {
-    let dot = |x: f64| vec![[x, 50.0], [x + 0.02, 50.0]];
-    for cap in ["round", "square"] {
-        let stroke = format!("stroke='red' stroke-linecap='{cap}'");
-        let contents = read(&in_mm(&format!(
-            "<path d='M10 50h0M20 50zM200 50h0' {stroke}/><path d='M30 50h5' {stroke} \
-             stroke-dasharray='0 3'/><clipPath id='c'><path d='M0 0H50V100H0Z'/></clipPath>\
-             <path clip-path='url(#c)' d='M40 50h0M60 50h0' {stroke}/>\
-             <path d='M100 50h0' {stroke}/>"
-        )));
-        let contents = contents.expect("an SVG");
-        let drawn: Vec<_> = polylines(&contents).into_iter().map(|(_, points)| points).collect();
-        let end = vec![[100.0, 50.0], [99.98, 50.0]];
-        assert_eq!(drawn, [dot(10.0), dot(20.0), dot(30.0), dot(33.0), dot(40.0), end], "{cap}");
-        let note = "1 path reaches beyond the page of the SVG: the rest is cut off";
-        assert_eq!(contents.notes(), [note], "{cap}");
-    }
 }
 
 #[test]
@@ -496,5 +477,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
 
 mod clips;
 mod css;
+mod embedded;
+mod masks;
 #[cfg(feature = "text")]
 mod texts;

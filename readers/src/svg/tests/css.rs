@@ -66,3 +66,28 @@ fn the_dashes_of_a_stroke_of_fixed_width_are_measured_on_the_page() {
     let sent = positions(&in_mm(dashed));
     assert_eq!(sent, [[[10.0, 90.0], [15.292, 90.0]]]);
 }
+
+#[test]
+fn a_browser_text_in_html_is_replaced_by_what_the_file_has_for_others() {
+    const FEATURES: &str = "requiredFeatures='http://www.w3.org/TR/SVG11/feature#Extensibility'";
+    let html = |text: &str, features: &str| {
+        format!(
+            "<switch><foreignObject {features} width='9' height='9'><p \
+             xmlns='http://www.w3.org/1999/xhtml'>{text}</p></foreignObject>\
+             <g><desc>Lamp</desc><path d='M0 9H9'/></g></switch>"
+        )
+    };
+    // What is drawn where there is no HTML is drawn, but not that there is none.
+    let warning = format!("<switch><g {FEATURES}/><path d='M0 50H9'/></switch>");
+    for features in ["", FEATURES] {
+        let read = |text| read(&in_mm(&[html(text, features), warning.clone()].concat()));
+        let same = read("La mp").expect("an SVG");
+        assert_eq!(polylines(&same).len(), 1, "{features}");
+        assert!(same.notes().is_empty(), "{:?}", same.notes());
+        let longer = read("Lamp plugged in?").expect("an SVG");
+        assert!(longer.notes()[0].starts_with("1 text in HTML is drawn as another text"));
+    }
+    let alone = "<foreignObject><p>a</p></foreignObject><path d='M0 9H9'/>";
+    let notes = read(&in_mm(alone)).expect("an SVG");
+    assert_eq!(notes.notes(), ["1 foreignObject is not drawn: it is not SVG (line 1)"]);
+}

@@ -1,0 +1,150 @@
+//! Decides which signal of a program lifts the pen, and during which moves it is down.
+//!
+//! In this order: the angle of a servo (`M280`, `M300`); the height Z; the power S, where the
+//! spindle is on from the first move that draws to the last; the spindle or laser (`M3`, `M4`,
+//! `M5`), which with the power 0 does not draw; or, if none of these changes between moves, G1 to
+//! G3 draw and G0 does not.
+//!
+//! A signal has levels at which the pen is up and others at which it is down. They are divided
+//! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may
+//! travel at several heights. Without moves by G0, the two levels that come most often are divided;
+//! the higher Z is up then, and for a servo the level of the first move. Where Z is only moved by
+//! distances that do not cancel out, whether it has grown or fallen last says where the pen is.
+
+use super::{Move, Signals};
+
+/// Levels that differ by less are the same.
+const SAME: f64 = 1e-6;
+
+/// How a signal lifts the pen.
+struct Division {
+    /// What lies between the levels at which the pen is up and the others.
+    middle: f64,
+    high_is_up: bool,
+}
+
+/// Decides for each move whether it draws. `has_absolute_heights` says whether a Z was given as a
+/// height.
+pub(super) fn inked(moves: &[Move], has_absolute_heights: bool) -> Vec<bool> {
+    let servo = || by_level(moves, |signals| signals.servo, None);
+    let height = || by_level(moves, |signals| signals.height, Some(true));
+    let growth = || by_level(moves, |signals| signals.growth, Some(true));
+    let drifts = !has_absolute_heights && drift(moves);
+    servo()
+        .or_else(|| if drifts { growth() } else { height() })
+        .or_else(|| by_power(moves))
+        .or_else(|| by_spindle(moves))
+        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect())
+}
+
+/// Whether the moves are at more than two heights.
+fn drift(moves: &[Move]) -> bool {
+    let mut heights: Vec<f64> = moves.iter().filter_map(|it| it.signals.height).collect();
+    heights.sort_by(f64::total_cmp);
+    heights.dedup_by(|one, other| (*one - *other).abs() < SAME);
+    heights.len() > 2
+}
+
+/// Whether the spindle is on during a move, with a power above 0.
+fn is_on(it: &Move) -> bool {
+    it.signals.spindle == Some(true) && it.signals.power != Some(0.0)
+}
+
+fn by_spindle(moves: &[Move]) -> Option<Vec<bool>> {
+    let draws: Vec<bool> = moves.iter().map(is_on).collect();
+    // A spindle that only runs before the first move lifts no pen.
+    (draws.contains(&true) && draws.contains(&false)).then_some(draws)
+}
+
+/// By the power of a spindle that is not switched off between moves, as servos are set.
+fn by_power(moves: &[Move]) -> Option<Vec<bool>> {
+    let first = moves.iter().position(is_on)?;
+    let last = moves.iter().rposition(is_on)?;
+    let between = moves.get(first..=last)?;
+    if !between.iter().all(is_on) {
+        return None;
+    }
+    let power = |signals: &Signals| signals.power.filter(|_| signals.spindle == Some(true));
+    let draws = by_level(moves, power, None)?;
+    // A laser does not burn during G0, whatever its power.
+    let is_laser =
+        between.iter().zip(draws.get(first..=last)?).any(|(it, draws)| it.is_rapid && *draws);
+    (!is_laser).then_some(draws)
+}
+
+/// By the levels of a signal; `None` if it does not change.
+fn by_level(
+    moves: &[Move],
+    level: impl Fn(&Signals) -> Option<f64>,
+    high_is_up: Option<bool>,
+) -> Option<Vec<bool>> {
+    let levels: Vec<Option<f64>> = moves.iter().map(|it| level(&it.signals)).collect();
+    let first = levels.iter().copied().flatten().next()?;
+    let has_rapid = moves.iter().zip(&levels).any(|(it, level)| it.is_rapid && level.is_some());
+    let division = match has_rapid {
+        true => by_rapids(moves, &levels)?,
+        false => {
+            let middle = between_most_visited(&levels)?;
+            Division { middle, high_is_up: high_is_up.unwrap_or(first > middle) }
+        }
+    };
+    // Before the first level the pen is up.
+    let draws = |level: f64| (level > division.middle) != division.high_is_up;
+    Some(levels.iter().map(|level| level.is_some_and(draws)).collect())
+}
+
+/// The division with the longest way by G0 at the levels that are up, and by G1 to G3 at the
+/// others.
+fn by_rapids(moves: &[Move], levels: &[Option<f64>]) -> Option<Division> {
+    let mut ways: Vec<(f64, [f64; 2])> = Vec::new();
+    for (it, level) in moves.iter().zip(levels) {
+        let way = if it.is_rapid { [it.length(), 0.0] } else { [0.0, it.length()] };
+        ways.extend(level.map(|level| (level, way)));
+    }
+    ways.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut high = [0, 1].map(|kind: usize| ways.iter().map(|(_, way)| way[kind]).sum::<f64>());
+    let mut low = [0.0; 2];
+    let mut best: Option<(f64, f64, Division)> = None;
+    for pair in ways.windows(2) {
+        let &[(level, way), (next, _)] = pair else { continue };
+        for kind in 0..2 {
+            low[kind] += way[kind];
+            high[kind] -= way[kind];
+        }
+        let gap = next - level;
+        if gap < SAME {
+            continue;
+        }
+        // Where G0 goes on the same way at both, the higher one is up.
+        let high_is_up = high[0] >= low[0];
+        let agreed = if high_is_up { high[0] + low[1] } else { low[0] + high[1] };
+        let is_better = best.as_ref().is_none_or(|(most, widest, _)| {
+            agreed > most + SAME || agreed > most - SAME && gap > *widest
+        });
+        if is_better {
+            let middle = f64::midpoint(level, next);
+            best = Some((agreed, gap, Division { middle, high_is_up }));
+        }
+    }
+    best.map(|(_, _, division)| division)
+}
+
+/// What lies between the two levels to which a signal is set most often; `None` if there are not
+/// two.
+fn between_most_visited(levels: &[Option<f64>]) -> Option<f64> {
+    let mut visited: Vec<f64> = Vec::new();
+    for level in levels.iter().copied().flatten() {
+        if visited.last().is_none_or(|last| (level - last).abs() >= SAME) {
+            visited.push(level);
+        }
+    }
+    visited.sort_by(f64::total_cmp);
+    let groups = visited.chunk_by(|one, other| (one - other).abs() < SAME);
+    let mut counts: Vec<(usize, f64)> =
+        groups.filter_map(|group| Some((group.len(), *group.first()?))).collect();
+    counts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
+    match counts.as_slice() {
+        [(_, one), (_, other), ..] => Some(f64::midpoint(*one, *other)),
+        _ => None,
+    }
+}
