@@ -135,6 +135,49 @@ fn bends_behind_straights_are_seen_in_time() {
     }
 }
 
+/// A curve of the soak (its seed 73), in which a bend is found too late to be braked for. It is
+/// braked for as hard as the limits let it, and no longer than it takes: braking went on at the
+/// greatest acceleration until the machine stood, and its end there was a jerk of 2.3 times the
+/// limit. How many chords, and by what angle each turns.
+#[test]
+fn a_bend_that_is_found_late_stops_nothing() {
+    let curve = [
+        (35, 0.0),
+        (17, -0.017103349879940572),
+        (1, -0.07458103991924962),
+        (26, -0.028159789273917626),
+        (2, 0.0),
+        (1, 0.0072931692343833916),
+        (8, 0.0034322073833288357),
+        (13, -0.004110860698857175),
+        (13, -0.04589045607446345),
+        (34, -0.4338248196418906),
+        (4, 0.07578181708789762),
+        (3, -0.5),
+        (27, 0.0),
+        (38, -0.00837252440694301),
+        (34, -0.06554517814019474),
+    ];
+    let chord = 32.934585594450255;
+    let (mut x, mut y, mut heading) = (20_000.0f64, 20_000.0f64, 0.0f64);
+    let mut points = vec![PagePoint { x: 20_000, y: 20_000 }];
+    for (count, turn) in curve {
+        for _ in 0..count {
+            heading += turn;
+            (x, y) = (x + chord * heading.cos(), y + chord * heading.sin());
+            points.push(PagePoint { x: x.round() as i32, y: y.round() as i32 });
+        }
+    }
+    let case = Case {
+        speed: 107.20388147009999,
+        acceleration: 399.521638160104,
+        jerk: 4308.2697360269,
+        deviation: 0.11193162879054035,
+    };
+    let nearness = case.measure(&points, &draw(&points, case.settings(), 60));
+    assert!(nearness.jerk <= 1.1, "{nearness:?}");
+}
+
 /// Most of the points that show the bends come after the blocks that bend were begun. Of three or
 /// more blocks: two, of which one is a single step, say too little (1.09 times the speed).
 #[test]

@@ -5,7 +5,8 @@
 //! these steps. So they change neither position nor ink length, and the travel limits ignore them.
 //! Within a stroke the pen stands on the paper during them. Before one it is still raised if it may
 //! move while the machine does (`$224`, `$225`). The slack is a property of each motor, in every
-//! kind of kinematics.
+//! kind of kinematics. With `$237`, which not every board has, it is taken up on the way instead
+//! (`backlash_on_the_way.rs`).
 //!
 //! Until a motor has moved, it is unknown on which side of its slack it is. The first move
 //! therefore takes up nothing, and the pen may be off by the slack until the machine is homed.
@@ -20,7 +21,7 @@ use crate::motion::{Move, PathLength, PushError};
 pub(super) struct Backlash {
     /// For each motor, the steps that it must make upward before it moves the pen; `None` if this
     /// is not known.
-    ahead: [Option<i32>; 2],
+    pub(super) ahead: [Option<i32>; 2],
 }
 
 impl Backlash {
@@ -80,28 +81,65 @@ impl Machine<'_> {
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<bool, PushError> {
-        let (motors, end) = (segment.motors, self.runner.end());
+        let (motors, end) = (segment.motors, self.motors_end());
+        let delta = [motors.x - end.x, motors.y - end.y];
         let mut slack = self.slack;
-        let [x, y] = slack.take_up(self.slack_steps(), [motors.x - end.x, motors.y - end.y]);
+        let [x, y] = slack.take_up(self.slack_steps(), delta);
+        #[cfg(feature = "backlash-on-the-way")]
+        let (before, from) = (self.slack.ahead, self.runner.motor_steps_end());
         if (x, y) == (0, 0) {
+            #[cfg(feature = "backlash-on-the-way")]
+            let segment = &self.with_slack(*segment);
             self.runner.push(segment, ink, limit)?;
         } else {
             self.runner.push_slack(PagePoint { x, y }, ink)?;
         }
         self.slack = slack;
+        #[cfg(feature = "backlash-on-the-way")]
+        if self.spreads_slack() {
+            self.learn_slack(before, from, delta);
+        }
         Ok((x, y) == (0, 0))
     }
 
     /// Discards the moves that are planned but not yet made. The pen is at `page`.
     pub(super) fn forget_path(&mut self, page: PagePoint) {
-        self.slack.give_back(self.runner.slack_ahead());
+        #[cfg(feature = "backlash-on-the-way")]
+        let is_settled = self.settle_slack_planned();
+        #[cfg(not(feature = "backlash-on-the-way"))]
+        let is_settled = false;
+        if !is_settled {
+            self.slack.give_back(self.runner.slack_ahead());
+        }
         self.runner.forget_path(page);
+    }
+
+    /// Returns where the planned moves lead the motors, less the slack taken up on the way.
+    pub(super) fn motors_end(&self) -> PagePoint {
+        let end = self.runner.end();
+        #[cfg(feature = "backlash-on-the-way")]
+        let end = self.end_without_slack(end);
+        end
+    }
+
+    /// Forgets on which side of its slack each motor is.
+    pub(super) fn forget_slack(&mut self) {
+        #[cfg(feature = "backlash-on-the-way")]
+        self.settle_slack_planned();
+        self.slack.forget();
+        #[cfg(feature = "backlash-on-the-way")]
+        self.follow_slack_anew();
     }
 
     /// Corrects the state by the slack steps that were planned but never made because the pins were
     /// halted. Returns the slack steps that the pins have counted.
     pub(super) fn find_slack(&mut self) -> PagePoint {
         let (x, y) = self.pins.slack();
+        #[cfg(feature = "backlash-on-the-way")]
+        if self.spreads_slack() {
+            // It is settled by the turns.
+            return PagePoint { x, y };
+        }
         let planned = self.runner.slack();
         self.slack
             .give_back(PagePoint { x: planned.x.wrapping_sub(x), y: planned.y.wrapping_sub(y) });

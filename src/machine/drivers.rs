@@ -25,7 +25,7 @@ impl Machine<'_> {
         }
         self.released_at = self.runner.ticks();
         // As after sleep: the motors had no current.
-        self.slack.forget();
+        self.forget_slack();
         if self.settings.is_on(Setting::Tool) {
             self.runner.forget_lift();
         }

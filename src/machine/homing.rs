@@ -183,7 +183,7 @@ impl Machine<'_> {
         if !is_allowed || !self.is_stopped() {
             return Err(self.refusal());
         }
-        self.slack.forget();
+        self.forget_slack();
         self.begin_phase(Homing::begin(Axis::X, switches.x));
         Ok(())
     }
@@ -268,7 +268,7 @@ impl Machine<'_> {
         let distance =
             homing.distance(steps(properties.homing_travel[axis]), steps(Setting::HomingPullOff));
         let distance = if self.homes_low(homing.axis) { distance } else { -distance };
-        let mut point = self.homing_position(self.runner.position());
+        let mut point = self.homing_position(self.planned_motors());
         let from = homing.pressed_at.unwrap_or(point);
         match homing.axis {
             Axis::X => point.x = from.x + distance,
@@ -290,7 +290,7 @@ impl Machine<'_> {
     /// # Errors
     /// See [`PushError`]. On an error nothing is appended.
     fn push_motor(&mut self, motors: PagePoint) -> Result<(), PushError> {
-        let (end, page) = (self.runner.end(), self.runner.page_end());
+        let (end, page) = (self.motors_end(), self.runner.page_end());
         let way = (motors.x - end.x, motors.y - end.y);
         let page = PagePoint { x: page.x + way.0, y: page.y + way.1 };
         let length = self.runner.limits().length(way.0, way.1).ok_or(PushError::TooLong)?;
@@ -320,7 +320,7 @@ impl Machine<'_> {
     /// length of a belt.
     fn set_homed(&mut self, axis: Axis) {
         let properties = Kinematics::properties(&self.settings);
-        let mut position = self.homing_position(self.runner.position());
+        let mut position = self.homing_position(self.planned_motors());
         let end =
             if self.homes_low(axis) { None } else { Some(properties.homing_travel[axis as usize]) };
         let homed = properties.homed_length.or(end).map_or(0, |setting| {

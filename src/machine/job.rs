@@ -172,6 +172,10 @@ impl Machine<'_> {
     /// pins. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
         self.runner.follow_lift(self.pins.ticks());
+        #[cfg(feature = "backlash-on-the-way")]
+        if self.spreads_slack() {
+            self.follow_slack();
+        }
         if let Activity::Alarm(alarm) = self.activity {
             return self.raise_pen(alarm, queue);
         }
@@ -195,6 +199,10 @@ impl Machine<'_> {
             }
             #[cfg(feature = "resume")]
             if self.rests_in_stroke(queue) {
+                return;
+            }
+            #[cfg(feature = "backlash-on-the-way")]
+            if self.runner.waits_for_turns() {
                 return;
             }
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
@@ -326,6 +334,8 @@ impl Machine<'_> {
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn end_targets(&mut self, source: Source) {
         self.activity.set_source(source);
+        #[cfg(feature = "backlash-on-the-way")]
+        self.push_slack_due();
         self.runner.end_path();
     }
 

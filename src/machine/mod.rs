@@ -11,6 +11,8 @@
 //! beyond the limits. A refused command changes nothing.
 
 mod backlash;
+#[cfg(feature = "backlash-on-the-way")]
+mod backlash_on_the_way;
 mod estimate;
 #[cfg(feature = "driver-pins")]
 mod drivers;
@@ -88,6 +90,9 @@ pub struct Machine<'m> {
     steady: Steady,
     /// How much of its slack each motor has taken up.
     slack: Backlash,
+    /// What of it was taken up while the pen drew on.
+    #[cfg(feature = "backlash-on-the-way")]
+    on_the_way: backlash_on_the_way::SlackOnTheWay,
     /// The contacts that were pressed when they were last observed.
     contacts: Contacts,
     /// The speed override, in percent of the speeds in the settings.
@@ -113,7 +118,8 @@ impl<'m> Machine<'m> {
     /// A machine at rest at the page's origin with the pen raised. If the settings require homing,
     /// it starts in the alarm [`Alarm::NotHomed`].
     ///
-    /// `blocks` is the memory of the look-ahead, at 48 bytes per block. It needs at least one
+    /// `blocks` is the memory of the look-ahead, at 48 bytes per block, or 52 with the
+    /// feature `backlash-on-the-way`. It needs at least one
     /// block; 100 or more work well. `ahead_ticks` is how far the queue is planned ahead of the
     /// pins. The machine plans further ahead if it could otherwise not stop in time when the main
     /// loop is late. A feed hold takes effect after that delay. With `u32::MAX` only the size of
@@ -147,6 +153,8 @@ impl<'m> Machine<'m> {
             segmenter: None,
             steady: Steady::default(),
             slack: Backlash::default(),
+            #[cfg(feature = "backlash-on-the-way")]
+            on_the_way: Default::default(),
             contacts: Contacts::default(),
             percent: 100,
             rapid_percent: 100,
@@ -202,11 +210,23 @@ impl<'m> Machine<'m> {
     fn replace(&mut self, settings: Settings) {
         let (page, before) = (self.position(), self.settings.kinematics());
         let slack = self.slack_steps();
+        // While a path waits, only heights of the pen change.
+        #[cfg(feature = "backlash-on-the-way")]
+        let spreads_slack = (self.spreads_slack() || settings.is_on(Setting::BacklashDistance))
+            && !matches!(self.activity, Activity::Hold { .. });
+        #[cfg(feature = "backlash-on-the-way")]
+        if spreads_slack {
+            self.set_motors(self.motors_now(), page);
+        }
         self.settings = settings;
         self.resize_slack(slack);
         if self.settings.kinematics() != before {
             // The pen stays where it is, but the motors' coordinates for that position change.
             self.set_position(page);
+        }
+        #[cfg(feature = "backlash-on-the-way")]
+        if spreads_slack {
+            self.follow_slack_anew();
         }
         self.take_settings();
         self.configure_pulser();
@@ -258,12 +278,18 @@ impl<'m> Machine<'m> {
     /// Declares where the machine is, whatever position it had: at `motors` in steps of the motors,
     /// which is `page` on the page.
     fn set_motors(&mut self, motors: PagePoint, page: PagePoint) {
+        #[cfg(feature = "backlash-on-the-way")]
+        self.settle_slack_at_pins();
         let (x, y) = self.pins.steps();
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
         self.segmenter = None;
+        #[cfg(feature = "backlash-on-the-way")]
+        self.forget_shift();
         let slack = self.find_slack();
         self.runner.set_lift(self.pins.z());
         self.runner.set_position(motors, slack, page, self.pins.ticks());
+        #[cfg(feature = "backlash-on-the-way")]
+        self.follow_slack_anew();
     }
 
     /// Slows down along the path and raises the pen. A jog is ended instead. In other states
@@ -383,7 +409,7 @@ impl<'m> Machine<'m> {
         match self.activity {
             // The motors had no current, so the slack and the height of the pen are unknown.
             Activity::Sleep { .. } => {
-                self.slack.forget();
+                self.forget_slack();
                 self.runner.forget_lift();
             }
             Activity::Alarm(alarm)
@@ -409,7 +435,7 @@ impl<'m> Machine<'m> {
         if !matches!(self.activity, Activity::Idle) || !self.is_stopped() {
             return Err(self.refusal());
         }
-        self.slack.forget();
+        self.forget_slack();
         self.set_position(PagePoint::default());
         Ok(())
     }

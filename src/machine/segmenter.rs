@@ -9,21 +9,21 @@ use crate::step::Pattern;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segmenter {
     /// The point of the page at which the move starts.
-    from: PagePoint,
+    pub(super) from: PagePoint,
     /// The point of the page at which the move ends.
-    to: PagePoint,
+    pub(super) to: PagePoint,
     /// The length of the whole move, of which segments are parts.
-    length: PathLength,
+    pub(super) length: PathLength,
     /// The length of what has been appended already.
-    position: PathLength,
+    pub(super) position: PathLength,
     /// The last cut that has been passed, in steps; 0 at the beginning.
-    cut: i32,
+    pub(super) cut: i32,
     /// The index of the current dot or gap of the line type.
-    dot: u32,
+    pub(super) dot: u32,
     /// The line type of the move; `None` with the pen up.
-    ink: Option<LineType>,
+    pub(super) ink: Option<LineType>,
     /// The limit of the speed, given as a stopping distance.
-    limit: PathLength,
+    pub(super) limit: PathLength,
 }
 
 impl Segmenter {
@@ -63,6 +63,10 @@ impl Machine<'_> {
         while let Some(segmenter) = self.segmenter
             && !self.runner.is_full()
         {
+            #[cfg(feature = "backlash-on-the-way")]
+            if self.push_on_the_way(&segmenter) {
+                continue;
+            }
             let Segmenter { from, to, length, position, mut cut, dot, mut ink, limit } = segmenter;
             let mut next_dot = dot;
             let way = (to.x - from.x, to.y - from.y);
@@ -93,7 +97,7 @@ impl Machine<'_> {
             }
             let end = PathLength::from_bits(end);
             let positions = [position.to_bits(), end.to_bits()];
-            let begin = self.runner.end();
+            let begin = self.motors_end();
             let SegmentEnd { motors, page, offsets } =
                 kinematics.segment_end([from, to], positions, length.to_bits(), begin);
             let segment =

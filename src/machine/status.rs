@@ -86,12 +86,24 @@ impl Machine<'_> {
     /// Returns the present positions of both motors, in steps.
     pub(super) fn motors_now(&self) -> PagePoint {
         let (x, y) = self.pins.steps();
-        PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) }
+        let motors =
+            PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) };
+        #[cfg(feature = "backlash-on-the-way")]
+        let motors = self.without_slack(motors);
+        motors
+    }
+
+    /// Returns the positions of both motors where the events planned so far end, in steps.
+    pub(super) fn planned_motors(&self) -> PagePoint {
+        let motors = self.runner.position();
+        #[cfg(feature = "backlash-on-the-way")]
+        let motors = self.planned_without_slack(motors);
+        motors
     }
 
     /// The position on the page where the events planned so far end, in steps.
     pub fn planned_position(&self) -> PagePoint {
-        self.settings.kinematics().page(self.runner.position())
+        self.settings.kinematics().page(self.planned_motors())
     }
 
     /// The present position of the pins in millimetres, converted by the steps per millimetre in

@@ -16,6 +16,8 @@ pub(super) struct BlockCursor {
     pub(super) pattern: Pattern,
     pub(super) piece: u32,
     pub(super) length: PathLength,
+    #[cfg(feature = "backlash-on-the-way")]
+    extra: PathLength,
     pub(super) curve_limit: PathLength,
     /// mm per move, 2^-32.
     pub(super) move_length: u64,
@@ -73,6 +75,8 @@ impl BlockCursor {
             pattern,
             piece: 0,
             length: block.length,
+            #[cfg(feature = "backlash-on-the-way")]
+            extra: block.extra,
             curve_limit: block.curve_limit,
             move_length,
             moves,
@@ -98,6 +102,20 @@ impl BlockCursor {
     /// Whether the motors only take up their slack: the pen stays where it is.
     pub(super) fn is_slack(&self) -> bool {
         self.kind == BlockKind::Slack
+    }
+
+    /// How much of the block the pen draws.
+    pub(super) fn drawn(&self) -> PathLength {
+        #[cfg(feature = "backlash-on-the-way")]
+        return self.length.saturating_sub(self.extra);
+        #[cfg(not(feature = "backlash-on-the-way"))]
+        self.length
+    }
+
+    /// Whether a motor turns round that has slack.
+    #[cfg(feature = "backlash-on-the-way")]
+    pub(super) fn turns(&self) -> bool {
+        matches!(self.kind, BlockKind::Slack | BlockKind::Turn)
     }
 
     /// Whether it is the last one.

@@ -13,7 +13,8 @@ fn surely_known(limits: &Limits) -> u32 {
     limits.rounding.to_bits().saturating_mul(9 * 24)
 }
 
-/// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes.
+/// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes,
+/// or 52 with the feature `backlash-on-the-way`.
 ///
 /// The LM3S6965 lends 16 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
 /// far as the stopping distance asks for it (`Lookahead::join`). With fewer blocks than hold
@@ -38,6 +39,9 @@ pub struct Block {
     pub(super) points: u8,
     /// Those chords, in front. What is behind them has no meaning.
     pub(super) chords: [Chord; MOST_CHORDS - 1],
+    /// How much longer its steps are than what the pen draws: they take up slack besides.
+    #[cfg(feature = "backlash-on-the-way")]
+    pub(super) extra: PathLength,
 }
 
 /// A chord of a block behind the first one.
@@ -73,6 +77,9 @@ pub(super) enum BlockKind {
     Gap,
     /// The motors only take up their slack: the pen stays where it is.
     Slack,
+    /// A line with which a motor turns round that takes up its slack on the way.
+    #[cfg(feature = "backlash-on-the-way")]
+    Turn,
 }
 
 impl Block {
@@ -89,6 +96,8 @@ impl Block {
         chord_count: 0,
         points: 1,
         chords: [Chord { dx: 0, dy: 0, length: 0 }; MOST_CHORDS - 1],
+        #[cfg(feature = "backlash-on-the-way")]
+        extra: PathLength::ZERO,
     };
 
     /// The chords behind the first one.
@@ -213,6 +222,10 @@ impl<'m> Lookahead<'m> {
         slot.ink = block.ink;
         slot.offsets = block.offsets;
         slot.kind = block.kind;
+        #[cfg(feature = "backlash-on-the-way")]
+        {
+            slot.extra = block.extra;
+        }
         slot.chord_count = 0;
         slot.points = 1;
         self.count += 1;
@@ -256,6 +269,8 @@ impl<'m> Lookahead<'m> {
         };
         let are_lines = [&*block, line].iter().all(|block| {
             let is_whole = matches!(block.ink, None | Some(LineType::Full));
+            #[cfg(feature = "backlash-on-the-way")]
+            let is_whole = is_whole && block.extra == 0;
             is_whole && block.kind == BlockKind::Line && block.offsets == [0; 2]
         });
         let is_long = block.length.to_bits() >= longest;

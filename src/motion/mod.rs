@@ -49,6 +49,8 @@ pub use profile::Profile;
 #[cfg(feature = "pen-overlap")]
 pub use runner::PenOverlap;
 pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
+#[cfg(feature = "backlash-on-the-way")]
+pub use runner::{OnTheWay, Turn};
 pub use steady::SteadySpeed;
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.

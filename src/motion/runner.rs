@@ -2,10 +2,14 @@
 
 #[cfg_attr(not(feature = "pen-overlap"), path = "runner/pen_at_rest.rs")]
 mod pen;
+#[cfg(feature = "backlash-on-the-way")]
+mod turns;
 
 #[cfg(feature = "pen-overlap")]
 pub use pen::PenOverlap;
 use pen::PenTiming;
+#[cfg(feature = "backlash-on-the-way")]
+pub use turns::{OnTheWay, Turn};
 
 use super::course::BlockCursor;
 use super::curvature::Curvature;
@@ -165,6 +169,11 @@ pub struct Runner<'m> {
     /// When the pen was last told to go up, in ticks of the events; wraps.
     #[cfg(feature = "resume")]
     raised_at: u32,
+    #[cfg(feature = "backlash-on-the-way")]
+    turns: turns::Turns,
+    /// What the next move is, besides a move.
+    #[cfg(feature = "backlash-on-the-way")]
+    on_the_way: OnTheWay,
 }
 
 impl<'m> Runner<'m> {
@@ -210,6 +219,10 @@ impl<'m> Runner<'m> {
             run: RunLengths::default(),
             in_stroke: false,
             was_faster: SliceSpeed::ZERO,
+            #[cfg(feature = "backlash-on-the-way")]
+            turns: turns::Turns::default(),
+            #[cfg(feature = "backlash-on-the-way")]
+            on_the_way: OnTheWay::default(),
         };
         runner.set_limits(limits, pen);
         runner
@@ -423,6 +436,8 @@ impl<'m> Runner<'m> {
     ) {
         self.position = motors;
         self.slack = slack;
+        #[cfg(feature = "backlash-on-the-way")]
+        self.turns.clear();
         self.forget_path(page);
         self.emitter.restart(ticks);
     }
@@ -467,8 +482,21 @@ impl<'m> Runner<'m> {
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
         let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
-        let block =
-            Block { dx, dy, length, entry_limit, curve_limit, ink, offsets, kind, ..Block::EMPTY };
+        #[cfg(feature = "backlash-on-the-way")]
+        let (kind, extra) = core::mem::take(&mut self.on_the_way).of_block(kind);
+        let block = Block {
+            dx,
+            dy,
+            length,
+            entry_limit,
+            curve_limit,
+            ink,
+            offsets,
+            kind,
+            #[cfg(feature = "backlash-on-the-way")]
+            extra,
+            ..Block::EMPTY
+        };
         // Between two blocks the speed is looked at.
         let is_free = corner.limit >= self.limits.top && limit == self.last_limit;
         if self.lookahead.is_full() {
@@ -648,6 +676,10 @@ impl<'m> Runner<'m> {
         self.end = self.position;
         self.slack_end = self.slack;
         self.page_end = page;
+        #[cfg(feature = "backlash-on-the-way")]
+        {
+            self.on_the_way = OnTheWay::default();
+        }
     }
 
     /// Lets `ticks` pass; nothing must wait or move.
@@ -833,6 +865,10 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = course.ink.is_some();
+        #[cfg(feature = "backlash-on-the-way")]
+        if course.turns() {
+            self.turns.add(Turn::new(self.emitter.ticks(), self.position, self.slack));
+        }
         if self.plan.is_some() {
             // The interval in work goes on with these moves.
             let units = self.brake.step_length(course.move_length);
@@ -1059,7 +1095,7 @@ impl<'m> Runner<'m> {
             course.next_piece();
             return;
         }
-        let length = if course.is_slack() { 0 } else { u64::from(course.length.to_bits()) };
+        let length = if course.is_slack() { 0 } else { u64::from(course.drawn().to_bits()) };
         if course.ink.is_some() {
             self.run.drawn += length;
         } else {

@@ -407,7 +407,8 @@ impl Road<'_, '_> {
         let jerk = self.jerk;
         let (mut slices, is_uneven) = jerk.slices_from(from);
         // The hardest braking is as hard as it may be, as soon as it can.
-        let mut least = if from.ramp > -jerk.longest { -MOST_GROWTH } else { 0 };
+        let hardest = if from.ramp > -jerk.longest { -MOST_GROWTH } else { 0 };
+        let mut least = hardest;
         let room = (jerk.longest - from.ramp).checked_div(slices.into()).unwrap_or(0);
         let mut most = MOST_GROWTH.min(room);
         if self.allows(from, most, slices) {
@@ -421,7 +422,8 @@ impl Road<'_, '_> {
                 most = middle;
             }
         }
-        if least == -MOST_GROWTH && from.ramp < least * i32::from(slices) && self.is_slow(from) {
+        // At the longest ramp, too: it would brake to rest, and end that with a jerk.
+        if least == hardest && from.ramp < -MOST_GROWTH * i32::from(slices) && self.is_slow(from) {
             least = MOST_GROWTH;
         }
         // Where it makes the next interval longer, a little less.

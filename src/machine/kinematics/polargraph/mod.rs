@@ -51,6 +51,10 @@ pub struct Anchors {
 /// # Errors
 /// [`LimitsError::Anchors`] if it reaches up to them.
 pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
+    #[cfg(feature = "backlash-on-the-way")]
+    if settings.is_on(Setting::BacklashDistance) {
+        return Err(LimitsError::BacklashOfBelts);
+    }
     if settings.get(Setting::AnchorHeight) > settings.get(Setting::TravelY) {
         Ok(())
     } else {
