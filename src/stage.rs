@@ -269,8 +269,8 @@ pub trait Cancel {
     /// Called when a stage begins, so that the user can be told what is being computed.
     fn enter(&mut self, _stage: Stage) {}
 
-    /// Called as soon as it is known about where on the page the pen will begin, while most is still
-    /// to be computed. The pen may travel there meanwhile.
+    /// Called as soon as it is known about where on the page the pen will begin, while most is
+    /// still to be computed. The pen may travel there meanwhile.
     #[cfg(feature = "early-ink")]
     fn expect_beginning(&mut self, _at: crate::drawing::PagePoint) {}
 }

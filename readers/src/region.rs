@@ -2,9 +2,9 @@
 //!
 //! A region is the union of parts, each of which is what its outlines surround by the rule of
 //! filling. The parts of a mask lie on each other instead: a dark one hides what those below let
-//! through, and the region is where at least half of the light comes through. Whether a line is inside is asked of the middle of each of its pieces between two
-//! crossings, so no crossing is ever taken for an entry or an exit. A line along the border is
-//! inside.
+//! through, and the region is where at least half of the light comes through. Whether a line is
+//! inside is asked of the middle of each of its pieces between two crossings, so no crossing is
+//! ever taken for an entry or an exit. A line along the border is inside.
 
 #![cfg_attr(not(feature = "svg"), expect(dead_code, reason = "only SVG files have clip paths"))]
 

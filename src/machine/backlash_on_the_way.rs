@@ -3,9 +3,10 @@
 //! Where a motor turns round within a line, the steps that take up its slack are spread evenly over
 //! that distance of the line, and are planned as a part of it: the motors' path is the line and
 //! those steps together. So one law of motion limits speed and acceleration of all steps, and the
-//! corners that the spread makes are corners as others. While slack is taken up, the pen lags behind
-//! the line along the axis of that motor: by no more than the slack that is left, nor than the line
-//! has moved on along that axis since it turned. What is left where a line ends is taken up there.
+//! corners that the spread makes are corners as others. While slack is taken up, the pen lags
+//! behind the line along the axis of that motor: by no more than the slack that is left, nor than
+//! the line has moved on along that axis since it turned. What is left where a line ends is taken
+//! up there.
 //!
 //! Before a stroke, on travels, and in lines with gaps, slack is taken up at rest, as without it.
 //!
@@ -180,8 +181,8 @@ impl Machine<'_> {
         self.on_the_way.shift = [0; 2];
     }
 
-    /// The motors move by `delta`, all steps of each having been `from` and its slack `before`. That
-    /// may be the first that is known of their slack.
+    /// The motors move by `delta`, all steps of each having been `from` and its slack `before`.
+    /// That may be the first that is known of their slack.
     #[inline(never)] // Only with this setting: inlined, it would fill the cache.
     pub(super) fn learn_slack(
         &mut self,

@@ -103,8 +103,8 @@ pub fn power_soak(minutes: u32, seed: u64, long: bool, streamed: bool) -> Result
     soak(&mut on_the_pico(test)?, &["--exact", name], minutes, seed)
 }
 
-/// Cuts the power of the emulated Pico before every byte that it writes to its flash, of each kind of
-/// record or of the kind `only`.
+/// Cuts the power of the emulated Pico before every byte that it writes to its flash, of each kind
+/// of record or of the kind `only`.
 pub fn byte_cuts(seed: u64, only: Option<String>) -> Result<()> {
     let mut command = on_the_pico("pico_byte_cuts")?;
     if let Some(only) = only {

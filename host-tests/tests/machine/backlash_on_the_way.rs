@@ -213,9 +213,9 @@ fn slack_is_taken_up_without_a_stop_and_near_the_lines() {
             let smooth = draw(settings(0.1, within), &targets);
             let [off, missed] = deviation(&smooth, &targets);
             println!(
-                "{reversals} turns: {:.2} s without slack, {:.2} s at rest, {:.2} s within {within} \
-                 mm; {} steps at rest; the ink is off by {off:.3} mm, and misses {missed:.3} mm; {:.0} mm/s2, \
-                 {:.0} without slack",
+                "{reversals} turns: {:.2} s without slack, {:.2} s at rest, {:.2} s within \
+                 {within} mm; {} steps at rest; the ink is off by {off:.3} mm, and misses \
+                 {missed:.3} mm; {:.0} mm/s2, {:.0} without slack",
                 tight.seconds,
                 at_rest.seconds,
                 smooth.seconds,

@@ -374,7 +374,8 @@ fn what_is_not_drawn_is_counted() {
         "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
          <image href='a.png' width='9' height='9'/>\
          \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
-         <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'><image href='b.png' y='5' width='9' height='9'/></mask>\
+         <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'>\
+         <image href='b.png' y='5' width='9' height='9'/></mask>\
          <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
     );
     assert_eq!(

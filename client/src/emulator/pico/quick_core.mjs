@@ -5,8 +5,8 @@
 // the registers of the chip, exceptions, special registers and sleep, is left to rp2040js: its
 // interpreter then executes the instruction, before anything of it has been done here.
 //
-// The cycles are those that rp2040js and `core_cycles.mjs` count. The test `pico_core` compares both
-// after each instruction, with random ones.
+// The cycles are those that rp2040js and `core_cycles.mjs` count. The test `pico_core` compares
+// both after each instruction, with random ones.
 
 const RAM = 0x20000000;
 /** The upper bits of the addresses of flash. */
