@@ -15,6 +15,7 @@ pub(crate) type Point = [f64; 2];
 const PER_MM: f64 = 1000.0;
 
 /// The length in mm of the line that is drawn for a dot: more than a motor step.
+#[cfg(any(feature = "dxf", feature = "hpgl", feature = "svg"))]
 const DOT: f64 = 0.02;
 
 /// A polyline that the pen draws.
@@ -125,6 +126,7 @@ impl Plan {
 
     /// Draws a dot on a layer, as a line of [`DOT`] to the right, or to the left at the right end
     /// of the page.
+    #[cfg(any(feature = "dxf", feature = "hpgl", feature = "svg"))]
     pub(crate) fn draw_dot(&mut self, [x, y]: Point, page: Option<[f64; 2]>, pen: u32, layer: u32) {
         let is_at_end = page.is_some_and(|page| x + DOT > page[0]);
         let beside = if is_at_end { x - DOT } else { x + DOT };
