@@ -128,12 +128,12 @@ enum Task {
     /// minutes).
     Lattice7,
     /// Lets the emulated Pico draw the Stanford bunny, which is larger than its memory, and
-    /// compares every step with the host's (some hours).
+    /// compares every step with the host's (some 20 minutes).
     Bunny {
         /// The file; without it, it is fetched.
         file: Option<PathBuf>,
     },
-    /// Does the same with a mesh of 10,000 faces (some 20 minutes).
+    /// Does the same with a mesh of 10,000 faces (some 6 minutes).
     Mesh,
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
