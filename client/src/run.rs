@@ -21,6 +21,7 @@ use crate::sender::{Patience, Sender};
 use crate::tape;
 use penup::index::Index;
 use penup::machine::Setting;
+use penup::plotter::{OPTIONS, PlotOption, PlotOptions};
 use penup::step::tape::BadCode;
 use penup_job::export::{self, Retracing};
 use penup_job::picture::Picture;
@@ -268,9 +269,44 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> 
         note(file, source.notes());
         let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
         note(file, moved.as_slice());
+        if source.bounds().is_some() {
+            note(file, idle_on_plan(&settings).as_slice());
+        }
     }
     let (extent, is_plan) = (source.extent(), source.bounds().is_some());
     Ok(Source { job: Job::new(source, &settings), settings, extent, is_plan })
+}
+
+/// Names the options that change nothing because the drawing lies flat and is drawn as it lies:
+/// those of the camera. `None` if there are none, or if a view is chosen that shows it in space.
+fn idle_on_plan(settings: &Settings) -> Option<String> {
+    let mut options = PlotOptions::default();
+    let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
+    for (name, value) in &settings.values {
+        // What the plotter refuses is told when the job is sent.
+        let _ = options.set(name, value);
+    }
+    let is_of_camera = |line: &&String| {
+        let of = |option: &&PlotOption| line.starts_with(&format!("${}=", option.name));
+        let flag = OPTIONS.iter().find(of).and_then(|option| option.flag.get());
+        flag.is_some_and(|flag| flag.heading == "Camera")
+    };
+    let now: Vec<String> = options.lines().map(|line| line.to_string()).collect();
+    let idle: Vec<String> = now
+        .iter()
+        .zip(&usual)
+        .filter(|(now, usual)| now != usual)
+        .filter(|(now, _)| is_of_camera(now))
+        .filter_map(|(now, _)| now.strip_prefix('$')?.split('=').next())
+        .map(|name| format!("--{name}"))
+        .collect();
+    (options.shows_plans_flat() && !idle.is_empty()).then(|| {
+        format!(
+            "the drawing lies flat and is drawn as it lies, so nothing is changed by {}: they are \
+             for models in space",
+            idle.join(", ")
+        )
+    })
 }
 
 /// A file that was read, with its settings.

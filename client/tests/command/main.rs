@@ -205,6 +205,29 @@ fn an_svg_is_drawn_at_its_place_with_two_pens() {
 }
 
 #[test]
+fn options_that_change_nothing_on_a_plan_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = |text: &str, options: &[&str]| {
+        fs::write(folder.path().join("a.obj"), text).expect("written");
+        let (code, _, noted) =
+            penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
+        assert_eq!(code, Some(0), "{noted}");
+        noted.split_once("nothing is changed by ").map(|(_, rest)| {
+            rest.split_once(": they are").map_or("", |(names, _)| names).to_owned()
+        })
+    };
+    let (plan, solid) = ("v 0 0 0\nv 20 30 0\nl 1 2\n", "v 0 0 0\nv 20 30 0\nv 0 9 9\nf 1 2 3\n");
+    let idle = ["--hidden", "dotted", "--crease", "30"];
+    assert_eq!(told(plan, &idle).as_deref(), Some("--hidden, --crease"));
+    let lens = ["--projection", "orthographic"];
+    assert_eq!(told(plan, &lens).as_deref(), Some("--projection"));
+    assert_eq!(told(plan, &[]), None);
+    assert_eq!(told(plan, &["--lift", "3", "--page", "A4"]), None);
+    assert_eq!(told(plan, &[&idle[..], &["--eye=9,-9,9"]].concat()), None);
+    assert_eq!(told(solid, &idle), None);
+}
+
+#[test]
 fn a_plan_that_the_margin_moves_is_told_and_a_solid_is_not() {
     let folder = tempfile::tempdir().expect("a folder");
     let told = |text: &str, options: &[&str]| {
