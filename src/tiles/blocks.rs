@@ -146,6 +146,16 @@ impl<'t> Blocks<'t> {
         .sum()
     }
 
+    /// Returns how far the elements of the blocks that may meet a rectangle extend on the grid at
+    /// most, or a little more.
+    pub fn extent(&self, near: Rectangle) -> [u16; 2] {
+        let wanted = Block::around(near);
+        self.blocks.iter().filter(|block| block.meets(wanted)).fold([0; 2], |most, block| {
+            let extent = block.extent();
+            [most[0].max(extent[0]), most[1].max(extent[1])]
+        })
+    }
+
     /// Iterates over the elements of all blocks that may meet a rectangle, each with how far it
     /// extends on the grid at most.
     pub fn outlines<'s, S: ModelSource>(

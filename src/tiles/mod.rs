@@ -19,7 +19,8 @@
 //! # Memory
 //! A search can be paused between two tiles ([`Tiles::pause`]); only its index then stays in
 //! memory. A sixteenth of the memory at most is the index of the blocks; another KiB counts the
-//! elements on each part of the page. A small scene takes 8 bytes for each element, 32 for each
+//! elements on each part of the page, and a sixteenth lists the elements around the next tiles. A
+//! small scene takes 8 bytes for each element, 32 for each
 //! vertex (20 if no positions are known), 2 for each corner, and what the search takes. The fewest
 //! elements for which there must be room are those that meet a single edge.
 //!
@@ -34,18 +35,20 @@ mod needs;
 mod outline;
 mod owner;
 mod page;
+mod region;
 mod source;
 
 use crate::geometry::{Precision, Projection, Vertex};
 use crate::index::Index;
 use crate::model::{Corner, Position};
-use crate::stage::{Cancel, Scratch};
+use crate::stage::{Aborted, Cancel, Scratch};
 use crate::visibility::{Options, StretchSink, VisibilityError, YieldCounter};
 use blocks::{Blocks, PausedBlocks};
 use load::Reach;
 use outline::Outline;
 use owner::OfTile;
 use page::{Rectangle, Tile};
+use region::{PausedRegion, Region};
 
 pub use page::Survey;
 pub use source::{Projected, ProjectedStored};
@@ -92,6 +95,10 @@ const LOOK: usize = 3000;
 /// The number of instructions for placing an element on the page.
 const PLACE: usize = 8000;
 
+/// A region has a margin of one in so many points of its shorter side: the next tiles also need the
+/// elements beside them.
+const REGION_MARGIN: u16 = 16;
+
 /// An element takes at least so many bytes in most models. A tile with more elements than that is
 /// divided before it is loaded.
 const LIKELY_BYTES: usize = 48;
@@ -108,6 +115,8 @@ pub struct Tiles<'t, S> {
     survey: Survey,
     /// Where the elements lie on the page.
     blocks: Blocks<'t>,
+    /// The elements around the next tiles.
+    region: Region<'t>,
     /// The tile that comes next.
     next: Option<Tile>,
 }
@@ -119,6 +128,8 @@ pub struct PausedTiles {
     survey: Survey,
     /// How the index of the blocks lies in memory.
     blocks: PausedBlocks,
+    /// The elements around the next tiles.
+    region: PausedRegion,
     /// The tile that comes next.
     next: Option<Tile>,
 }
@@ -126,7 +137,7 @@ pub struct PausedTiles {
 impl PausedTiles {
     /// The number of words at the front of the memory that the index takes.
     pub fn index_words(&self) -> usize {
-        self.blocks.words()
+        self.blocks.words() + self.region.words()
     }
 
     /// The number of faces that are left out because they have no area.
@@ -198,14 +209,15 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> Result<Option<Self>, VisibilityError> {
         let Some(survey) = Survey::new(source, &sight, cancel)? else { return Ok(None) };
         let blocks = Blocks::new(source, &sight, &survey, scratch, cancel)?;
-        Ok(Some(Self { source, sight, options, survey, blocks, next: Some(Tile::FIRST) }))
+        let region = Region::new(scratch)?;
+        Ok(Some(Self { source, sight, options, survey, blocks, region, next: Some(Tile::FIRST) }))
     }
 
     /// Ends for now, so that the memory can be used for other things. The index, which lies at the
     /// front of the memory that was given to [`Tiles::new`], must stay as it is.
     pub fn pause(self) -> PausedTiles {
-        let Self { survey, blocks, next, .. } = self;
-        PausedTiles { survey, blocks: blocks.pause(), next }
+        let Self { survey, blocks, region, next, .. } = self;
+        PausedTiles { survey, blocks: blocks.pause(), region: region.known, next }
     }
 
     /// Goes on with a search, with the same model and options. `index` is the memory that was given
@@ -215,11 +227,13 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         sight: Sight,
         options: Options,
         paused: PausedTiles,
-        index: &'t [u64],
+        index: &'t mut [u64],
     ) -> Option<Self> {
-        let PausedTiles { survey, blocks, next } = paused;
-        let blocks = Blocks::go_on(blocks, index)?;
-        Some(Self { source, sight, options, survey, blocks, next })
+        let PausedTiles { survey, blocks, region, next } = paused;
+        let (of_blocks, of_region) = index.split_at_mut_checked(blocks.words())?;
+        let blocks = Blocks::go_on(blocks, of_blocks)?;
+        let region = Region::go_on(region, of_region)?;
+        Some(Self { source, sight, options, survey, blocks, region, next })
     }
 
     /// Calls `visit` with each point of each element that has an extent and is seen.
@@ -268,7 +282,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
 
     /// Iterates over the elements of the model. Those that may meet a rectangle are handed over;
     /// each other one that must be looked at is a `None`, so that the caller can check for
-    /// cancelling. They are taken from `listed`, if it has all of them.
+    /// cancelling. They are taken from `listed`, if it has all of them, or from the region.
     fn outlines(
         &self,
         near: Rectangle,
@@ -276,14 +290,21 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> impl Iterator<Item = Option<Outline<'t, S>>> {
         let listed = listed.filter(|listed| listed.near.includes(near));
         let of_list = listed.map_or(&[] as &[u32], |listed| listed.firsts).iter();
+        let in_region = listed.is_none() && self.region.includes(near);
+        let of_region = in_region.then(|| self.region.firsts());
+        let is_elsewhere = listed.is_none() && !in_region;
+        let of_model = is_elsewhere.then(|| self.blocks.outlines(self.source, near));
+        let most_in_region = self.region.extent();
         let window = self.survey.window(near);
         let is_all = near == Rectangle::ALL;
-        let of_model = self.blocks.outlines(self.source, near);
         // Most elements are small and lie far away: then one of their vertices is enough.
         let (mut around, mut extent) = (window, [0; 2]);
+        let of_region = of_region.into_iter().flatten().map(move |first| (first, most_in_region));
         of_list
-            .map(|&first| (Outline::at(self.source, first as usize), [0; 2]))
-            .chain(of_model.take_while(move |_| listed.is_none()))
+            .map(|&first| (first as usize, [0; 2]))
+            .chain(of_region)
+            .map(|(first, most)| (Outline::at(self.source, first), most))
+            .chain(of_model.into_iter().flatten())
             .map(move |(outline, most)| {
                 if is_all || listed.is_some() {
                     return Some(outline);
@@ -295,6 +316,41 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
                     && outline.may_meet(&self.sight, &window);
                 is_near.then_some(outline)
             })
+    }
+
+    /// Makes the region one that has a tile, as large as there is room for. If even the tile has
+    /// too many elements, there is no region.
+    fn move_region(&mut self, tile: Tile, cancel: &mut dyn Cancel) -> Result<(), Aborted> {
+        if self.region.includes(tile.rectangle()) {
+            return Ok(());
+        }
+        self.region.clear();
+        while let Some(part) = tile.part_of(self.region.known.depth) {
+            let part = part.rectangle();
+            if self.blocks.count_at_least(part) <= self.region.room()
+                && self.list_region(part, cancel)?
+            {
+                return Ok(());
+            }
+            self.region.known.depth += 1;
+        }
+        self.region.known.depth = tile.depth();
+        Ok(())
+    }
+
+    /// Lists the elements around a part of the page as the region. Returns whether they fit.
+    fn list_region(&mut self, part: Rectangle, cancel: &mut dyn Cancel) -> Result<bool, Aborted> {
+        let margin = part.extent().iter().min().map_or(0, |extent| extent / REGION_MARGIN);
+        let near = part.grown(margin);
+        let mut region = self.region.take();
+        let yield_counter = &mut YieldCounter::new(cancel);
+        let firsts = self.outlines(near, None).map(|outline| {
+            yield_counter.spend(LOOK)?;
+            Ok(outline.map(|outline| outline.first()))
+        });
+        let outcome = region.list(near, self.blocks.extent(near), firsts);
+        self.region = region;
+        outcome
     }
 
     /// Lists the elements that may meet a rectangle. Returns `None` if they do not fit.
@@ -341,7 +397,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     /// Finds the stretches of a tile. Returns `false`, and hands over nothing, if it must be
     /// divided.
     fn follow<N: Index>(
-        &self,
+        &mut self,
         tile: Tile,
         mut scratch: Scratch<'_>,
         cancel: &mut dyn Cancel,
@@ -359,7 +415,9 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let no_small_faces = limit.iter().any(|&part| part < self.doubt());
         // Most edges that begin in the tile end not far beside it.
         let margin = limit.iter().min().map_or(0, |limit| limit / 4);
-        let listed = self.list(rectangle.grown(margin), &mut scratch, cancel)?;
+        self.move_region(tile, cancel)?;
+        let near = self.region.clip(rectangle, rectangle.grown(margin));
+        let listed = self.list(near, &mut scratch, cancel)?;
         let listed = listed.as_ref();
         let needs = self.needs(rectangle, no_small_faces, listed, cancel)?;
         if needs.all == Rectangle::NONE {

@@ -285,6 +285,18 @@ impl Tile {
         Some(Self { path: (self.path >> last_halves) + 1, depth })
     }
 
+    /// Returns the number of divisions.
+    pub fn depth(self) -> u32 {
+        self.depth
+    }
+
+    /// Returns the part of the page that is divided so many times and has this tile in it. `None`
+    /// if the tile is larger than that.
+    pub fn part_of(self, depth: u32) -> Option<Self> {
+        let more = self.depth.checked_sub(depth)?;
+        Some(Self { path: self.path.checked_shr(more).unwrap_or(0), depth })
+    }
+
     /// Returns the points of the grid that belong to the tile.
     pub fn rectangle(self) -> Rectangle {
         let (mut low, mut bits) = ([0u32; 2], [GRID_BITS; 2]);

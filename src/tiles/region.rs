@@ -1,0 +1,146 @@
+//! The elements around several tiles, found once for all of them.
+//!
+//! The faces of many models are in no order on the page, so nearly all of them must be looked at to
+//! find those that meet a tile. A region is a larger part of the page whose elements are listed, in
+//! a byte each, so that only these are looked at for each tile in it.
+
+use super::page::Rectangle;
+use crate::stage::{OutOfScratch, Scratch};
+
+/// The part of the working memory that the list takes is one in so many bytes.
+const SHARE: usize = 16;
+
+/// A region with fewer elements than one in so many for which there is room is small: the next one
+/// may be twice as large.
+const SMALL: usize = 4;
+
+/// A step over so many corners that leads to no element. A lesser one leads from the first corner
+/// of an element to that of the next.
+const FAR: u8 = u8::MAX;
+
+/// What is known of a region beside its list.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PausedRegion {
+    /// The rectangle whose elements are listed, [`Rectangle::NONE`] if none are.
+    near: Rectangle,
+    /// How far an element of the list extends on the grid at most.
+    extent: [u16; 2],
+    /// The number of steps of the list.
+    length: usize,
+    /// How often the page is divided to get the next region.
+    pub depth: u32,
+    /// The number of words of memory.
+    words: usize,
+}
+
+impl PausedRegion {
+    /// The number of words of memory that the list takes.
+    pub fn words(&self) -> usize {
+        self.words
+    }
+}
+
+/// The list of all elements that may meet a part of the page, in the order of the model.
+#[derive(Debug)]
+pub(super) struct Region<'t> {
+    /// The way from each element to the next, and from corner 0 to the first.
+    steps: &'t mut [u8],
+    /// What else is known.
+    pub known: PausedRegion,
+}
+
+impl<'t> Region<'t> {
+    /// Takes memory for a list, which is empty so far.
+    ///
+    /// # Errors
+    /// [`OutOfScratch`].
+    pub fn new(scratch: &mut Scratch<'t>) -> Result<Self, OutOfScratch> {
+        let words = scratch.available_bytes() / SHARE / size_of::<u64>();
+        let near = Rectangle::NONE;
+        let known = PausedRegion { near, extent: [0; 2], length: 0, depth: 0, words };
+        Ok(Self { steps: scratch.take(words * size_of::<u64>())?, known })
+    }
+
+    /// Finds the list again, which lies at the front of `memory`.
+    pub fn go_on(known: PausedRegion, memory: &'t mut [u64]) -> Option<Self> {
+        Some(Self { steps: bytemuck::cast_slice_mut(memory.get_mut(..known.words)?), known })
+    }
+
+    /// Returns the number of elements for which there is room.
+    pub fn room(&self) -> usize {
+        self.steps.len()
+    }
+
+    /// Whether all elements are listed that may meet a rectangle.
+    pub fn includes(&self, near: Rectangle) -> bool {
+        self.known.near != Rectangle::NONE && self.known.near.includes(near)
+    }
+
+    /// Returns how far an element of the list extends on the grid at most.
+    pub fn extent(&self) -> [u16; 2] {
+        self.known.extent
+    }
+
+    /// Iterates over the first corners of the elements.
+    pub fn firsts(&self) -> impl Iterator<Item = usize> {
+        let mut first = 0;
+        let steps = self.steps.get(..self.known.length).unwrap_or(&[]);
+        steps.iter().filter_map(move |&step| {
+            first += usize::from(step);
+            (step != FAR).then_some(first)
+        })
+    }
+
+    /// Returns as much of `wanted` as is listed, if `least` is.
+    pub fn clip(&self, least: Rectangle, wanted: Rectangle) -> Rectangle {
+        let listed = self.includes(least).then_some(self.known.near);
+        listed.and_then(|near| near.intersection(wanted)).unwrap_or(wanted)
+    }
+
+    /// Lists elements, given by their first corners, in place of those before: those that may meet
+    /// `near`, none of which extends farther than `extent`. A corner that is `None` is none.
+    /// Returns whether all of them fit; otherwise no element is listed.
+    ///
+    /// # Errors
+    /// That of `firsts`, with no element listed.
+    pub fn list<E>(
+        &mut self,
+        near: Rectangle,
+        extent: [u16; 2],
+        firsts: impl Iterator<Item = Result<Option<usize>, E>>,
+    ) -> Result<bool, E> {
+        self.clear();
+        let (mut length, mut last) = (0, 0);
+        for first in firsts {
+            let Some(first) = first? else { continue };
+            let mut way = first - last;
+            loop {
+                let Some(step) = self.steps.get_mut(length) else { return Ok(false) };
+                length += 1;
+                *step = way.min(FAR.into()) as u8;
+                way -= usize::from(*step);
+                if *step != FAR {
+                    break;
+                }
+            }
+            last = first;
+        }
+        if length < self.steps.len() / SMALL {
+            self.known.depth = self.known.depth.saturating_sub(1);
+        }
+        self.known = PausedRegion { near, extent, length, ..self.known };
+        Ok(true)
+    }
+
+    /// Takes the region and leaves one without elements and memory.
+    pub fn take(&mut self) -> Self {
+        self.clear();
+        Self { steps: core::mem::take(&mut self.steps), known: self.known }
+    }
+
+    /// Forgets the elements.
+    pub fn clear(&mut self) {
+        self.known.near = Rectangle::NONE;
+        self.known.length = 0;
+    }
+}
