@@ -143,18 +143,26 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> Result<Loaded<'a>, VisibilityError> {
         let (source, sight) = (self.source, &self.sight);
         let (mut corner_count, mut changes, mut pen) = (0, 0, 0);
+        let window = self.survey.window(reach.bounds());
         let firsts: &[u32] = scratch.take_filled(|room| {
             let mut count = 0;
             let yield_counter = &mut YieldCounter::new(cancel);
             for outline in self.outlines(reach.bounds(), listed) {
                 yield_counter.spend(LOOK)?;
                 let Some(outline) = outline else { continue };
-                yield_counter.spend(PLACE)?;
                 let first = outline.first();
-                let bounds = outline.bounds(sight, &self.survey);
-                if bounds.is_none_or(|bounds| !reach.includes(first, bounds))
-                    || !outline.has_extent()
-                {
+                let is_reached = match reach {
+                    Reach::Rectangle(near) => {
+                        yield_counter.spend(LOOK)?;
+                        outline.meets(sight, &self.survey, near, &window)
+                    }
+                    _ => {
+                        yield_counter.spend(PLACE)?;
+                        let bounds = outline.bounds(sight, &self.survey);
+                        bounds.is_some_and(|bounds| reach.includes(first, bounds))
+                    }
+                };
+                if !is_reached || !outline.has_extent() {
                     continue;
                 }
                 let length = room.len();

@@ -99,9 +99,9 @@ const PLACE: usize = 8000;
 /// elements beside them.
 const REGION_MARGIN: u16 = 16;
 
-/// An element takes at least so many bytes in most models. A tile with more elements than that is
-/// divided before it is loaded.
-const LIKELY_BYTES: usize = 48;
+/// For each element of a tile so many bytes are needed in most models, for what lies beside the tile
+/// and for the search, too. A tile with more elements than that is divided before it is loaded.
+const LIKELY_BYTES: usize = 72;
 
 /// The search for the stretches of a model, tile after tile.
 pub struct Tiles<'t, S> {
@@ -312,9 +312,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
                 if most != extent {
                     (around, extent) = (self.survey.window_around(near, most), most);
                 }
-                let is_near = outline.may_begin_in(&self.sight, &around)
-                    && outline.may_meet(&self.sight, &window);
-                is_near.then_some(outline)
+                outline.may_meet(&self.sight, &window, &around).then_some(outline)
             })
     }
 

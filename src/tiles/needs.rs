@@ -74,9 +74,13 @@ impl<S: ModelSource> Tiles<'_, S> {
         let limit = tile.extent();
         let beyond = Rectangle { high: Rectangle::ALL.high, ..tile };
         let yield_counter = &mut YieldCounter::new(cancel);
+        let window = self.survey.window(tile);
         for outline in self.outlines(tile, listed) {
             yield_counter.spend(LOOK)?;
             let Some(outline) = outline else { continue };
+            if !outline.meets(&self.sight, &self.survey, tile, &window) {
+                continue;
+            }
             yield_counter.spend(PLACE)?;
             let mut around = none;
             outline.each_side(&self.sight, &self.survey, &mut |_, [a, b]| {
@@ -92,9 +96,6 @@ impl<S: ModelSource> Tiles<'_, S> {
                     needs.long_sides += 1;
                 }
             });
-            if !around.meets(tile) {
-                continue;
-            }
             needs.elements += 1;
             if !self.options.with_seams || outline.is_bar() {
                 continue;
