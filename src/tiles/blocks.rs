@@ -156,26 +156,44 @@ impl<'t> Blocks<'t> {
         })
     }
 
-    /// Iterates over the elements of all blocks that may meet a rectangle, each with how far it
-    /// extends on the grid at most.
-    pub fn outlines<'s, S: ModelSource>(
-        &self,
-        source: &'s S,
-        near: Rectangle,
-    ) -> impl Iterator<Item = (Outline<'s, S>, [u16; 2])> {
-        let wanted = Block::around(near);
-        let is_near = move |(_, block): &(usize, &Block)| block.meets(wanted);
-        let length = self.length;
-        self.blocks.iter().enumerate().filter(is_near).flat_map(move |(number, block)| {
-            let end = source.corner_count().min((number + 1) * length);
-            let mut next = start_after(source, number * length);
-            core::iter::from_fn(move || {
-                let outline = (next < end).then(|| Outline::at(source, next))?;
-                next = outline.end();
-                Some((outline, block.extent()))
-            })
-        })
+    /// Begins to go through the elements of all blocks that may meet a rectangle.
+    pub fn cursor(&self, near: Rectangle) -> BlockCursor {
+        BlockCursor { near: Block::around(near), block: 0, next: 0, end: 0, extent: [0; 2] }
     }
+
+    /// Returns the next element, and how far those of its block extend on the grid at most.
+    pub fn next<'s, S: ModelSource>(
+        &self,
+        cursor: &mut BlockCursor,
+        source: &'s S,
+    ) -> Option<(Outline<'s, S>, [u16; 2])> {
+        while cursor.next >= cursor.end {
+            let block = self.blocks.get(cursor.block)?;
+            if block.meets(cursor.near) {
+                cursor.next = start_after(source, cursor.block * self.length);
+                cursor.end = source.corner_count().min((cursor.block + 1) * self.length);
+                cursor.extent = block.extent();
+            }
+            cursor.block += 1;
+        }
+        let outline = Outline::at(source, cursor.next);
+        cursor.next = outline.end();
+        Some((outline, cursor.extent))
+    }
+}
+
+/// How far one has gone through the blocks.
+pub(super) struct BlockCursor {
+    /// The rectangle that the blocks may meet.
+    near: Block,
+    /// The number of the next block.
+    block: usize,
+    /// The first corner of the next element of the block before it, unless it is `end`.
+    next: usize,
+    /// The corner at which that block ends.
+    end: usize,
+    /// How far the elements of that block extend on the grid at most.
+    extent: [u16; 2],
 }
 
 /// Returns the index of the count to which a point belongs.

@@ -33,6 +33,7 @@ mod blocks;
 mod load;
 mod needs;
 mod outline;
+mod outlines;
 mod owner;
 mod page;
 mod region;
@@ -280,42 +281,6 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         Ok(true)
     }
 
-    /// Iterates over the elements of the model. Those that may meet a rectangle are handed over;
-    /// each other one that must be looked at is a `None`, so that the caller can check for
-    /// cancelling. They are taken from `listed`, if it has all of them, or from the region.
-    fn outlines(
-        &self,
-        near: Rectangle,
-        listed: Option<&Listed<'_>>,
-    ) -> impl Iterator<Item = Option<Outline<'t, S>>> {
-        let listed = listed.filter(|listed| listed.near.includes(near));
-        let of_list = listed.map_or(&[] as &[u32], |listed| listed.firsts).iter();
-        let in_region = listed.is_none() && self.region.includes(near);
-        let of_region = in_region.then(|| self.region.firsts());
-        let is_elsewhere = listed.is_none() && !in_region;
-        let of_model = is_elsewhere.then(|| self.blocks.outlines(self.source, near));
-        let most_in_region = self.region.extent();
-        let window = self.survey.window(near);
-        let is_all = near == Rectangle::ALL;
-        // Most elements are small and lie far away: then one of their vertices is enough.
-        let (mut around, mut extent) = (window, [0; 2]);
-        let of_region = of_region.into_iter().flatten().map(move |first| (first, most_in_region));
-        of_list
-            .map(|&first| (first as usize, [0; 2]))
-            .chain(of_region)
-            .map(|(first, most)| (Outline::at(self.source, first), most))
-            .chain(of_model.into_iter().flatten())
-            .map(move |(outline, most)| {
-                if is_all || listed.is_some() {
-                    return Some(outline);
-                }
-                if most != extent {
-                    (around, extent) = (self.survey.window_around(near, most), most);
-                }
-                outline.may_meet(&self.sight, &window, &around).then_some(outline)
-            })
-    }
-
     /// Makes the region one that has a tile, as large as there is room for. If even the tile has
     /// too many elements, there is no region.
     fn move_region(&mut self, tile: Tile, cancel: &mut dyn Cancel) -> Result<(), Aborted> {
@@ -340,14 +305,22 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     fn list_region(&mut self, part: Rectangle, cancel: &mut dyn Cancel) -> Result<bool, Aborted> {
         let margin = part.extent().iter().min().map_or(0, |extent| extent / REGION_MARGIN);
         let near = part.grown(margin);
+        let extent = self.blocks.extent(near);
         let mut region = self.region.take();
+        let mut outcome = Ok(true);
         let yield_counter = &mut YieldCounter::new(cancel);
-        let firsts = self.outlines(near, None).map(|outline| {
-            yield_counter.spend(LOOK)?;
-            Ok(outline.map(|outline| outline.first()))
-        });
-        let outcome = region.list(near, self.blocks.extent(near), firsts);
+        for outline in self.outlines(near, None) {
+            outcome = yield_counter
+                .spend(LOOK)
+                .map(|()| outline.is_none_or(|outline| region.push(outline.first())));
+            if outcome != Ok(true) {
+                break;
+            }
+        }
         self.region = region;
+        if outcome == Ok(true) {
+            self.region.finish(near, extent);
+        }
         outcome
     }
 

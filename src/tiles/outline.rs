@@ -34,6 +34,7 @@ impl<'s, S: ModelSource> Outline<'s, S> {
     }
 
     /// Returns the vertex at a corner, in view coordinates.
+    #[inline(never)] // One copy of the code is enough: it is long.
     fn vertex(&self, corner: usize) -> Vertex {
         let corner = if corner == self.first { self.start } else { self.source.corner(corner) };
         self.source.vertex(corner.vertex())
@@ -64,6 +65,7 @@ impl<'s, S: ModelSource> Outline<'s, S> {
 
     /// Calls `visit` with each point of the outline, in its order. What is nearer than `near` is
     /// cut off as [`crate::view`] does it.
+    #[inline(never)] // One copy of the code is enough: it is long.
     pub fn each_point(&self, near: Option<i32>, visit: &mut dyn FnMut(Vertex)) {
         let is_seen = |vertex: Vertex| near.is_none_or(|near| vertex.z >= near);
         let is_bar = self.is_bar();
@@ -107,6 +109,7 @@ impl<'s, S: ModelSource> Outline<'s, S> {
     }
 
     /// Whether the rectangle around the outline meets another, which `window` stands for.
+    #[inline(never)] // One copy of the code is enough: it is long.
     pub fn meets(&self, sight: &Sight, survey: &Survey, other: Rectangle, window: &Window) -> bool {
         let mut beyond = u32::MAX;
         for corner in self.first..self.end {
@@ -121,6 +124,7 @@ impl<'s, S: ModelSource> Outline<'s, S> {
     }
 
     /// Returns the rectangle around the outline on the page, `None` if nothing of it is seen.
+    #[inline(never)] // One copy of the code is enough: it is long.
     pub fn bounds(&self, sight: &Sight, survey: &Survey) -> Option<Rectangle> {
         let (mut bounds, mut count) = (Rectangle::NONE, 0);
         self.each_point(sight.near, &mut |vertex| {

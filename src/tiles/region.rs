@@ -6,6 +6,7 @@
 
 use super::page::Rectangle;
 use crate::stage::{OutOfScratch, Scratch};
+use core::slice;
 
 /// The part of the working memory that the list takes is one in so many bytes.
 const SHARE: usize = 16;
@@ -47,6 +48,29 @@ pub(super) struct Region<'t> {
     steps: &'t mut [u8],
     /// What else is known.
     pub known: PausedRegion,
+    /// The first corner of the element that was listed last.
+    last: usize,
+}
+
+/// How far one has gone through the list.
+pub(super) struct RegionCursor<'a> {
+    /// The steps that are left.
+    steps: slice::Iter<'a, u8>,
+    /// The first corner of the element before them.
+    first: usize,
+}
+
+impl RegionCursor<'_> {
+    /// Returns the first corner of the next element.
+    pub fn next(&mut self) -> Option<usize> {
+        loop {
+            let step = *self.steps.next()?;
+            self.first += usize::from(step);
+            if step != FAR {
+                return Some(self.first);
+            }
+        }
+    }
 }
 
 impl<'t> Region<'t> {
@@ -58,12 +82,13 @@ impl<'t> Region<'t> {
         let words = scratch.available_bytes() / SHARE / size_of::<u64>();
         let near = Rectangle::NONE;
         let known = PausedRegion { near, extent: [0; 2], length: 0, depth: 0, words };
-        Ok(Self { steps: scratch.take(words * size_of::<u64>())?, known })
+        Ok(Self { steps: scratch.take(words * size_of::<u64>())?, known, last: 0 })
     }
 
     /// Finds the list again, which lies at the front of `memory`.
     pub fn go_on(known: PausedRegion, memory: &'t mut [u64]) -> Option<Self> {
-        Some(Self { steps: bytemuck::cast_slice_mut(memory.get_mut(..known.words)?), known })
+        let steps = bytemuck::cast_slice_mut(memory.get_mut(..known.words)?);
+        Some(Self { steps, known, last: 0 })
     }
 
     /// Returns the number of elements for which there is room.
@@ -81,14 +106,10 @@ impl<'t> Region<'t> {
         self.known.extent
     }
 
-    /// Iterates over the first corners of the elements.
-    pub fn firsts(&self) -> impl Iterator<Item = usize> {
-        let mut first = 0;
+    /// Begins to go through the elements.
+    pub fn cursor(&self) -> RegionCursor<'_> {
         let steps = self.steps.get(..self.known.length).unwrap_or(&[]);
-        steps.iter().filter_map(move |&step| {
-            first += usize::from(step);
-            (step != FAR).then_some(first)
-        })
+        RegionCursor { steps: steps.iter(), first: 0 }
     }
 
     /// Returns as much of `wanted` as is listed, if `least` is.
@@ -97,49 +118,40 @@ impl<'t> Region<'t> {
         listed.and_then(|near| near.intersection(wanted)).unwrap_or(wanted)
     }
 
-    /// Lists elements, given by their first corners, in place of those before: those that may meet
-    /// `near`, none of which extends farther than `extent`. A corner that is `None` is none.
-    /// Returns whether all of them fit; otherwise no element is listed.
-    ///
-    /// # Errors
-    /// That of `firsts`, with no element listed.
-    pub fn list<E>(
-        &mut self,
-        near: Rectangle,
-        extent: [u16; 2],
-        firsts: impl Iterator<Item = Result<Option<usize>, E>>,
-    ) -> Result<bool, E> {
-        self.clear();
-        let (mut length, mut last) = (0, 0);
-        for first in firsts {
-            let Some(first) = first? else { continue };
-            let mut way = first - last;
-            loop {
-                let Some(step) = self.steps.get_mut(length) else { return Ok(false) };
-                length += 1;
-                *step = way.min(FAR.into()) as u8;
-                way -= usize::from(*step);
-                if *step != FAR {
-                    break;
-                }
+    /// Adds an element, given by its first corner, behind those that are listed. Returns whether
+    /// there was room for it.
+    pub fn push(&mut self, first: usize) -> bool {
+        let mut way = first.saturating_sub(self.last);
+        self.last = first;
+        loop {
+            let Some(step) = self.steps.get_mut(self.known.length) else { return false };
+            self.known.length += 1;
+            *step = way.min(FAR.into()) as u8;
+            way -= usize::from(*step);
+            if *step != FAR {
+                return true;
             }
-            last = first;
         }
-        if length < self.steps.len() / SMALL {
+    }
+
+    /// Says which elements have been listed: all that may meet `near`, none of which extends
+    /// farther on the grid than `extent`.
+    pub fn finish(&mut self, near: Rectangle, extent: [u16; 2]) {
+        (self.known.near, self.known.extent) = (near, extent);
+        if self.known.length < self.steps.len() / SMALL {
             self.known.depth = self.known.depth.saturating_sub(1);
         }
-        self.known = PausedRegion { near, extent, length, ..self.known };
-        Ok(true)
     }
 
     /// Takes the region and leaves one without elements and memory.
     pub fn take(&mut self) -> Self {
         self.clear();
-        Self { steps: core::mem::take(&mut self.steps), known: self.known }
+        Self { steps: core::mem::take(&mut self.steps), known: self.known, last: 0 }
     }
 
     /// Forgets the elements.
     pub fn clear(&mut self) {
+        self.last = 0;
         self.known.near = Rectangle::NONE;
         self.known.length = 0;
     }
