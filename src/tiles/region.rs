@@ -156,3 +156,70 @@ impl<'t> Region<'t> {
         self.known.length = 0;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::page::GridPoint;
+    use super::*;
+    use std::vec::Vec;
+
+    /// A rectangle from (0, 0) to (`side`, `side`).
+    fn square(side: u16) -> Rectangle {
+        Rectangle { low: GridPoint { x: 0, y: 0 }, high: GridPoint { x: side, y: side } }
+    }
+
+    /// The elements of a region.
+    fn listed(region: &Region<'_>) -> Vec<usize> {
+        let mut cursor = region.cursor();
+        core::iter::from_fn(|| cursor.next()).collect()
+    }
+
+    #[test]
+    fn elements_far_apart_take_more_steps() {
+        let mut words = [0; 16 * 8];
+        let mut region = Region::new(&mut Scratch::new(&mut words)).unwrap();
+        assert_eq!(region.room(), 64);
+        // Distances around 255 and its double, and the first element of the model.
+        let firsts = [0, 3, 257, 511, 766, 1022, 1531, 2041, 2552, 100_000];
+        let mut fit = 0;
+        for first in firsts {
+            fit += usize::from(region.push(first));
+        }
+        // The last one is 382 times 255 corners away.
+        assert_eq!(fit, firsts.len() - 1);
+        region.clear();
+        assert_eq!(listed(&region), [0; 0]);
+        assert!(firsts[..9].iter().all(|&first| region.push(first)));
+        region.finish(square(9), [1, 2]);
+        assert_eq!(listed(&region), firsts[..9]);
+        assert_eq!(region.extent(), [1, 2]);
+    }
+
+    #[test]
+    fn it_includes_what_lies_within_it_only() {
+        let mut words = [0; 16];
+        let mut region = Region::new(&mut Scratch::new(&mut words)).unwrap();
+        assert!(!region.includes(square(1)) && !region.includes(Rectangle::NONE));
+        assert_eq!(region.clip(square(5), square(20)), square(20));
+        region.finish(square(9), [0; 2]);
+        assert!(region.includes(square(9)) && !region.includes(square(10)));
+        assert_eq!(region.clip(square(5), square(20)), square(9));
+        assert_eq!(region.clip(square(10), square(20)), square(20));
+        let (known, memory) = (region.known, &mut [0; 1]);
+        assert!(Region::go_on(known, memory).is_some_and(|region| region.includes(square(9))));
+        assert!(Region::go_on(known, &mut []).is_none());
+    }
+
+    #[test]
+    fn the_next_region_is_larger_after_a_small_one_only() {
+        let mut words = [0; 16 * 8];
+        let mut region = Region::new(&mut Scratch::new(&mut words)).unwrap();
+        for (count, depth) in [(16, 5), (15, 4)] {
+            region.known.depth = 5;
+            region.clear();
+            assert!((0..count).all(|number| region.push(3 * number)));
+            region.finish(square(9), [0; 2]);
+            assert_eq!(region.known.depth, depth, "{count} elements of 64");
+        }
+    }
+}
