@@ -1,6 +1,6 @@
 //! Reads the text form of DXF as plans: lines, polylines with bulges, arcs, circles, ellipses and
-//! splines, points, level faces and dimensions, also in blocks, as they are seen from above, with
-//! the dashes of their line types.
+//! splines, points, level faces, dimensions and texts, also in blocks, as they are seen from above,
+//! with the dashes of their line types.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
@@ -10,6 +10,7 @@ mod curves;
 mod dashes;
 mod document;
 mod space;
+mod text;
 
 use super::arrange::Arrangement;
 use super::counted;
@@ -22,6 +23,7 @@ use dashes::dashed;
 use document::{Document, Entity, Refusal, document, number, pairs};
 use space::Plane;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use text::Writing;
 
 /// The format itself.
 #[derive(Debug)]
@@ -60,6 +62,20 @@ struct Drawing<'d, 'a> {
     unit: f64,
     /// The number of lines with too many dashes.
     undashed: usize,
+    /// The number of texts, and of their letters that are not in the plotter's font.
+    texts: usize,
+    unknown_letters: usize,
+}
+
+/// Where entities are drawn.
+#[derive(Debug, Clone, Copy)]
+struct Place<'a> {
+    to_page: Affine,
+    /// What layer and line type those have that take them from the block in which they are.
+    layer: &'a str,
+    line_type: &'a str,
+    /// The number of blocks around them.
+    depth: usize,
 }
 
 impl<'d, 'a> Drawing<'d, 'a> {
@@ -67,13 +83,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         self.skipped.entry(what.to_owned()).or_insert((0, line)).0 += 1;
     }
 
-    fn all(
-        &mut self,
-        entities: &'d [Entity<'a>],
-        to_page: Affine,
-        outer_layer: Option<&'a str>,
-        depth: usize,
-    ) -> Result<(), Refusal> {
+    fn all(&mut self, entities: &'d [Entity<'a>], place: Place<'a>) -> Result<(), Refusal> {
         let mut at = 0;
         while let Some(entity) = entities.get(at) {
             at += 1;
@@ -84,19 +94,20 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     at += 1;
                 }
             }
-            let layer = match (entity.layer(), outer_layer) {
-                ("0", Some(outer)) => outer,
-                (own, _) => own,
+            let layer = match entity.layer() {
+                "0" => place.layer,
+                own => own,
             };
+            let is_hidden_text = entity.kind == "ATTRIB" && entity.flags()? & 1 != 0;
             if self.document.is_hidden(layer) {
                 self.skip("entities on layers that are off or frozen", entity.line);
             } else if entity.number(67, 0.0)? != 0.0 {
                 self.skip("entities in paper space", entity.line);
-            } else if entity.number(60, 0.0)? != 0.0 {
+            } else if entity.number(60, 0.0)? != 0.0 || is_hidden_text {
                 self.skip("invisible entities", entity.line);
             } else {
                 let vertices = entities.get(first..at).unwrap_or_default();
-                self.entity(entity, vertices, to_page, layer, depth)?;
+                self.entity(entity, vertices, Place { layer, ..place })?;
             }
         }
         Ok(())
@@ -106,15 +117,13 @@ impl<'d, 'a> Drawing<'d, 'a> {
         &mut self,
         entity: &'d Entity<'a>,
         vertices: &[Entity<'a>],
-        to_page: Affine,
-        layer: &'a str,
-        depth: usize,
+        place: Place<'a>,
     ) -> Result<(), Refusal> {
         let up = [entity.number(210, 0.0)?, entity.number(220, 0.0)?, entity.number(230, 1.0)?];
         let plane = Plane::of(up);
         // The points of these are those of the world, whatever is up.
         let is_planar = match entity.kind {
-            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" => false,
+            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" | "MTEXT" => false,
             "POLYLINE" => entity.flags()? & (8 | 16 | 64) == 0,
             _ => true,
         };
@@ -122,7 +131,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "LWPOLYLINE" => entity.number(38, 0.0)?,
             _ => entity.number(30, 0.0)?,
         };
-        let to_page = if is_planar { to_page.after(plane.seen(height)) } else { to_page };
+        let to_page = match is_planar {
+            true => place.to_page.after(plane.seen(height)),
+            false => place.to_page,
+        };
+        let place = Place { to_page, ..place };
         let curve = match entity.kind {
             "LINE" => Curve::polyline(&[entity.point(10)?, entity.point(11)?]),
             "LWPOLYLINE" => bulged(&light(entity)?, entity.flags()? & 1 == 1),
@@ -175,7 +188,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {
                 Some(sides) => {
                     for side in sides {
-                        self.draw(entity, layer, to_page, &Curve::polyline(&side))?;
+                        self.draw(entity, place, &Curve::polyline(&side))?;
                     }
                     return Ok(());
                 }
@@ -184,11 +197,13 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     return Ok(());
                 }
             },
-            "INSERT" => return self.insert(entity, to_page, layer, depth),
+            "TEXT" | "ATTRIB" => return self.write(entity, place, text::line(entity)?),
+            "MTEXT" => return self.write(entity, place, text::paragraph(entity, plane)?),
+            "INSERT" => return self.insert(entity, place),
             // What shows a dimension is a block of its own, at its place.
             "DIMENSION" if self.block(entity).is_some() => {
                 let Some((_, entities)) = self.block(entity) else { return Ok(()) };
-                return self.nested(entity, entities, to_page, layer, depth);
+                return self.nested(entity, entities, place);
             }
             "VERTEX" | "SEQEND" => return Ok(()),
             kind => {
@@ -196,20 +211,20 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 return Ok(());
             }
         };
-        self.draw(entity, layer, to_page, &curve)
+        self.draw(entity, place, &curve)
     }
 
     /// Draws a curve of an entity, with its line type.
     fn draw(
         &mut self,
         entity: &'d Entity<'a>,
-        layer: &'a str,
-        to_page: Affine,
+        place: Place<'a>,
         curve: &Curve,
     ) -> Result<(), Refusal> {
-        let too_many = || (entity.line, "the file has too many points to be drawn".to_owned());
-        let points = curve.flattened(to_page, MOST_POINTS - self.points).ok_or_else(too_many)?;
-        let lengths = self.document.dashes(entity, layer)?;
+        let most = MOST_POINTS - self.points;
+        let points = curve.flattened(place.to_page, most).ok_or_else(|| too_many(entity))?;
+        let line_type = self.document.line_type(entity, place.layer, place.line_type);
+        let lengths = self.document.dashes(entity, line_type)?;
         let lengths: Vec<f64> = lengths.into_iter().map(|length| length * self.unit).collect();
         let pieces = match lengths.is_empty() {
             true => vec![points],
@@ -221,24 +236,45 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 }
             },
         };
-        for points in pieces {
-            self.points += points.len();
-            if self.points > MOST_POINTS {
-                return Err(too_many());
-            }
-            self.strokes.push((entity.line, entity.kind, layer, points));
+        pieces.into_iter().try_for_each(|points| self.ink(entity, place, points))
+    }
+
+    /// Draws the letters of an entity; `None` if they cannot be drawn.
+    fn write(
+        &mut self,
+        entity: &'d Entity<'a>,
+        place: Place<'a>,
+        writing: Option<Writing>,
+    ) -> Result<(), Refusal> {
+        let Some(Writing { strokes, unknown }) = writing else {
+            self.skip(entity.kind, entity.line);
+            return Ok(());
+        };
+        self.texts += usize::from(!strokes.is_empty());
+        self.unknown_letters += unknown;
+        strokes.into_iter().try_for_each(|points| {
+            let points = points.into_iter().map(|point| place.to_page.apply(point));
+            self.ink(entity, place, points.collect())
+        })
+    }
+
+    /// Draws a polyline on the page.
+    fn ink(
+        &mut self,
+        entity: &'d Entity<'a>,
+        place: Place<'a>,
+        points: Vec<Point>,
+    ) -> Result<(), Refusal> {
+        self.points += points.len();
+        if self.points > MOST_POINTS {
+            return Err(too_many(entity));
         }
+        self.strokes.push((entity.line, entity.kind, place.layer, points));
         Ok(())
     }
 
     /// Draws a block where it is inserted, in rows and columns if it is.
-    fn insert(
-        &mut self,
-        entity: &'d Entity<'a>,
-        to_page: Affine,
-        layer: &'a str,
-        depth: usize,
-    ) -> Result<(), Refusal> {
+    fn insert(&mut self, entity: &'d Entity<'a>, place: Place<'a>) -> Result<(), Refusal> {
         let Some((base, entities)) = self.block(entity) else {
             self.skip("INSERT of an unknown block", entity.line);
             return Ok(());
@@ -257,9 +293,9 @@ impl<'d, 'a> Drawing<'d, 'a> {
         for row in 0..counts[1].max(1.0) as u32 {
             for column in 0..counts[0].max(1.0) as u32 {
                 let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
-                let place = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
-                let inner = to_page.after(turned).after(place).after(scaled);
-                self.nested(entity, entities, inner, layer, depth)?;
+                let moved = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
+                let to_page = place.to_page.after(turned).after(moved).after(scaled);
+                self.nested(entity, entities, Place { to_page, ..place })?;
             }
         }
         Ok(())
@@ -275,19 +311,23 @@ impl<'d, 'a> Drawing<'d, 'a> {
         &mut self,
         entity: &Entity<'a>,
         entities: &'d [Entity<'a>],
-        to_page: Affine,
-        layer: &'a str,
-        depth: usize,
+        place: Place<'a>,
     ) -> Result<(), Refusal> {
-        if depth >= MOST_NESTED {
+        if place.depth >= MOST_NESTED {
             return Err((entity.line, "the blocks are nested too deeply".to_owned()));
         }
         self.points += 1;
         if self.points >= MOST_POINTS {
             return Err((entity.line, "the blocks are inserted too often".to_owned()));
         }
-        self.all(entities, to_page, Some(layer), depth + 1)
+        let line_type = self.document.line_type(entity, place.layer, place.line_type);
+        self.all(entities, Place { line_type, depth: place.depth + 1, ..place })
     }
+}
+
+/// The refusal of a file at the entity that makes it too large.
+fn too_many(entity: &Entity<'_>) -> Refusal {
+    (entity.line, "the file has too many points to be drawn".to_owned())
 }
 
 /// The sides of a face that are visible, or the closed outline of a filled triangle or
@@ -406,9 +446,12 @@ impl Format for Dxf {
             points: 0,
             unit,
             undashed: 0,
+            texts: 0,
+            unknown_letters: 0,
         };
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
-        drawing.all(&document.entities, to_page, None, 0).map_err(in_line)?;
+        let place = Place { to_page, layer: "0", line_type: "", depth: 0 };
+        drawing.all(&document.entities, place).map_err(in_line)?;
         let mut layers: Vec<&str> = Vec::new();
         for (_, _, layer, _) in &drawing.strokes {
             if !layers.contains(layer) {
@@ -454,6 +497,16 @@ impl Format for Dxf {
                 "clipped in the file (XCLIP), which is not obeyed: the whole is drawn",
             ),
             (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
+            (
+                drawing.texts,
+                ["text is", "texts are"],
+                "drawn in the plotter's own letters, not in the font of the file",
+            ),
+            (
+                drawing.unknown_letters,
+                ["letter is", "letters are"],
+                "not in the plotter's font: drawn as a box",
+            ),
         ] {
             if number > 0 {
                 notes.push(format!("{} {what}", counted(number, nouns)));

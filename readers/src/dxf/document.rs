@@ -8,6 +8,8 @@ use std::collections::{HashMap, HashSet};
 pub(super) struct Pair<'a> {
     pub(super) code: i32,
     pub(super) value: &'a str,
+    /// The value with the spaces around it, which count in texts.
+    pub(super) raw: &'a str,
     pub(super) line: usize,
 }
 
@@ -25,6 +27,11 @@ pub(super) type Refusal = (usize, String);
 impl<'a> Entity<'a> {
     pub(super) fn text(&self, code: i32) -> Option<&'a str> {
         self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.value)
+    }
+
+    /// The text with this code, with the spaces around it.
+    pub(super) fn raw(&self, code: i32) -> Option<&'a str> {
+        self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.raw)
     }
 
     /// All numbers with this code.
@@ -99,15 +106,22 @@ impl<'a> Document<'a> {
         self.blocks.get(&name.to_uppercase())
     }
 
-    /// The lengths of the dashes and gaps of an entity on this layer, in units of the file; empty
-    /// if its line is continuous.
+    /// The name of the line type of an entity on this layer, in a block that is inserted with the
+    /// type `of_block`.
+    pub(super) fn line_type(&self, entity: &Entity<'a>, layer: &str, of_block: &'a str) -> &'a str {
+        match entity.text(6) {
+            Some(name) if name.eq_ignore_ascii_case("BYBLOCK") => of_block,
+            Some(name) if !name.eq_ignore_ascii_case("BYLAYER") => name,
+            _ => self.types_of_layers.get(&layer.to_uppercase()).copied().unwrap_or_default(),
+        }
+    }
+
+    /// The lengths of the dashes and gaps of an entity with this line type, in units of the file;
+    /// empty if its line is continuous.
     ///
     /// # Errors
     /// The scale of the entity is no number.
-    pub(super) fn dashes(&self, entity: &Entity<'a>, layer: &str) -> Result<Vec<f64>, Refusal> {
-        let of_layer = || self.types_of_layers.get(&layer.to_uppercase()).copied();
-        let own = entity.text(6).filter(|name| !name.eq_ignore_ascii_case("BYLAYER"));
-        let name = own.or_else(of_layer).unwrap_or_default();
+    pub(super) fn dashes(&self, entity: &Entity<'a>, name: &str) -> Result<Vec<f64>, Refusal> {
         let scale = self.type_scale * entity.number(48, 1.0)?;
         let lengths = self.line_types.get(&name.to_uppercase());
         Ok(lengths.into_iter().flatten().map(|length| length * scale).collect())
@@ -128,7 +142,7 @@ pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
         let Some((index, value)) = lines.next() else {
             return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
         };
-        pairs.push(Pair { code, value: value.trim(), line: index + 1 });
+        pairs.push(Pair { code, value: value.trim(), raw: value, line: index + 1 });
     }
     Ok(pairs)
 }
