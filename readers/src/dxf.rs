@@ -18,11 +18,13 @@ use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::{Plan, Point, number_in};
 use crate::lines::Origin;
+use crate::region::{Region, Regions};
 use curves::{Affine, Curve, Spline};
 use dashes::dashed;
 use document::{Document, Entity, Refusal, document, number, pairs};
 use space::Plane;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
 use text::Writing;
 
 /// The format itself.
@@ -34,6 +36,9 @@ const MOST_NESTED: usize = 16;
 
 /// The most points before a file is refused. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
+
+/// The most work of clipping before a file is refused.
+const MOST_WORK: usize = 300_000_000;
 
 /// The units of `$INSUNITS` and their lengths in mm.
 const UNITS: [(i64, f64); 11] = [
@@ -65,6 +70,10 @@ struct Drawing<'d, 'a> {
     /// The number of texts, and of their letters that are not in the plotter's font.
     texts: usize,
     unknown_letters: usize,
+    /// What the blocks around the entity show of it.
+    within: Regions,
+    /// The work that is left for clipping, see [`Regions::cut`].
+    work: usize,
 }
 
 /// Where entities are drawn.
@@ -265,11 +274,19 @@ impl<'d, 'a> Drawing<'d, 'a> {
         place: Place<'a>,
         points: Vec<Point>,
     ) -> Result<(), Refusal> {
-        self.points += points.len();
-        if self.points > MOST_POINTS {
-            return Err(too_many(entity));
+        let pieces = match points.as_slice() {
+            _ if self.within.0.is_empty() => vec![points],
+            [dot] if self.within.contain(*dot) => vec![points],
+            [_] => Vec::new(),
+            line => self.within.cut(line, &mut self.work).map_err(|_| too_many(entity))?,
+        };
+        for points in pieces {
+            self.points += points.len();
+            if self.points > MOST_POINTS {
+                return Err(too_many(entity));
+            }
+            self.strokes.push((entity.line, entity.kind, place.layer, points));
         }
-        self.strokes.push((entity.line, entity.kind, place.layer, points));
         Ok(())
     }
 
@@ -295,7 +312,17 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
                 let moved = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
                 let to_page = place.to_page.after(turned).after(moved).after(scaled);
+                let outline = self.document.clip(entity);
+                if let Some(outline) = outline {
+                    let outline = outline.iter().map(|point| to_page.apply(*point)).collect();
+                    let mut region = Region::default();
+                    region.add(vec![outline], true, Vec::new());
+                    self.within.0.push(Arc::new(region));
+                }
                 self.nested(entity, entities, Place { to_page, ..place })?;
+                if outline.is_some() {
+                    self.within.0.pop();
+                }
             }
         }
         Ok(())
@@ -448,6 +475,8 @@ impl Format for Dxf {
             undashed: 0,
             texts: 0,
             unknown_letters: 0,
+            within: Regions::default(),
+            work: MOST_WORK,
         };
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
         let place = Place { to_page, layer: "0", line_type: "", depth: 0 };
@@ -492,9 +521,9 @@ impl Format for Dxf {
             .collect();
         for (number, nouns, what) in [
             (
-                document.clipped,
+                document.unclipped,
                 ["inserted block is", "inserted blocks are"],
-                "clipped in the file (XCLIP), which is not obeyed: the whole is drawn",
+                "clipped in the file (XCLIP) in a way that is not obeyed: the whole is drawn",
             ),
             (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
             (

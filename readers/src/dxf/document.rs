@@ -1,5 +1,6 @@
 //! What a DXF file says: pairs of a code and a value, which make entities, layers and blocks.
 
+use super::curves::Affine;
 use crate::plan::Point;
 use std::collections::{HashMap, HashSet};
 
@@ -90,8 +91,11 @@ pub(super) struct Document<'a> {
     types_of_layers: HashMap<String, &'a str>,
     /// By what the lengths of line types are multiplied.
     type_scale: f64,
-    /// The number of inserted blocks of which only a part is shown.
-    pub(super) clipped: usize,
+    /// The outlines within which inserted blocks are shown, in the coordinates of the block, by the
+    /// handles of the insertions.
+    clips: HashMap<&'a str, Vec<Point>>,
+    /// The number of insertions of which only a part is shown that is not known.
+    pub(super) unclipped: usize,
     pub(super) entities: Vec<Entity<'a>>,
 }
 
@@ -104,6 +108,11 @@ impl<'a> Document<'a> {
     /// The block with this name: its base point and its entities.
     pub(super) fn block(&self, name: &str) -> Option<&(Point, Vec<Entity<'a>>)> {
         self.blocks.get(&name.to_uppercase())
+    }
+
+    /// The outline within which an insertion of a block shows it, in the coordinates of the block.
+    pub(super) fn clip(&self, insertion: &Entity<'_>) -> Option<&[Point]> {
+        self.clips.get(insertion.text(5)?).map(Vec::as_slice)
     }
 
     /// The name of the line type of an entity on this layer, in a block that is inserted with the
@@ -222,16 +231,63 @@ pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> 
             }
             Some("OBJECTS") => {
                 // Each belongs to one block that is inserted.
-                for object in &entities(section) {
-                    let is_filter = object.kind == "SPATIAL_FILTER";
-                    let is_on = is_filter && object.number(71, 1.0)? != 0.0;
-                    document.clipped += usize::from(is_on);
+                let objects = entities(section);
+                for object in objects.iter().filter(|object| object.kind == "SPATIAL_FILTER") {
+                    if object.number(71, 1.0)? == 0.0 {
+                        continue;
+                    }
+                    let clip = clip(object, &objects)?;
+                    document.unclipped += usize::from(clip.is_none());
+                    document.clips.extend(clip);
                 }
             }
             _ => {}
         }
     }
+    let blocks = document.blocks.values().flat_map(|(_, entities)| entities);
+    let all = document.entities.iter().chain(blocks).filter(|entity| entity.kind == "INSERT");
+    let handles: HashSet<&str> = all.filter_map(|entity| entity.text(5)).collect();
+    let clips = document.clips.len();
+    document.clips.retain(|handle, _| handles.contains(handle));
+    document.unclipped += clips - document.clips.len();
     Ok(document)
+}
+
+/// The handle of the insertion that a filter in space belongs to, and the outline within which the
+/// block is shown; `None` if the filter shows what is not within an outline in the plane.
+fn clip<'a>(
+    filter: &Entity<'a>,
+    objects: &[Entity<'a>],
+) -> Result<Option<(&'a str, Vec<Point>)>, Refusal> {
+    let owner = |object: &Entity<'a>| object.text(330);
+    let owner_of = |handle: &str| {
+        owner(objects.iter().find(|object| object.text(5).is_some_and(|own| own == handle))?)
+    };
+    // An insertion has a dictionary of its own, in which that of its filters is.
+    let insertion = owner(filter).and_then(owner_of).and_then(owner_of);
+    let Some(insertion) = insertion else { return Ok(None) };
+    let is_inverse = objects.iter().any(|object| {
+        let is_mark = |pair: &Pair<'_>| pair.value == "ACAD_INVERTEDCLIP_ROUNDTRIP";
+        object.pairs.iter().any(is_mark)
+            && owner(object).and_then(owner_of).is_some_and(|of| filter.text(5) == Some(of))
+    });
+    let up = [filter.number(210, 0.0)?, filter.number(220, 0.0)?, filter.number(230, 1.0)?];
+    let has_depth = filter.number(72, 0.0)? != 0.0 || filter.number(73, 0.0)? != 0.0;
+    let matrices = filter.numbers(40)?;
+    let (outline, count) = (filter.points(10)?, matrices.len());
+    if is_inverse || up != [0.0, 0.0, 1.0] || has_depth || count < 24 || outline.len() < 2 {
+        return Ok(None);
+    }
+    // The first of two matrices of 12 numbers leads to the coordinates of the block.
+    let matrix = &matrices[count - 24..count - 12];
+    let map = Affine([matrix[0], matrix[4], matrix[1], matrix[5], matrix[3], matrix[7]]);
+    let corners = match outline[..] {
+        [[left, low], [right, high]] => {
+            vec![[left, low], [right, low], [right, high], [left, high]]
+        }
+        _ => outline,
+    };
+    Ok(Some((insertion, corners.into_iter().map(|point| map.apply(point)).collect())))
 }
 
 fn number_of(pair: Pair<'_>) -> Result<i64, Refusal> {
