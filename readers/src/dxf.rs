@@ -132,7 +132,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let plane = Plane::of(up);
         // The points of these are those of the world, whatever is up.
         let is_planar = match entity.kind {
-            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" | "MTEXT" => false,
+            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" | "MTEXT"
+            | "ACAD_TABLE" => false,
             "POLYLINE" => entity.flags()? & (8 | 16 | 64) == 0,
             _ => true,
         };
@@ -209,6 +210,18 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "TEXT" | "ATTRIB" => return self.write(entity, place, text::line(entity)?),
             "MTEXT" => return self.write(entity, place, text::paragraph(entity, plane)?),
             "INSERT" => return self.insert(entity, place),
+            // A table is shown by a block, turned so that its x has the direction of the table.
+            "ACAD_TABLE" if self.block(entity).is_some() => {
+                let Some((base, entities)) = self.block(entity) else { return Ok(()) };
+                let ([x, y], [right, up]) = (entity.point(10)?, entity.point(11)?);
+                let length = right.hypot(up);
+                let [cosine, sine] =
+                    if length > 0.0 { [right / length, up / length] } else { [1.0, 0.0] };
+                let turned = Affine([cosine, sine, -sine, cosine, x, y]);
+                let moved = Affine([1.0, 0.0, 0.0, 1.0, -base[0], -base[1]]);
+                let to_page = place.to_page.after(turned).after(moved);
+                return self.nested(entity, entities, Place { to_page, ..place });
+            }
             // What shows a dimension is a block of its own, at its place.
             "DIMENSION" if self.block(entity).is_some() => {
                 let Some((_, entities)) = self.block(entity) else { return Ok(()) };

@@ -151,7 +151,12 @@ pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
         let Some((index, value)) = lines.next() else {
             return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
         };
-        pairs.push(Pair { code, value: value.trim(), raw: value, line: index + 1 });
+        let value_at = Pair { code, value: value.trim(), raw: value, line: index + 1 };
+        pairs.push(value_at);
+        // Nothing that follows belongs to the drawing.
+        if (code, value_at.value) == (0, "EOF") {
+            break;
+        }
     }
     Ok(pairs)
 }

@@ -213,6 +213,12 @@ fn points_faces_and_dimensions_are_drawn() {
                  0 MTEXT 8 0 1 8 0 ENDBLK 0 ENDSEC";
     let dimension = dxf("4", block, "0 DIMENSION 8 5 2 *D1 10 7 20 7");
     assert_eq!(strokes(&dimension), [("pen5".to_owned(), vec![[1.0, 1.0], [9.0, 1.0]])]);
+    // A table has a place and a direction of its own.
+    let table = dxf("4", block, "0 TABLE 8 5 2 *D1 10 7 20 7 11 0 21 2 41 9");
+    let table = table.replace("TABLE", "ACAD_TABLE");
+    assert_eq!(strokes(&table), [("pen5".to_owned(), vec![[6.0, 8.0], [6.0, 16.0]])]);
+    // What stands behind the end of the file is not read.
+    assert_eq!(strokes(&(table.clone() + "ignore\nthis")), strokes(&table));
     let said = notes("a.dxf", dimension.as_bytes());
     assert!(
         matches!(said.as_slice(), [note] if note.starts_with("1 MTEXT is not drawn")),
