@@ -1,10 +1,10 @@
 //! Polygons (`PM EP FP`), filled shapes (`RA RR WG`), and how they are filled (`FT PT`).
 //!
-//! A polygon is kept in a [`PolygonBuffer`], on a plotter of [`VERTICES`] points. As on Hewlett-Packard's machines, filled
-//! rectangles and wedges use the same buffer, and what does not fit sets error 7 (HP 7550A) and is
-//! not drawn at all. Inside is what an odd number of edges surrounds. A fill is made line by line,
-//! each from edge to edge. A plotter keeps no list of crossings: the next one is looked for among
-//! all edges. A buffer with more memory may list them.
+//! A polygon is kept in a [`PolygonBuffer`], on a plotter of [`VERTICES`] points. As on
+//! Hewlett-Packard's machines, filled rectangles and wedges use the same buffer, and what does not
+//! fit sets error 7 (HP 7550A) and is not drawn at all. Inside is what an odd number of edges
+//! surrounds. A fill is made line by line, each from edge to edge. A plotter keeps no list of
+//! crossings: the next one is looked for among all edges. A buffer with more memory may list them.
 //!
 //! Sources: PCL 5 Printer Language Technical Reference Manual (Hewlett-Packard), part II, chapter
 //! 21, "The Polygon Group": which points are joined, how subpolygons are closed, and what `EP` and
