@@ -327,7 +327,7 @@ pub struct PreviewArgs {
     /// How often everything is drawn.
     #[command(flatten)]
     pub passes: PassesArgs,
-    /// Write the segments, strokes, lengths, bounds and times to this file as JSON
+    /// Write the page, segments, strokes, lengths, bounds and times to this file as JSON
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
     /// Write the drawing for a Grbl machine whose M3 lowers the pen

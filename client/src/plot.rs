@@ -72,7 +72,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         let json = json!({ "file": file.display().to_string(), "drawn": report, "passes": passes });
         let times = if passes > 1 { format!(" {passes} times") } else { String::new() };
         let drawn = Outcome::done(format!("{} is drawn{times}{text}", file.display()), json);
-        return Ok(source.bounded(drawn));
+        return Ok(source.measured(drawn));
     }
     // On Linux the kernel ends the emulator together with this program. On other systems this
     // program must end it, so Ctrl-C must not exit at once.
@@ -100,7 +100,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
     let picture = Picture { page: settings.page, runs };
     drop(bar);
     let files = write_pictures(&picture, &outputs)?;
-    Ok(source.bounded(summary(&files, report)))
+    Ok(source.measured(summary(&files, report)))
 }
 
 /// A drawing that is to be plotted.

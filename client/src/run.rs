@@ -28,6 +28,7 @@ use penup_job::picture::Picture;
 use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;
 use penup_job::{Job, Settings};
+use penup_readers::page::Page;
 use penup_readers::{Arrangement, ReadError, SourceFile};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -139,8 +140,13 @@ fn show<I: Index>(
         for _ in 1..args.repeat {
             result.timings_ms = result.timings_ms.best(plotter.result()?.timings_ms);
         }
-        let whole =
-            PreviewResult { result: &result, passes, bounds: source.extent, drawn: &report };
+        let whole = PreviewResult {
+            result: &result,
+            passes,
+            page_mm: page_mm(source.settings.page),
+            bounds: source.extent,
+            drawn: &report,
+        };
         let text = serde_json::to_string(&whole).map_err(|error| Error::Write {
             file: path.display().to_string(),
             source: error.into(),
@@ -152,13 +158,18 @@ fn show<I: Index>(
         output::write(path, plotter.motion()?.svg().as_bytes())?;
         files.push(path);
     }
-    let mut outcome = source.bounded(summary(&files, report));
+    let mut outcome = source.measured(summary(&files, report));
     if passes > 1 {
         outcome.text += &format!(", {passes} passes");
     }
     let time = duration(duration_s.round() as u64);
     outcome.text += &format!(", {time} to draw");
     Ok(outcome)
+}
+
+/// The size of the page for `--json`, in mm.
+fn page_mm(Page { width, height }: Page) -> Value {
+    json!({ "width": width, "height": height })
 }
 
 /// What is written by `penup preview --json`.
@@ -169,6 +180,8 @@ struct PreviewResult<'a> {
     /// How often everything is drawn; the lengths are those of one pass, and the steps and the
     /// duration those of all.
     passes: u32,
+    /// The size of the page.
+    page_mm: Value,
     /// The least and the greatest coordinates of the model, or of the plan in mm.
     bounds: Option<[[f64; 3]; 2]>,
     /// The plotter's own report on one pass.
@@ -321,8 +334,11 @@ pub struct Source {
 }
 
 impl Source {
-    /// Adds the bounding box to what is said about the job.
-    pub fn bounded(&self, mut outcome: Outcome) -> Outcome {
+    /// Adds the size of the page and the bounding box to what is said about the job.
+    pub fn measured(&self, mut outcome: Outcome) -> Outcome {
+        if let Value::Object(fields) = &mut outcome.json {
+            fields.insert("page_mm".to_owned(), page_mm(self.settings.page));
+        }
         let Some(corners) = self.extent else { return outcome };
         let axes = if self.is_plan { 2 } else { 3 };
         let [low, high] = corners.map(|corner| {

@@ -1,6 +1,6 @@
 //! Reads the text form of DXF as plans: lines, polylines with bulges, arcs, circles, ellipses and
-//! splines, points, level faces and dimensions, also in blocks, as they are seen from above, with
-//! the dashes of their line types.
+//! splines, points, level faces, dimensions and texts, also in blocks, as they are seen from above,
+//! with the dashes of their line types.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
@@ -10,6 +10,7 @@ mod curves;
 mod dashes;
 mod document;
 mod space;
+mod text;
 
 use super::arrange::Arrangement;
 use super::counted;
@@ -17,11 +18,14 @@ use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::{Plan, Point, number_in};
 use crate::lines::Origin;
+use crate::region::{Region, Regions};
 use curves::{Affine, Curve, Spline};
 use dashes::dashed;
 use document::{Document, Entity, Refusal, document, number, pairs};
 use space::Plane;
 use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::Arc;
+use text::Writing;
 
 /// The format itself.
 #[derive(Debug)]
@@ -32,6 +36,9 @@ const MOST_NESTED: usize = 16;
 
 /// The most points before a file is refused. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
+
+/// The most work of clipping before a file is refused.
+const MOST_WORK: usize = 300_000_000;
 
 /// The units of `$INSUNITS` and their lengths in mm.
 const UNITS: [(i64, f64); 11] = [
@@ -60,6 +67,24 @@ struct Drawing<'d, 'a> {
     unit: f64,
     /// The number of lines with too many dashes.
     undashed: usize,
+    /// The number of texts, and of their letters that are not in the plotter's font.
+    texts: usize,
+    unknown_letters: usize,
+    /// What the blocks around the entity show of it.
+    within: Regions,
+    /// The work that is left for clipping, see [`Regions::cut`].
+    work: usize,
+}
+
+/// Where entities are drawn.
+#[derive(Debug, Clone, Copy)]
+struct Place<'a> {
+    to_page: Affine,
+    /// What layer and line type those have that take them from the block in which they are.
+    layer: &'a str,
+    line_type: &'a str,
+    /// The number of blocks around them.
+    depth: usize,
 }
 
 impl<'d, 'a> Drawing<'d, 'a> {
@@ -67,13 +92,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         self.skipped.entry(what.to_owned()).or_insert((0, line)).0 += 1;
     }
 
-    fn all(
-        &mut self,
-        entities: &'d [Entity<'a>],
-        to_page: Affine,
-        outer_layer: Option<&'a str>,
-        depth: usize,
-    ) -> Result<(), Refusal> {
+    fn all(&mut self, entities: &'d [Entity<'a>], place: Place<'a>) -> Result<(), Refusal> {
         let mut at = 0;
         while let Some(entity) = entities.get(at) {
             at += 1;
@@ -84,19 +103,20 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     at += 1;
                 }
             }
-            let layer = match (entity.layer(), outer_layer) {
-                ("0", Some(outer)) => outer,
-                (own, _) => own,
+            let layer = match entity.layer() {
+                "0" => place.layer,
+                own => own,
             };
+            let is_hidden_text = entity.kind == "ATTRIB" && entity.flags()? & 1 != 0;
             if self.document.is_hidden(layer) {
                 self.skip("entities on layers that are off or frozen", entity.line);
             } else if entity.number(67, 0.0)? != 0.0 {
                 self.skip("entities in paper space", entity.line);
-            } else if entity.number(60, 0.0)? != 0.0 {
+            } else if entity.number(60, 0.0)? != 0.0 || is_hidden_text {
                 self.skip("invisible entities", entity.line);
             } else {
                 let vertices = entities.get(first..at).unwrap_or_default();
-                self.entity(entity, vertices, to_page, layer, depth)?;
+                self.entity(entity, vertices, Place { layer, ..place })?;
             }
         }
         Ok(())
@@ -106,15 +126,14 @@ impl<'d, 'a> Drawing<'d, 'a> {
         &mut self,
         entity: &'d Entity<'a>,
         vertices: &[Entity<'a>],
-        to_page: Affine,
-        layer: &'a str,
-        depth: usize,
+        place: Place<'a>,
     ) -> Result<(), Refusal> {
         let up = [entity.number(210, 0.0)?, entity.number(220, 0.0)?, entity.number(230, 1.0)?];
         let plane = Plane::of(up);
         // The points of these are those of the world, whatever is up.
         let is_planar = match entity.kind {
-            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" => false,
+            "LINE" | "ELLIPSE" | "SPLINE" | "POINT" | "3DFACE" | "DIMENSION" | "MTEXT"
+            | "ACAD_TABLE" => false,
             "POLYLINE" => entity.flags()? & (8 | 16 | 64) == 0,
             _ => true,
         };
@@ -122,7 +141,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "LWPOLYLINE" => entity.number(38, 0.0)?,
             _ => entity.number(30, 0.0)?,
         };
-        let to_page = if is_planar { to_page.after(plane.seen(height)) } else { to_page };
+        let to_page = match is_planar {
+            true => place.to_page.after(plane.seen(height)),
+            false => place.to_page,
+        };
+        let place = Place { to_page, ..place };
         let curve = match entity.kind {
             "LINE" => Curve::polyline(&[entity.point(10)?, entity.point(11)?]),
             "LWPOLYLINE" => bulged(&light(entity)?, entity.flags()? & 1 == 1),
@@ -175,7 +198,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {
                 Some(sides) => {
                     for side in sides {
-                        self.draw(entity, layer, to_page, &Curve::polyline(&side))?;
+                        self.draw(entity, place, &Curve::polyline(&side))?;
                     }
                     return Ok(());
                 }
@@ -184,11 +207,25 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     return Ok(());
                 }
             },
-            "INSERT" => return self.insert(entity, to_page, layer, depth),
+            "TEXT" | "ATTRIB" => return self.write(entity, place, text::line(entity)?),
+            "MTEXT" => return self.write(entity, place, text::paragraph(entity, plane)?),
+            "INSERT" => return self.insert(entity, place),
+            // A table is shown by a block, turned so that its x has the direction of the table.
+            "ACAD_TABLE" if self.block(entity).is_some() => {
+                let Some((base, entities)) = self.block(entity) else { return Ok(()) };
+                let ([x, y], [right, up]) = (entity.point(10)?, entity.point(11)?);
+                let length = right.hypot(up);
+                let [cosine, sine] =
+                    if length > 0.0 { [right / length, up / length] } else { [1.0, 0.0] };
+                let turned = Affine([cosine, sine, -sine, cosine, x, y]);
+                let moved = Affine([1.0, 0.0, 0.0, 1.0, -base[0], -base[1]]);
+                let to_page = place.to_page.after(turned).after(moved);
+                return self.nested(entity, entities, Place { to_page, ..place });
+            }
             // What shows a dimension is a block of its own, at its place.
             "DIMENSION" if self.block(entity).is_some() => {
                 let Some((_, entities)) = self.block(entity) else { return Ok(()) };
-                return self.nested(entity, entities, to_page, layer, depth);
+                return self.nested(entity, entities, place);
             }
             "VERTEX" | "SEQEND" => return Ok(()),
             kind => {
@@ -196,20 +233,20 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 return Ok(());
             }
         };
-        self.draw(entity, layer, to_page, &curve)
+        self.draw(entity, place, &curve)
     }
 
     /// Draws a curve of an entity, with its line type.
     fn draw(
         &mut self,
         entity: &'d Entity<'a>,
-        layer: &'a str,
-        to_page: Affine,
+        place: Place<'a>,
         curve: &Curve,
     ) -> Result<(), Refusal> {
-        let too_many = || (entity.line, "the file has too many points to be drawn".to_owned());
-        let points = curve.flattened(to_page, MOST_POINTS - self.points).ok_or_else(too_many)?;
-        let lengths = self.document.dashes(entity, layer)?;
+        let most = MOST_POINTS - self.points;
+        let points = curve.flattened(place.to_page, most).ok_or_else(|| too_many(entity))?;
+        let line_type = self.document.line_type(entity, place.layer, place.line_type);
+        let lengths = self.document.dashes(entity, line_type)?;
         let lengths: Vec<f64> = lengths.into_iter().map(|length| length * self.unit).collect();
         let pieces = match lengths.is_empty() {
             true => vec![points],
@@ -221,24 +258,53 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 }
             },
         };
+        pieces.into_iter().try_for_each(|points| self.ink(entity, place, points))
+    }
+
+    /// Draws the letters of an entity; `None` if they cannot be drawn.
+    fn write(
+        &mut self,
+        entity: &'d Entity<'a>,
+        place: Place<'a>,
+        writing: Option<Writing>,
+    ) -> Result<(), Refusal> {
+        let Some(Writing { strokes, unknown }) = writing else {
+            self.skip(entity.kind, entity.line);
+            return Ok(());
+        };
+        self.texts += usize::from(!strokes.is_empty());
+        self.unknown_letters += unknown;
+        strokes.into_iter().try_for_each(|points| {
+            let points = points.into_iter().map(|point| place.to_page.apply(point));
+            self.ink(entity, place, points.collect())
+        })
+    }
+
+    /// Draws a polyline on the page.
+    fn ink(
+        &mut self,
+        entity: &'d Entity<'a>,
+        place: Place<'a>,
+        points: Vec<Point>,
+    ) -> Result<(), Refusal> {
+        let pieces = match points.as_slice() {
+            _ if self.within.0.is_empty() => vec![points],
+            [dot] if self.within.contain(*dot) => vec![points],
+            [_] => Vec::new(),
+            line => self.within.cut(line, &mut self.work).map_err(|_| too_many(entity))?,
+        };
         for points in pieces {
             self.points += points.len();
             if self.points > MOST_POINTS {
-                return Err(too_many());
+                return Err(too_many(entity));
             }
-            self.strokes.push((entity.line, entity.kind, layer, points));
+            self.strokes.push((entity.line, entity.kind, place.layer, points));
         }
         Ok(())
     }
 
     /// Draws a block where it is inserted, in rows and columns if it is.
-    fn insert(
-        &mut self,
-        entity: &'d Entity<'a>,
-        to_page: Affine,
-        layer: &'a str,
-        depth: usize,
-    ) -> Result<(), Refusal> {
+    fn insert(&mut self, entity: &'d Entity<'a>, place: Place<'a>) -> Result<(), Refusal> {
         let Some((base, entities)) = self.block(entity) else {
             self.skip("INSERT of an unknown block", entity.line);
             return Ok(());
@@ -257,9 +323,19 @@ impl<'d, 'a> Drawing<'d, 'a> {
         for row in 0..counts[1].max(1.0) as u32 {
             for column in 0..counts[0].max(1.0) as u32 {
                 let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
-                let place = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
-                let inner = to_page.after(turned).after(place).after(scaled);
-                self.nested(entity, entities, inner, layer, depth)?;
+                let moved = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
+                let to_page = place.to_page.after(turned).after(moved).after(scaled);
+                let outline = self.document.clip(entity);
+                if let Some(outline) = outline {
+                    let outline = outline.iter().map(|point| to_page.apply(*point)).collect();
+                    let mut region = Region::default();
+                    region.add(vec![outline], true, Vec::new());
+                    self.within.0.push(Arc::new(region));
+                }
+                self.nested(entity, entities, Place { to_page, ..place })?;
+                if outline.is_some() {
+                    self.within.0.pop();
+                }
             }
         }
         Ok(())
@@ -275,19 +351,23 @@ impl<'d, 'a> Drawing<'d, 'a> {
         &mut self,
         entity: &Entity<'a>,
         entities: &'d [Entity<'a>],
-        to_page: Affine,
-        layer: &'a str,
-        depth: usize,
+        place: Place<'a>,
     ) -> Result<(), Refusal> {
-        if depth >= MOST_NESTED {
+        if place.depth >= MOST_NESTED {
             return Err((entity.line, "the blocks are nested too deeply".to_owned()));
         }
         self.points += 1;
         if self.points >= MOST_POINTS {
             return Err((entity.line, "the blocks are inserted too often".to_owned()));
         }
-        self.all(entities, to_page, Some(layer), depth + 1)
+        let line_type = self.document.line_type(entity, place.layer, place.line_type);
+        self.all(entities, Place { line_type, depth: place.depth + 1, ..place })
     }
+}
+
+/// The refusal of a file at the entity that makes it too large.
+fn too_many(entity: &Entity<'_>) -> Refusal {
+    (entity.line, "the file has too many points to be drawn".to_owned())
 }
 
 /// The sides of a face that are visible, or the closed outline of a filled triangle or
@@ -406,9 +486,14 @@ impl Format for Dxf {
             points: 0,
             unit,
             undashed: 0,
+            texts: 0,
+            unknown_letters: 0,
+            within: Regions::default(),
+            work: MOST_WORK,
         };
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
-        drawing.all(&document.entities, to_page, None, 0).map_err(in_line)?;
+        let place = Place { to_page, layer: "0", line_type: "", depth: 0 };
+        drawing.all(&document.entities, place).map_err(in_line)?;
         let mut layers: Vec<&str> = Vec::new();
         for (_, _, layer, _) in &drawing.strokes {
             if !layers.contains(layer) {
@@ -449,11 +534,21 @@ impl Format for Dxf {
             .collect();
         for (number, nouns, what) in [
             (
-                document.clipped,
+                document.unclipped,
                 ["inserted block is", "inserted blocks are"],
-                "clipped in the file (XCLIP), which is not obeyed: the whole is drawn",
+                "clipped in the file (XCLIP) in a way that is not obeyed: the whole is drawn",
             ),
             (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
+            (
+                drawing.texts,
+                ["text is", "texts are"],
+                "drawn in the plotter's own letters, not in the font of the file",
+            ),
+            (
+                drawing.unknown_letters,
+                ["letter is", "letters are"],
+                "not in the plotter's font: drawn as a box",
+            ),
         ] {
             if number > 0 {
                 notes.push(format!("{} {what}", counted(number, nouns)));

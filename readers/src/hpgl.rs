@@ -11,10 +11,12 @@ use super::format::{Contents, Format};
 use super::plan::Plan;
 use crate::lines::Origin;
 use penup::hpgl::{
-    Dialect, ErrorNumber, FARTHEST, Interpreter, Order, POLYGON_POINTS, Point, Rectangle, Token,
-    UNIT, UNITS_PER_MM,
+    Dialect, ErrorNumber, FARTHEST, Interpreter, Order, Point, Rectangle, Token, UNIT, UNITS_PER_MM,
 };
+use polygon::{MOST_VERTICES, Vertices};
 use std::collections::BTreeMap;
+
+mod polygon;
 
 /// The format itself.
 #[derive(Debug)]
@@ -42,7 +44,7 @@ const STYLES: [&str; 22] = [
 /// What a file has drawn so far.
 #[derive(Debug)]
 struct Reader {
-    interpreter: Box<Interpreter>,
+    interpreter: Box<Interpreter<Vertices>>,
     /// Where the pen has been, with or without ink.
     at: Point,
     /// The pen in the holder, from 1.
@@ -61,7 +63,7 @@ struct Reader {
 
 impl Reader {
     fn new() -> Self {
-        let mut interpreter = Box::new(Interpreter::new());
+        let mut interpreter = Box::new(Interpreter::with_buffer(Vertices::default()));
         interpreter.initialize(Point::default(), LIMITS);
         Self {
             interpreter,
@@ -146,7 +148,7 @@ impl Reader {
                 FARTHEST / UNIT
             )),
             ErrorNumber::BufferOverflow => Err(format!(
-                "error 7 of HP-GL: the polygon has more than {POLYGON_POINTS} points, with those \
+                "error 7 of HP-GL: the polygon has more than {MOST_VERTICES} points, with those \
                  that close its parts: divide it"
             )),
             _ => {

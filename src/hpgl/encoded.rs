@@ -3,6 +3,7 @@
 use super::DAMAGED;
 use super::coordinates::Point;
 use super::interpreter::{ErrorNumber, Interpreter, Step};
+use super::polygon::PolygonBuffer;
 
 /// How far an encoded polyline has come.
 #[derive(Debug, Clone, Copy, Default)]
@@ -47,7 +48,7 @@ impl Polyline {
     };
 }
 
-impl Interpreter {
+impl<B: PolygonBuffer> Interpreter<B> {
     /// Begins an encoded polyline.
     pub(super) fn begin_polyline(&mut self) {
         self.polyline = Polyline::default();

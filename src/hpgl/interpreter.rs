@@ -7,7 +7,7 @@ use super::line_type::{LineStyle, Part, Stroke};
 use super::number::Number;
 use super::outline::ArcStep;
 use super::parser::Mode;
-use super::polygon::{FillStyle, Hatch, Polygon};
+use super::polygon::{FillStyle, Hatch, Polygon, PolygonBuffer, VERTICES, Vertex};
 use crate::drawing::LetterStrokes;
 use heapless::Deque;
 
@@ -95,8 +95,10 @@ impl ErrorNumber {
 }
 
 /// The interpreter. All its bits may be zero before [`Interpreter::initialize`].
+///
+/// The buffer holds the points of a polygon; that of a plotter has room for [`VERTICES`].
 #[derive(Debug)]
-pub struct Interpreter {
+pub struct Interpreter<B = [Vertex; VERTICES]> {
     /// What the next byte belongs to.
     pub(super) mode: Mode,
     /// The first letter of an instruction, 0 if none has come.
@@ -129,7 +131,7 @@ pub struct Interpreter {
     pub(super) text: TextStyle,
     pub(super) line: LineStyle,
     pub(super) fill: FillStyle,
-    pub(super) polygon: Polygon,
+    pub(super) polygon: Polygon<B>,
     pub(super) hatch: Hatch,
     /// The lengths of ticks in the positive and the negative direction, in percent.
     pub(super) ticks: [i64; 2],
@@ -151,6 +153,13 @@ pub struct Interpreter {
 impl Interpreter {
     /// Consists of zero bits. Before use it must be initialized.
     pub const fn new() -> Self {
+        Self::with_buffer([Vertex::ZERO; VERTICES])
+    }
+}
+
+impl<B: PolygonBuffer> Interpreter<B> {
+    /// Keeps the points of polygons in this buffer. Before use it must be initialized.
+    pub const fn with_buffer(buffer: B) -> Self {
         Self {
             mode: Mode::Code,
             letter: 0,
@@ -171,7 +180,7 @@ impl Interpreter {
             text: TextStyle::ZERO,
             line: LineStyle::ZERO,
             fill: FillStyle::ZERO,
-            polygon: Polygon::ZERO,
+            polygon: Polygon::new(buffer),
             hatch: Hatch::ZERO,
             ticks: [0; 2],
             speed: 0,

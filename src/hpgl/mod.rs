@@ -30,7 +30,7 @@ mod tests;
 pub use coordinates::{FARTHEST, Point, Rectangle, UNIT, UNITS_PER_MM};
 pub use dialect::{Beginning, Dialect, Token};
 pub use interpreter::{ANSWER_BYTES, Answer, ErrorNumber, Interpreter, Order};
-pub use polygon::VERTICES as POLYGON_POINTS;
+pub use polygon::{PolygonBuffer, VERTICES as POLYGON_POINTS, Vertex};
 pub use session::{RECEIVED_BYTES, Session};
 
 /// The byte that stands for lost or damaged bytes among received ones.

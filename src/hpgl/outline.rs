@@ -2,6 +2,7 @@
 
 use super::coordinates::{Point, UNIT};
 use super::interpreter::{Interpreter, Step};
+use super::polygon::PolygonBuffer;
 use crate::fixed::sin_cos_degrees;
 
 /// A whole turn, in units of 2^-16 degrees.
@@ -56,7 +57,7 @@ pub(super) fn sine_and_cosine(degrees: f64) -> [i64; 2] {
     [scaled(sine), scaled(cosine)]
 }
 
-impl Interpreter {
+impl<B: PolygonBuffer> Interpreter<B> {
     /// `AA` and `AR`: an arc about a centre.
     pub(super) fn arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
         let radius = self.at.minus(center);

@@ -4,6 +4,7 @@ use super::coordinates::{Point, UNIT};
 use super::interpreter::{ErrorNumber, Interpreter, Step};
 use super::line_type::LineStyle;
 use super::number::Parsed;
+use super::polygon::PolygonBuffer;
 use super::{DAMAGED, dialect};
 
 /// What the next byte belongs to.
@@ -34,7 +35,7 @@ const WITHOUT_EFFECT: &[[u8; 2]] = &[
     *b"RF", *b"RP", *b"SB", *b"SD", *b"SG", *b"SV", *b"TD", *b"TR", *b"UL", *b"WU",
 ];
 
-impl Interpreter {
+impl<B: PolygonBuffer> Interpreter<B> {
     /// Takes a byte of HP-GL without instructions to the interface. Before the next byte, take all
     /// that [`Interpreter::next_order`] returns.
     pub fn push(&mut self, byte: u8) {

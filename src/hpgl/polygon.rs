@@ -1,10 +1,10 @@
 //! Polygons (`PM EP FP`), filled shapes (`RA RR WG`), and how they are filled (`FT PT`).
 //!
-//! A polygon is kept in a buffer of [`VERTICES`] points. As on Hewlett-Packard's machines, filled
-//! rectangles and wedges use the same buffer, and what does not fit sets error 7 (HP 7550A) and is
-//! not drawn at all. Inside is what an odd number of edges surrounds. A fill is made line by line,
-//! each from edge to edge: no list of crossings is kept, the next one is looked for among all
-//! edges.
+//! A polygon is kept in a [`PolygonBuffer`], on a plotter of [`VERTICES`] points. As on
+//! Hewlett-Packard's machines, filled rectangles and wedges use the same buffer, and what does not
+//! fit sets error 7 (HP 7550A) and is not drawn at all. Inside is what an odd number of edges
+//! surrounds. A fill is made line by line, each from edge to edge. A plotter keeps no list of
+//! crossings: the next one is looked for among all edges. A buffer with more memory may list them.
 //!
 //! Sources: PCL 5 Printer Language Technical Reference Manual (Hewlett-Packard), part II, chapter
 //! 21, "The Polygon Group": which points are joined, how subpolygons are closed, and what `EP` and
@@ -15,7 +15,7 @@ use super::interpreter::{ErrorNumber, Interpreter, Order, Step};
 use super::outline::{ArcStep, sine_and_cosine};
 use crate::fixed::{divide_rounding, product};
 
-/// The most points of a polygon, with those that close its parts. Each takes 8 bytes.
+/// The most points of a polygon on a plotter, with those that close its parts. Each takes 8 bytes.
 pub const VERTICES: usize = 256;
 /// Coordinates of a vertex are kept without so many of their lowest bits: in 2^-6 plotter units.
 const DROPPED_BITS: u32 = 10;
@@ -28,7 +28,7 @@ const LEAST_PITCH: i64 = UNIT / 2;
 
 /// A point of a polygon.
 #[derive(Debug, Clone, Copy)]
-struct Vertex {
+pub struct Vertex {
     /// x in units of 2^-6 plotter units, times 2, plus 1 if the point begins a subpolygon.
     x: i32,
     /// y in the same way, plus 1 if the edge to the point is drawn by `EP`.
@@ -36,6 +36,9 @@ struct Vertex {
 }
 
 impl Vertex {
+    /// Consists of zero bits.
+    pub const ZERO: Self = Self { x: 0, y: 0 };
+
     fn new(at: Point, begins: bool, is_drawn: bool) -> Self {
         // Coordinates are below 2^40 in units of 2^-16, so below 2^31 here.
         let packed = |coordinate: i64, flag: bool| {
@@ -58,10 +61,48 @@ impl Vertex {
     }
 }
 
-/// The polygon buffer.
+/// The memory for the points of a polygon.
+pub trait PolygonBuffer {
+    /// The points, from the first one.
+    fn vertices(&self) -> &[Vertex];
+
+    /// Sets the point with this index. Those before it have been set; those behind it are not
+    /// needed any more. Returns whether there is room for it.
+    fn put(&mut self, index: usize, vertex: Vertex) -> bool;
+
+    /// Begins the lines of a fill. `span` gives, for the edge that ends at the point with an index,
+    /// how far the edge is below and above the lines, if there is such an edge.
+    fn begin_fill(&mut self, span: impl Fn(&[Vertex], usize) -> Option<[i64; 2]>) {
+        let _ = span;
+    }
+
+    /// All crossings of the edges with the line at `y`: where along the line, and the index of the
+    /// edge's end, in ascending order. `crossing` gives that of one edge. `y` never decreases
+    /// until the next fill begins. A buffer without memory for such a list returns `None`.
+    fn crossings_at(
+        &mut self,
+        y: i64,
+        crossing: impl Fn(&[Vertex], usize) -> Option<i64>,
+    ) -> Option<&[(i64, usize)]> {
+        let _ = (y, crossing);
+        None
+    }
+}
+
+impl<const POINTS: usize> PolygonBuffer for [Vertex; POINTS] {
+    fn vertices(&self) -> &[Vertex] {
+        self
+    }
+
+    fn put(&mut self, index: usize, vertex: Vertex) -> bool {
+        self.get_mut(index).map(|slot| *slot = vertex).is_some()
+    }
+}
+
+/// A polygon.
 #[derive(Debug)]
-pub(super) struct Polygon {
-    vertices: [Vertex; VERTICES],
+pub(super) struct Polygon<B> {
+    buffer: B,
     count: usize,
     /// The index of the first point of the subpolygon that is being defined.
     first: usize,
@@ -73,16 +114,11 @@ pub(super) struct Polygon {
     began_at: Point,
 }
 
-impl Polygon {
-    /// No polygon; it consists of zero bits.
-    pub(super) const ZERO: Self = Self {
-        vertices: [Vertex { x: 0, y: 0 }; VERTICES],
-        count: 0,
-        first: 0,
-        is_open: false,
-        is_full: false,
-        began_at: Point::ZERO,
-    };
+impl<B: PolygonBuffer> Polygon<B> {
+    /// No polygon. It consists of zero bits, if the buffer does.
+    pub(super) const fn new(buffer: B) -> Self {
+        Self { buffer, count: 0, first: 0, is_open: false, is_full: false, began_at: Point::ZERO }
+    }
 
     /// Forgets the polygon, and ends polygon mode.
     pub(super) fn clear(&mut self) {
@@ -92,20 +128,19 @@ impl Polygon {
     /// Adds a point. Returns whether there was room for it.
     fn push(&mut self, at: Point, is_drawn: bool) -> bool {
         let begins = self.count == self.first;
-        match self.vertices.get_mut(self.count) {
-            Some(slot) if !self.is_full => {
-                *slot = Vertex::new(at, begins, is_drawn);
-                self.count += 1;
-            }
-            _ => self.is_full = true,
+        if !self.is_full && self.buffer.put(self.count, Vertex::new(at, begins, is_drawn)) {
+            self.count += 1;
+        } else {
+            self.is_full = true;
         }
         !self.is_full
     }
 
     /// Closes the subpolygon that is being defined. A single point is none.
     fn close(&mut self) {
+        let vertices = self.buffer.vertices();
         let [first, last] =
-            [self.first, self.count.wrapping_sub(1)].map(|index| self.vertices.get(index).copied());
+            [self.first, self.count.wrapping_sub(1)].map(|index| vertices.get(index).copied());
         match (first, last) {
             (Some(first), Some(last)) if self.count >= self.first + 2 => {
                 if first.at() != last.at() {
@@ -117,19 +152,18 @@ impl Polygon {
         self.first = self.count;
     }
 
-    /// The edge that ends at the point with this index; `Some(None)` if none does, `None` behind
-    /// the last point.
-    fn edge(&self, index: usize) -> Option<Option<[Point; 2]>> {
-        let points = self.vertices.get(..self.count)?;
-        let end = points.get(index)?;
-        let begin = index.checked_sub(1).and_then(|before| points.get(before));
-        Some(begin.filter(|_| !end.begins()).map(|begin| [begin.at(), end.at()]))
-    }
-
     /// All edges, with the index of each.
     fn edges(&self) -> impl Iterator<Item = (usize, [Point; 2])> {
-        (1..self.count).filter_map(|index| Some((index, self.edge(index)??)))
+        let vertices = self.buffer.vertices();
+        (1..self.count).filter_map(|index| Some((index, edge(vertices, index)?)))
     }
+}
+
+/// The edge that ends at the point with this index, if one does.
+fn edge(vertices: &[Vertex], index: usize) -> Option<[Point; 2]> {
+    let end = vertices.get(index).filter(|end| !end.begins())?;
+    let begin = vertices.get(index.checked_sub(1)?)?;
+    Some([begin.at(), end.at()])
 }
 
 /// How shapes are filled.
@@ -206,7 +240,7 @@ impl Hatch {
     }
 }
 
-impl Interpreter {
+impl<B: PolygonBuffer> Interpreter<B> {
     /// `PM`: begins polygon mode, closes a subpolygon, or ends polygon mode.
     pub(super) fn polygon_mode(&mut self, numbers: &[i64]) -> Result<(), ErrorNumber> {
         let mode = match *numbers {
@@ -247,8 +281,8 @@ impl Interpreter {
     pub(super) fn add_arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
         let radius = self.at.minus(center);
         let arc = ArcStep::new(center, radius, sweep, chord.or(Some(CHORD)));
-        for index in 0..=VERTICES as u32 {
-            let Some(to) = arc.chord(index) else { return };
+        for index in 0.. {
+            let Some(to) = arc.chord(index).filter(|_| !self.polygon.is_full) else { return };
             self.add_vertex(to);
         }
     }
@@ -339,7 +373,8 @@ impl Interpreter {
     /// The edge of the polygon with this index: whether it is drawn, and its end. `None` behind the
     /// last.
     pub(super) fn polygon_edge(&self, index: u32) -> Option<(bool, Point)> {
-        let vertex = self.polygon.vertices.get(..self.polygon.count)?.get(index as usize)?;
+        let vertices = self.polygon.buffer.vertices().get(..self.polygon.count)?;
+        let vertex = vertices.get(index as usize)?;
         Some((vertex.is_drawn() && !vertex.begins(), vertex.at()))
     }
 
@@ -418,6 +453,12 @@ impl Interpreter {
             }
             (least, most) = (least.max(beyond.0), most.min(beyond.1));
         }
+        let count = self.polygon.count;
+        self.polygon.buffer.begin_fill(|vertices, index| {
+            let edge = edge(vertices, index).filter(|_| index < count)?;
+            let [a, b] = edge.map(|point| hatch.turned(point).y);
+            Some([a.min(b), a.max(b)])
+        });
         let pitch = hatch.pitch.max(1);
         hatch.pitch = pitch;
         // The first line at `least` or above, and the last at `most` or below.
@@ -465,11 +506,25 @@ impl Interpreter {
 
     /// The crossing of the line at `y` that follows another one, or the first.
     fn crossing_after(
-        &self,
+        &mut self,
         after: Option<(i64, usize)>,
         y: i64,
         is_backward: bool,
     ) -> Option<(i64, usize)> {
+        let (hatch, count) = (self.hatch, self.polygon.count);
+        let crossing = |vertices: &[Vertex], index| {
+            hatch.crosses(y, edge(vertices, index).filter(|_| index < count)?)
+        };
+        if let Some(crossings) = self.polygon.buffer.crossings_at(y, crossing) {
+            let passed = |limit: (i64, usize)| crossings.partition_point(|found| *found < limit);
+            let index = match after {
+                None if is_backward => crossings.len().checked_sub(1),
+                None => Some(0),
+                Some(after) if is_backward => passed(after).checked_sub(1),
+                Some((x, index)) => Some(passed((x, index + 1))),
+            };
+            return crossings.get(index?).copied();
+        }
         let is_before =
             |a: &(i64, usize), b: &(i64, usize)| if is_backward { a > b } else { a < b };
         let edges = self.polygon.edges();

@@ -2,10 +2,11 @@
 
 use super::coordinates::{Point, Rectangle, UNIT};
 use super::interpreter::{Answer, Interpreter, Step};
+use super::polygon::PolygonBuffer;
 use crate::fixed::{BinaryFraction, divide_rounding};
 use core::fmt::Write;
 
-impl Interpreter {
+impl<B: PolygonBuffer> Interpreter<B> {
     /// Answers the instruction with this second letter. Returns `false` if there is none.
     pub(super) fn query(&mut self, letter: u8) -> bool {
         let mut answer = Answer::new();

@@ -126,6 +126,10 @@ fn exponent(value: f64) -> i32 {
 /// 100,000 instructions.
 const VERTICES_BETWEEN_CHECKS: usize = 256;
 
+/// How far the rounding of a row's factors brings a coordinate off, as a part of the distance from
+/// the model's origin: 2^-26.
+const ROW_ERROR: f64 = 1.0 / 67_108_864.0;
+
 /// The near plane is at 2^-`NEAR_SHIFT` of the greatest depth.
 const NEAR_SHIFT: u32 = 10;
 
@@ -163,18 +167,25 @@ impl View {
         let (nearest, farthest) = (extents[2].0 + shift[2], extents[2].1 + shift[2]);
         // An extent of only a few units of 2^-30 is rounding noise of the directions.
         let noise = if reach > 0.0 { reach * 6e-8 } else { 1.0 };
-        let scale = limit / f64::max(width, noise);
+        // The factors of a row are rounded, too: far from the origin of a small model they bring a
+        // coordinate off by up to `scale` times `reach` times 2^-26, which must stay within the
+        // limit. Nearer than 64 times its size this is less than half a unit.
+        let whole = |extent: f64| {
+            let extent = f64::max(extent, noise);
+            if reach > 64.0 * extent { extent + reach * ROW_ERROR } else { extent }
+        };
+        let scale = limit / whole(width);
         let (depth_scale, depth_offset) = match projection {
             Projection::Perspective => {
                 if farthest <= 0.0 {
                     return Err(ViewError::NothingInFront);
                 }
-                (limit / f64::max(f64::max(farthest, -nearest), noise), 0.0)
+                (limit / whole(f64::max(farthest, -nearest)), 0.0)
             }
             // Only differences of depth matter, so the depths are centred on zero.
             Projection::Parallel => {
                 let half = (farthest - nearest) / 2.0;
-                (limit / f64::max(half, noise), -(nearest + farthest) / 2.0)
+                (limit / whole(half), -(nearest + farthest) / 2.0)
             }
         };
         let offsets = [scale * shift[0], scale * shift[1], depth_scale * (shift[2] + depth_offset)];
@@ -417,6 +428,41 @@ mod tests {
                 let widest = seen.map(|v| v.x.abs().max(v.y.abs())).max();
                 assert!(widest > Some(COORDINATE_LIMIT - 10), "{size}: {widest:?}");
             });
+        }
+    }
+
+    #[test]
+    fn a_small_model_far_from_the_origin_stays_within_the_range() {
+        const OBLIQUE: Lens = Lens::Oblique { angle: 30.0, ratio: 2.0 };
+        for size in [1.0, 0.001, 20.0] {
+            for far in [70.0, 4095.0, 14678.0, 100_003.0] {
+                let texts = CUBE.map(|corner| {
+                    let text = |at: &str, far: f64| {
+                        std::format!("{:.3}", far * size + at.parse::<f64>().unwrap() * size)
+                    };
+                    [text(corner[0], far), text(corner[1], 0.0), text(corner[2], -far)]
+                });
+                let texts = texts.each_ref().map(|texts| texts.each_ref().map(|it| it.as_str()));
+                with_model(&texts, |model| {
+                    for lens in [Lens::Perspective, Lens::Orthographic, OBLIQUE] {
+                        for azimuth in 0..40 {
+                            let axonometric = Camera::axonometric(
+                                model,
+                                f64::from(azimuth) * 9.0,
+                                30.0,
+                                None,
+                                None,
+                            );
+                            let view =
+                                View::new(&Camera { lens, ..axonometric.unwrap() }, model).unwrap();
+                            let seen = model.vertices().iter().map(|p| view.vertex(*p));
+                            let most = seen.flat_map(|v| [v.x, v.y, v.z]).map(i32::abs).max();
+                            assert!(most <= Some(COORDINATE_LIMIT), "{size} {far}: {most:?}");
+                            assert!(most > Some(COORDINATE_LIMIT / 3), "{size} {far}: {most:?}");
+                        }
+                    }
+                });
+            }
         }
     }
 

@@ -599,6 +599,7 @@ fn what_a_preview_says_stands_in_its_json() {
     let (said, once) = json(&[]);
     assert_eq!(once["bounds"], serde_json::json!([[10.0, 10.0, 0.0], [60.0, 35.0, 0.0]]));
     assert_eq!(once["passes"], 1);
+    assert_eq!(once["page_mm"], serde_json::json!({ "width": 210.0, "height": 297.0 }));
     let drawn = &once["drawn"];
     let figures = format!(
         "a.json: {} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %; the \
@@ -616,4 +617,7 @@ fn what_a_preview_says_stands_in_its_json() {
     assert_eq!(of(&twice, "pen_down_mm"), of(&once, "pen_down_mm"));
     assert!(of(&twice, "duration_s") > 1.8 * of(&once, "duration_s"));
     assert!(of(&twice, "steps") > 1.8 * of(&once, "steps"));
+
+    let (_, turned) = json(&["--page", "A5", "--landscape"]);
+    assert_eq!(turned["page_mm"], serde_json::json!({ "width": 210.0, "height": 148.0 }));
 }

@@ -171,6 +171,18 @@ fn a_program_that_draws_nothing_or_too_little_says_which_setting_to_change() {
 }
 
 #[test]
+fn a_first_line_that_a_pause_leaves_without_ink_is_told() {
+    let mut bench = bench("");
+    assert!(!send(&mut bench, "G0 X0 Y0\nG1 X10 F3000\nG1 Y10").contains("MSG"));
+    // The sender has paused for more than a second, and the program counts as a new one.
+    let heard = send(&mut bench, "G1 X0\nG1 Y0");
+    assert!(heard.contains("[MSG:the first line was not inked"), "{heard}");
+    assert!(!inked(&bench).contains(&[5.0 * STEPS, 10.0 * STEPS]));
+    // It is told once.
+    assert!(!send(&mut bench, "G0 X5\nG1 X10\nG1 Y10").contains("MSG"));
+}
+
+#[test]
 fn a_line_that_is_typed_alone_never_inks_unless_the_pen_was_put_down() {
     let mut bench = bench("");
     for line in ["G1 X10 F3000", "G1 Y10", "G0 X0", "G2 X10 Y10 I5", "G1 X0 Y0"] {

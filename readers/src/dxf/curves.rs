@@ -14,7 +14,7 @@ const MOST_HALVINGS: u32 = 16;
 pub(super) struct Affine(pub(super) [f64; 6]);
 
 impl Affine {
-    fn apply(self, [x, y]: Point) -> Point {
+    pub(super) fn apply(self, [x, y]: Point) -> Point {
         let Self([a, b, c, d, e, f]) = self;
         [a * x + c * y + e, b * x + d * y + f]
     }

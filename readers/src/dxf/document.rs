@@ -1,5 +1,6 @@
 //! What a DXF file says: pairs of a code and a value, which make entities, layers and blocks.
 
+use super::curves::Affine;
 use crate::plan::Point;
 use std::collections::{HashMap, HashSet};
 
@@ -8,6 +9,8 @@ use std::collections::{HashMap, HashSet};
 pub(super) struct Pair<'a> {
     pub(super) code: i32,
     pub(super) value: &'a str,
+    /// The value with the spaces around it, which count in texts.
+    pub(super) raw: &'a str,
     pub(super) line: usize,
 }
 
@@ -25,6 +28,11 @@ pub(super) type Refusal = (usize, String);
 impl<'a> Entity<'a> {
     pub(super) fn text(&self, code: i32) -> Option<&'a str> {
         self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.value)
+    }
+
+    /// The text with this code, with the spaces around it.
+    pub(super) fn raw(&self, code: i32) -> Option<&'a str> {
+        self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.raw)
     }
 
     /// All numbers with this code.
@@ -83,8 +91,11 @@ pub(super) struct Document<'a> {
     types_of_layers: HashMap<String, &'a str>,
     /// By what the lengths of line types are multiplied.
     type_scale: f64,
-    /// The number of inserted blocks of which only a part is shown.
-    pub(super) clipped: usize,
+    /// The outlines within which inserted blocks are shown, in the coordinates of the block, by the
+    /// handles of the insertions.
+    clips: HashMap<&'a str, Vec<Point>>,
+    /// The number of insertions of which only a part is shown that is not known.
+    pub(super) unclipped: usize,
     pub(super) entities: Vec<Entity<'a>>,
 }
 
@@ -99,15 +110,27 @@ impl<'a> Document<'a> {
         self.blocks.get(&name.to_uppercase())
     }
 
-    /// The lengths of the dashes and gaps of an entity on this layer, in units of the file; empty
-    /// if its line is continuous.
+    /// The outline within which an insertion of a block shows it, in the coordinates of the block.
+    pub(super) fn clip(&self, insertion: &Entity<'_>) -> Option<&[Point]> {
+        self.clips.get(insertion.text(5)?).map(Vec::as_slice)
+    }
+
+    /// The name of the line type of an entity on this layer, in a block that is inserted with the
+    /// type `of_block`.
+    pub(super) fn line_type(&self, entity: &Entity<'a>, layer: &str, of_block: &'a str) -> &'a str {
+        match entity.text(6) {
+            Some(name) if name.eq_ignore_ascii_case("BYBLOCK") => of_block,
+            Some(name) if !name.eq_ignore_ascii_case("BYLAYER") => name,
+            _ => self.types_of_layers.get(&layer.to_uppercase()).copied().unwrap_or_default(),
+        }
+    }
+
+    /// The lengths of the dashes and gaps of an entity with this line type, in units of the file;
+    /// empty if its line is continuous.
     ///
     /// # Errors
     /// The scale of the entity is no number.
-    pub(super) fn dashes(&self, entity: &Entity<'a>, layer: &str) -> Result<Vec<f64>, Refusal> {
-        let of_layer = || self.types_of_layers.get(&layer.to_uppercase()).copied();
-        let own = entity.text(6).filter(|name| !name.eq_ignore_ascii_case("BYLAYER"));
-        let name = own.or_else(of_layer).unwrap_or_default();
+    pub(super) fn dashes(&self, entity: &Entity<'a>, name: &str) -> Result<Vec<f64>, Refusal> {
         let scale = self.type_scale * entity.number(48, 1.0)?;
         let lengths = self.line_types.get(&name.to_uppercase());
         Ok(lengths.into_iter().flatten().map(|length| length * scale).collect())
@@ -128,7 +151,12 @@ pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
         let Some((index, value)) = lines.next() else {
             return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
         };
-        pairs.push(Pair { code, value: value.trim(), line: index + 1 });
+        let value_at = Pair { code, value: value.trim(), raw: value, line: index + 1 };
+        pairs.push(value_at);
+        // Nothing that follows belongs to the drawing.
+        if (code, value_at.value) == (0, "EOF") {
+            break;
+        }
     }
     Ok(pairs)
 }
@@ -208,16 +236,63 @@ pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> 
             }
             Some("OBJECTS") => {
                 // Each belongs to one block that is inserted.
-                for object in &entities(section) {
-                    let is_filter = object.kind == "SPATIAL_FILTER";
-                    let is_on = is_filter && object.number(71, 1.0)? != 0.0;
-                    document.clipped += usize::from(is_on);
+                let objects = entities(section);
+                for object in objects.iter().filter(|object| object.kind == "SPATIAL_FILTER") {
+                    if object.number(71, 1.0)? == 0.0 {
+                        continue;
+                    }
+                    let clip = clip(object, &objects)?;
+                    document.unclipped += usize::from(clip.is_none());
+                    document.clips.extend(clip);
                 }
             }
             _ => {}
         }
     }
+    let blocks = document.blocks.values().flat_map(|(_, entities)| entities);
+    let all = document.entities.iter().chain(blocks).filter(|entity| entity.kind == "INSERT");
+    let handles: HashSet<&str> = all.filter_map(|entity| entity.text(5)).collect();
+    let clips = document.clips.len();
+    document.clips.retain(|handle, _| handles.contains(handle));
+    document.unclipped += clips - document.clips.len();
     Ok(document)
+}
+
+/// The handle of the insertion that a filter in space belongs to, and the outline within which the
+/// block is shown; `None` if the filter shows what is not within an outline in the plane.
+fn clip<'a>(
+    filter: &Entity<'a>,
+    objects: &[Entity<'a>],
+) -> Result<Option<(&'a str, Vec<Point>)>, Refusal> {
+    let owner = |object: &Entity<'a>| object.text(330);
+    let owner_of = |handle: &str| {
+        owner(objects.iter().find(|object| object.text(5).is_some_and(|own| own == handle))?)
+    };
+    // An insertion has a dictionary of its own, in which that of its filters is.
+    let insertion = owner(filter).and_then(owner_of).and_then(owner_of);
+    let Some(insertion) = insertion else { return Ok(None) };
+    let is_inverse = objects.iter().any(|object| {
+        let is_mark = |pair: &Pair<'_>| pair.value == "ACAD_INVERTEDCLIP_ROUNDTRIP";
+        object.pairs.iter().any(is_mark)
+            && owner(object).and_then(owner_of).is_some_and(|of| filter.text(5) == Some(of))
+    });
+    let up = [filter.number(210, 0.0)?, filter.number(220, 0.0)?, filter.number(230, 1.0)?];
+    let has_depth = filter.number(72, 0.0)? != 0.0 || filter.number(73, 0.0)? != 0.0;
+    let matrices = filter.numbers(40)?;
+    let (outline, count) = (filter.points(10)?, matrices.len());
+    if is_inverse || up != [0.0, 0.0, 1.0] || has_depth || count < 24 || outline.len() < 2 {
+        return Ok(None);
+    }
+    // The first of two matrices of 12 numbers leads to the coordinates of the block.
+    let matrix = &matrices[count - 24..count - 12];
+    let map = Affine([matrix[0], matrix[4], matrix[1], matrix[5], matrix[3], matrix[7]]);
+    let corners = match outline[..] {
+        [[left, low], [right, high]] => {
+            vec![[left, low], [right, low], [right, high], [left, high]]
+        }
+        _ => outline,
+    };
+    Ok(Some((insertion, corners.into_iter().map(|point| map.apply(point)).collect())))
 }
 
 fn number_of(pair: Pair<'_>) -> Result<i64, Refusal> {

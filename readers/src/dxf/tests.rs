@@ -213,6 +213,12 @@ fn points_faces_and_dimensions_are_drawn() {
                  0 MTEXT 8 0 1 8 0 ENDBLK 0 ENDSEC";
     let dimension = dxf("4", block, "0 DIMENSION 8 5 2 *D1 10 7 20 7");
     assert_eq!(strokes(&dimension), [("pen5".to_owned(), vec![[1.0, 1.0], [9.0, 1.0]])]);
+    // A table has a place and a direction of its own.
+    let table = dxf("4", block, "0 TABLE 8 5 2 *D1 10 7 20 7 11 0 21 2 41 9");
+    let table = table.replace("TABLE", "ACAD_TABLE");
+    assert_eq!(strokes(&table), [("pen5".to_owned(), vec![[6.0, 8.0], [6.0, 16.0]])]);
+    // What stands behind the end of the file is not read.
+    assert_eq!(strokes(&(table.clone() + "ignore\nthis")), strokes(&table));
     let said = notes("a.dxf", dimension.as_bytes());
     assert!(
         matches!(said.as_slice(), [note] if note.starts_with("1 MTEXT is not drawn")),
@@ -250,7 +256,9 @@ fn tilted_entities_are_seen_from_above() {
 fn names_have_no_capitals_and_line_types_have_dashes() {
     let tables = "0 SECTION 2 TABLES 0 LTYPE 2 Dashed 49 2 49 -1 \
                   0 LAYER 2 Off 62 -7 0 LAYER 2 hid 62 7 6 DASHED 0 ENDTAB 0 ENDSEC \
-                  0 SECTION 2 BLOCKS 0 BLOCK 2 Tick 0 LINE 8 hid 11 4 0 ENDBLK 0 ENDSEC";
+                  0 SECTION 2 BLOCKS 0 BLOCK 2 Tick 0 LINE 8 hid 11 4 0 ENDBLK \
+                  0 BLOCK 2 open 0 LINE 8 a 6 BYBLOCK 11 4 0 ENDBLK \
+                  0 BLOCK 2 outer 0 INSERT 2 open 6 ByBlock 0 ENDBLK 0 ENDSEC";
     let drawn = |entities: &str| -> Vec<Vec<[f64; 2]>> {
         let strokes = strokes(&dxf("4", tables, entities));
         strokes.into_iter().map(|(_, points)| points).collect()
@@ -260,9 +268,116 @@ fn names_have_no_capitals_and_line_types_have_dashes() {
     assert_eq!(drawn("0 LINE 8 a 6 dashed 11 4"), dashes);
     assert_eq!(drawn("0 LINE 8 hid 6 dashed 48 2 11 6"), [[[0.0, 0.0], [4.0, 0.0]]]);
     assert_eq!(drawn("0 LINE 8 hid 6 CONTINUOUS 11 4"), [[[0.0, 0.0], [4.0, 0.0]]]);
-    let clipped = dxf("4", "0 SECTION 2 OBJECTS 0 FILTER 71 1 0 ENDSEC", "0 LINE 11 4");
-    let said = notes("a.dxf", clipped.replace("FILTER", "SPATIAL_FILTER").as_bytes());
-    assert!(said[0].starts_with("1 inserted block is clipped"), "{said:?}");
+    // A line type that the block leaves open is that of the insertion, or of the block around it.
+    assert_eq!(drawn("0 INSERT 2 OPEN 6 dashed"), dashes);
+    assert_eq!(drawn("0 INSERT 2 OPEN 8 hid"), dashes);
+    assert_eq!(drawn("0 INSERT 2 OUTER 6 dashed"), dashes);
+    assert_eq!(drawn("0 INSERT 2 OPEN 8 a"), [[[0.0, 0.0], [4.0, 0.0]]]);
+    assert_eq!(drawn("0 LINE 8 hid 6 ByBlock 11 4"), [[[0.0, 0.0], [4.0, 0.0]]]);
+}
+
+/// A block with a line, and objects that clip its insertion.
+fn clipped(objects: &str, insertion: &str) -> String {
+    let blocks = "0 SECTION 2 BLOCKS 0 BLOCK 2 bar 10 1 20 0 \
+                  0 LINE 8 0 10 -8 20 0 11 12 21 0 0 POINT 10 20 20 0 0 ENDBLK 0 ENDSEC";
+    let dictionaries = "0 DICTIONARY 5 D1 330 I1 3 ACAD_FILTER 360 D2 \
+                        0 DICTIONARY 5 D2 330 D1 3 SPATIAL 360 F1";
+    let objects = format!("0 SECTION 2 OBJECTS {dictionaries} {objects} 0 ENDSEC");
+    dxf("4", &format!("{blocks} {objects}"), insertion)
+        .replace("CLIP", "SPATIAL_FILTER")
+        .replace("ROUNDTRIP", "ACAD_INVERTEDCLIP_ROUNDTRIP")
+}
+
+#[test]
+fn inserted_blocks_are_clipped() {
+    let insertion = "0 INSERT 5 I1 2 bar 10 5 20 5 41 2 42 2";
+    // From the page to the block: x = (X - 5) / 2 + 1. The other matrix is not needed.
+    let matrices = "40 0.5 40 0 40 0 40 -1.5 40 0 40 0.5 40 0 40 -2.5 40 0 40 0 40 1 40 0 \
+                    40 1 40 0 40 0 40 0 40 0 40 1 40 0 40 0 40 0 40 0 40 1 40 0";
+    let clip = |corners: &str, more: &str| {
+        let filter = format!("0 CLIP 5 F1 330 D2 {corners} 71 1 {more} {matrices}");
+        let text = clipped(&filter, insertion);
+        let strokes = strokes(&text).into_iter().map(|(_, points)| points).collect::<Vec<_>>();
+        (strokes, notes("a.dxf", text.as_bytes()))
+    };
+    let whole = vec![vec![[-13.0, 5.0], [27.0, 5.0]], vec![[43.0, 5.0], [43.02, 5.0]]];
+    let rectangle = "10 1 20 0 10 9 20 8";
+    assert_eq!(clip(rectangle, ""), (vec![vec![[1.0, 5.0], [9.0, 5.0]]], vec![]));
+    let triangle = "10 0 20 0 10 10 20 0 10 0 20 10";
+    assert_eq!(clip(triangle, ""), (vec![vec![[0.0, 5.0], [5.0, 5.0]]], vec![]));
+    // What cuts in depth or from below is told, and so is a filter of no insertion.
+    let told = "1 inserted block is clipped in the file (XCLIP) in a way that is not obeyed: the \
+                whole is drawn";
+    for (corners, more) in [(rectangle, "72 1 40 3"), (rectangle, "230 -1"), ("10 1 20 2", "")] {
+        assert_eq!(clip(corners, more), (whole.clone(), vec![told.to_owned()]), "{more}");
+    }
+    let filter = format!("0 CLIP 5 F1 330 D2 {rectangle} 71 1 {matrices}");
+    let mark = "0 XRECORD 330 X1 102 ROUNDTRIP 0 DICTIONARY 5 X1 330 F1";
+    for (objects, handle) in [(filter.clone(), "I2"), (format!("{filter} {mark}"), "I1")] {
+        let text = clipped(&objects, &insertion.replace("I1", handle));
+        assert_eq!(notes("a.dxf", text.as_bytes()), [told], "{handle}");
+    }
+    let off = clipped(&filter.replace("71 1", "71 0"), insertion);
+    assert_eq!((strokes(&off).len(), notes("a.dxf", off.as_bytes())), (2, vec![]));
+}
+
+/// The least and the greatest coordinates of all strokes, rounded to hundredths.
+fn extent(entities: &str) -> [[f64; 2]; 2] {
+    let text = dxf("4", "", entities);
+    let points: Vec<[f64; 2]> = strokes(&text).into_iter().flat_map(|(_, points)| points).collect();
+    let most = |pick: fn(f64, f64) -> f64| {
+        [0, 1].map(|axis: usize| {
+            let all = points.iter().map(|point| point[axis]);
+            (all.reduce(pick).expect("points") * 100.0).round() / 100.0
+        })
+    };
+    [most(f64::min), most(f64::max)]
+}
+
+#[test]
+fn texts_stand_where_the_file_says() {
+    // The letter H is 14 units wide and 21 high, in a width of 22: at a height of 21 mm it begins
+    // 4 mm behind the beginning of its line.
+    let text = |more: &str| extent(&format!("0 TEXT 8 a 10 100 20 50 40 21 1 H {more}"));
+    assert_eq!(text(""), [[104.0, 50.0], [118.0, 71.0]]);
+    assert_eq!(text("50 90"), [[79.0, 54.0], [100.0, 68.0]]);
+    assert_eq!(text("41 0.5"), [[102.0, 50.0], [109.0, 71.0]]);
+    assert_eq!(text("71 2"), [[82.0, 50.0], [96.0, 71.0]]);
+    assert_eq!(text("71 4"), [[104.0, 29.0], [118.0, 50.0]]);
+    // With an alignment the second point counts.
+    let aligned = |codes: &str| text(&format!("11 10 21 20 {codes}"));
+    assert_eq!(aligned("72 1"), [[3.0, 20.0], [17.0, 41.0]]);
+    assert_eq!(aligned("72 2"), [[-8.0, 20.0], [6.0, 41.0]]);
+    assert_eq!(aligned("72 2 73 3"), [[-8.0, -1.0], [6.0, 20.0]]);
+    assert_eq!(aligned("72 1 73 2"), [[3.0, 9.5], [17.0, 30.5]]);
+    assert_eq!(aligned("73 1"), [[14.0, 27.0], [28.0, 48.0]]);
+    assert_eq!(aligned("72 0 73 0"), [[104.0, 50.0], [118.0, 71.0]]);
+    // The text fills the way from 100 to 144, twice its width; 3 makes it higher, too.
+    assert_eq!(text("72 5 11 144 21 50"), [[108.0, 50.0], [136.0, 71.0]]);
+    assert_eq!(text("72 3 11 144 21 50"), [[108.0, 50.0], [136.0, 92.0]]);
+    let attribute = extent("0 ATTRIB 10 0 20 0 11 10 21 20 40 21 1 H 70 0 72 2 74 3");
+    assert_eq!(attribute, [[-8.0, -1.0], [6.0, 20.0]]);
+
+    let paragraph = |more: &str| extent(&format!("0 MTEXT 10 100 20 50 40 21 1 H\\PH {more}"));
+    assert_eq!(paragraph("71 1"), [[104.0, -6.0], [118.0, 50.0]]);
+    assert_eq!(paragraph("71 3"), [[82.0, -6.0], [96.0, 50.0]]);
+    assert_eq!(paragraph("71 5"), [[93.0, 22.0], [107.0, 78.0]]);
+    assert_eq!(paragraph("71 7"), [[104.0, 57.0], [118.0, 113.0]]);
+    assert_eq!(paragraph("71 1 44 2"), [[104.0, -41.0], [118.0, 50.0]]);
+    assert_eq!(paragraph("71 1 50 90"), [[100.0, 54.0], [156.0, 68.0]]);
+    assert_eq!(paragraph("71 1 50 90 11 1 21 0"), [[104.0, -6.0], [118.0, 50.0]]);
+    assert_eq!(paragraph("71 1 11 0 21 1"), [[100.0, 54.0], [156.0, 68.0]]);
+
+    let said =
+        notes("a.dxf", dxf("4", "", "0 TEXT 40 5 1 H€\u{4E00} 0 ATTRIB 70 1 40 5 1 H").as_bytes());
+    assert_eq!(
+        said,
+        [
+            "1 invisible entity is not drawn (line 22)",
+            "1 text is drawn in the plotter's own letters, not in the font of the file",
+            "1 letter is not in the plotter's font: drawn as a box",
+        ]
+    );
 }
 
 #[test]

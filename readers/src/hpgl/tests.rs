@@ -99,7 +99,7 @@ fn what_is_not_drawn_is_counted_or_refused() {
             "2 instructions UC are not obeyed"
         ]
     );
-    let points = "0,40,40,0,".repeat(140);
+    let points = "0,40,40,0,".repeat(500_000);
     let polygon = format!("PU0,0;PM0;\nPD{points}0,0;PM2;FP;");
     for (text, reason) in [
         ("IN;\nPD1,x", "a.plt:2: error 2 of HP-GL: PD has a wrong number of parameters"),
@@ -109,11 +109,119 @@ fn what_is_not_drawn_is_counted_or_refused() {
         ("IN;PD;SC1,1,0,1;", "a.plt:1: error 3 of HP-GL: a parameter of SC"),
         ("IN;PD;PR8000000,0,8000000,0;", "a.plt:1: error 6 of HP-GL: PR leads beyond 8388608"),
         ("IN;PD1,9;\n$120=5\n", "a.plt:2: a line that begins with $ ends HP-GL"),
-        (&polygon, "a.plt:2: error 7 of HP-GL: the polygon has more than 256 points"),
+        (&polygon, "a.plt:2: error 7 of HP-GL: the polygon has more than 1000000 points"),
     ] {
         let error = sent("a.plt", text.as_bytes()).expect_err("refused");
         assert!(error.starts_with(reason), "{error}");
     }
     let error = sent("a.plt", b"IN;PD1,9;\n\xFFPD5,5;").expect_err("refused");
     assert!(error.starts_with("a.plt:2: the byte 0xFF"), "{error}");
+}
+
+/// A comb of this many teeth of 1 mm by 10 mm, 1 mm apart, as a polygon of four points a tooth.
+fn comb(teeth: usize) -> String {
+    let tooth = |index: usize| {
+        let (left, right) = (80 * index, 80 * index + 40);
+        format!("{left},400,{right},400,{right},0,{},0", right + 40)
+    };
+    let teeth: Vec<String> = (0..teeth).map(tooth).collect();
+    format!("PU0,0;PM0;PD{};PM2;", teeth.join(","))
+}
+
+/// The positions of all strokes, in mm.
+fn strokes(text: &str) -> Vec<Vec<[f64; 2]>> {
+    let (mut vertices, mut strokes) = (Vec::new(), Vec::<Vec<[f64; 2]>>::new());
+    for line in lines(text) {
+        let words: Vec<&str> = line.split(' ').collect();
+        match words.as_slice() {
+            ["v", x, y, _] => vertices.push([x, y].map(|word| word.parse().expect("a number"))),
+            ["l", numbers @ ..] => {
+                let number = |word: &&str| word.parse::<usize>().expect("a number");
+                let mut points = numbers.iter().map(|word| vertices[number(word) - 1]);
+                // A long stroke takes several lines.
+                match strokes.last_mut() {
+                    Some(last) if last.last() == vertices.get(number(&numbers[0]) - 1) => {
+                        last.extend(points.by_ref().skip(1));
+                    }
+                    _ => strokes.push(points.collect()),
+                }
+            }
+            _ => {}
+        }
+    }
+    strokes
+}
+
+#[test]
+fn polygons_larger_than_a_plotters_buffer_are_filled_and_edged() {
+    for teeth in [10, 65, 2000, 40_000] {
+        let comb = comb(teeth);
+        // Lines 2.5 mm apart cross each tooth at 0, 2.5, 5 and 7.5 mm, in turn to the right and
+        // back. The upper end of an edge does not belong to it.
+        let mut expected = Vec::new();
+        for (row, y) in [0.0, 2.5, 5.0, 7.5].into_iter().enumerate() {
+            let tooth = |index: usize| [2.0 * index as f64, 2.0 * index as f64 + 1.0];
+            let mut forth: Vec<_> =
+                (0..teeth).map(|index| tooth(index).map(|x| [x, y]).to_vec()).collect();
+            if row % 2 == 1 {
+                forth.reverse();
+                forth.iter_mut().for_each(|line| line.reverse());
+            }
+            expected.extend(forth);
+        }
+        assert_eq!(strokes(&format!("{comb}FT3,100;FP;")), expected, "{teeth} teeth");
+
+        let mut edges = vec![[0.0, 0.0]];
+        for index in 0..teeth {
+            let left = 2.0 * index as f64;
+            edges.extend([[left, 10.0], [left + 1.0, 10.0], [left + 1.0, 0.0], [left + 2.0, 0.0]]);
+        }
+        edges.push([0.0, 0.0]);
+        assert_eq!(strokes(&format!("{comb}EP;")), [edges], "{teeth} teeth");
+    }
+}
+
+#[test]
+fn a_polygon_of_few_points_is_filled_as_by_a_plotter() {
+    let mut state = 1_u32;
+    let mut below = |bound: u32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) % bound
+    };
+    for case in 0..200 {
+        let mut text = String::from("PU100,100;");
+        for _ in 0..2 {
+            // A coarse grid lets edges meet, lie on lines of the fill, and lie on each other.
+            let grid = [1, 40, 160][below(3) as usize];
+            text += "PM0;PD";
+            for _ in 0..1 + below(3) {
+                for _ in 0..2 + below(30) {
+                    text +=
+                        &format!("{},{},", below(1600) / grid * grid, below(1600) / grid * grid);
+                }
+                text += ["PM1;", "PM1;CI200,30;PM1;", "AA800,800,200,20;PM1;"][below(3) as usize];
+                text += "PD";
+            }
+            let angle = [0, 45, 90, 30][below(4) as usize];
+            let kind = 1 + below(4);
+            text += &format!("PM2;FT{kind},{},{angle};FP;EP;", 20 + below(60));
+            text += "RR400,300;WG200,10,100;";
+        }
+        let limits = super::LIMITS;
+        let mut plotter = Box::new(super::Interpreter::new());
+        plotter.initialize(super::Point::default(), limits);
+        let mut reader = super::Reader::new().interpreter;
+        for byte in text.bytes() {
+            plotter.push(byte);
+            reader.push(byte);
+            loop {
+                let (expected, found) = (plotter.next_order(), reader.next_order());
+                assert_eq!(found, expected, "{case}: {text}");
+                if found.is_none() {
+                    break;
+                }
+            }
+        }
+        assert_eq!(reader.take_error(), None, "{case}: {text}");
+    }
 }

@@ -74,6 +74,8 @@ pub(super) struct PenState {
     waits: bool,
     /// Whether S has changed from one number to another without M5 between.
     varies: bool,
+    /// Whether the first line was a move of G1 to G3 that did not draw because it stood alone.
+    first_is_dry: bool,
     /// The number of moves of G1 to G3 with the pen down and up; more than 65535 count as 65535.
     inked: u16,
     dry: u16,
@@ -158,7 +160,10 @@ impl Program {
         let has_shown = self.pen.has_on || self.pen.has_off || self.pen.z_is_down.is_some();
         let draws = match rule {
             // A line that is typed alone draws nothing unless the pen was put down.
-            PenRule::Auto if !has_shown => is_feed && self.pen.lines > 1,
+            PenRule::Auto if !has_shown => {
+                self.pen.first_is_dry |= is_feed && self.pen.lines == 1;
+                is_feed && self.pen.lines > 1
+            }
             PenRule::Laser => is_feed && self.is_on() && self.speed > 0,
             rule => self.stands_down(rule),
         };
@@ -214,6 +219,8 @@ impl Program {
                      M3 or Z"
                 }
             })
+        } else if pen.first_is_dry && pen.inked > 0 {
+            Some("the first line was not inked: it came alone, or after a second of idleness")
         } else if pen.varies && matches!(rule, PenRule::Auto | PenRule::Spindle) {
             Some("S changed while M3 was on: if S moves the pen, set $206=3, and $216 and $217")
         } else if pen.inked > 0 && pen.dry > 8 && pen.dry / 2 > pen.inked {
@@ -226,7 +233,15 @@ impl Program {
         };
         let stays = self.stands_down(rule);
         let kept = if stays { self.pen } else { PenState::default() };
-        self.pen = PenState { lines: 0, inked: 0, dry: 0, varies: false, waits: false, ..kept };
+        self.pen = PenState {
+            lines: 0,
+            inked: 0,
+            dry: 0,
+            varies: false,
+            first_is_dry: false,
+            waits: false,
+            ..kept
+        };
         note
     }
 
