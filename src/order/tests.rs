@@ -94,6 +94,11 @@ fn small_drawings_have_the_shortest_tour() {
                 assert_eq!((report.pen_up, report.lifts), (up, lifts), "seed {seed}");
                 let down = strokes.iter().map(|[from, to]| u64::from(length(*from, *to)));
                 assert_eq!(report.pen_down, down.sum::<u64>());
+                let begins = strokes.iter().map(|[from, _]| from.x).min();
+                match shape {
+                    Shape::OpenPath => assert!(strokes[0][0].x <= strokes[strokes.len() - 1][1].x),
+                    Shape::ClosedCycle => assert_eq!(Some(strokes[0][0].x), begins),
+                }
                 let least = shortest(&mut strokes.clone(), &mut Vec::new(), shape);
                 assert_eq!(up, least, "{shape:?}, {method:?}, seed {seed}");
                 assert!(report.bound <= least, "seed {seed}: {report:?}");
