@@ -236,3 +236,59 @@ fn paths_of_all_kinds_take_as_long_as_they_did() {
         }
     }
 }
+
+/// Strokes of all line types, dots and travels.
+fn strokes() -> Vec<Target> {
+    let mut targets = Vec::new();
+    let types = [LineType::Full, LineType::Dotted, LineType::Dashed, LineType::Full];
+    for (stroke, line_type) in (0..12).zip(types.into_iter().cycle()) {
+        let (x, y) = (2000 + 1300 * (stroke % 5), 2500 + 900 * (stroke * 2 % 7));
+        targets.push(Target { point: PagePoint { x, y }, ink: None });
+        for point in 1..=stroke % 4 * 3 {
+            let (dx, dy) =
+                (250 * point - 40 * (point % 3) * stroke, 310 * (point % 2) - 90 * point);
+            let point = PagePoint { x: x + dx, y: y + dy };
+            targets.push(Target { point, ink: Some(line_type) });
+        }
+        if stroke % 4 == 0 {
+            targets.push(Target { point: PagePoint { x, y }, ink: Some(LineType::Full) });
+        }
+    }
+    targets
+}
+
+/// As above, of whole jobs. Each row has the settings that differ, and the seconds without jerk and
+/// with it.
+#[test]
+fn jobs_take_as_long_as_they_did_with_all_settings() {
+    let rows: &[(&[(Setting, f64)], [f64; 2])] = &[
+        (&[], [28.056, 33.348]),
+        (&[(Setting::PenDownEarly, 80.0), (Setting::TravelEarly, 60.0)], [24.981, 29.304]),
+        (&[(Setting::PenDownEarly, 500.0), (Setting::TravelEarly, 500.0)], [23.623, 27.730]),
+        (&[(Setting::PenRamp, 300.0), (Setting::PenUpHeight, 30.0)], [42.116, 47.408]),
+        (&[(Setting::Tool, 1.0)], [87.633, 92.925]),
+        (&[(Setting::DotLength, 3.0), (Setting::SteadySpeed, 1.0)], [19.695, 22.968]),
+        (&[(Setting::BacklashX, 0.3), (Setting::BacklashY, 0.2)], [30.869, 38.596]),
+        (&[(Setting::BacklashX, 0.3), (Setting::BacklashDistance, 1.0)], [23.931, 28.796]),
+        (&[(Setting::PointDistance, 0.02)], [29.330, 34.625]),
+    ];
+    let targets = strokes();
+    for (changes, known) in rows {
+        for (jerk, known) in [0.0, 15.0].into_iter().zip(known) {
+            let mut settings = settings([70.0, 600.0, jerk, 0.05]);
+            for (setting, value) in *changes {
+                settings.set(*setting, Value::from_num(*value)).expect("a valid setting");
+            }
+            let mut blocks = std::vec![Block::EMPTY; 32];
+            let pins = PulserState::new();
+            let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
+            let (mut path, mut events) = (TargetList::new(&targets), Events::default());
+            machine.start(&mut path).expect("within the travel");
+            machine.fill(&mut path, &mut events);
+            let ticks: u64 = events.0.iter().map(|event| u64::from(event.ticks())).sum();
+            let seconds = ticks as f64 / f64::from(TICKS_PER_SECOND);
+            let off = seconds / known - 1.0;
+            assert!(off.abs() < 0.0005, "{changes:?}, jerk {jerk}: {seconds} s, not {known}");
+        }
+    }
+}
