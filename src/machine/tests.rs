@@ -257,11 +257,13 @@ fn strokes() -> Vec<Target> {
     targets
 }
 
-/// As above, of whole jobs. Each row has the settings that differ, and the seconds without jerk and
-/// with it.
+/// The settings that differ, and the seconds without jerk and with it.
+type Row<'r> = (&'r [(Setting, f64)], [f64; 2]);
+
+/// As above, of whole jobs.
 #[test]
 fn jobs_take_as_long_as_they_did_with_all_settings() {
-    let rows: &[(&[(Setting, f64)], [f64; 2])] = &[
+    let rows: &[Row] = &[
         (&[], [28.056, 33.348]),
         (&[(Setting::PenDownEarly, 80.0), (Setting::TravelEarly, 60.0)], [24.981, 29.304]),
         (&[(Setting::PenDownEarly, 500.0), (Setting::TravelEarly, 500.0)], [23.623, 27.730]),

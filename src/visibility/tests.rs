@@ -212,3 +212,36 @@ fn what_is_visible_is_what_rays_reach() {
     assert!(visible > 5000 && hidden > 5000, "{visible} {hidden}");
     assert!(unclear < 1000, "{unclear}");
 }
+
+/// The seam of two triangles that pass through each other, and that of a triangle and a square.
+#[test]
+fn faces_that_pass_through_each_other_have_a_seam() {
+    let at = |x, y, z| Vertex { x, y, z };
+    let triangle = [at(-3000, -2000, 2000), at(3000, -2000, 8000), at(0, 4000, 5000)];
+    let level = [at(-3500, -3000, 5100), at(3500, -3000, 5100), at(3500, 5000, 5100)];
+    for corners in [3, 4] {
+        let fourth = [at(-3500, 5000, 5100)];
+        let vertices: Vec<Vertex> =
+            triangle.into_iter().chain(level).chain(fourth.into_iter().take(corners - 3)).collect();
+        let count = vertices.len() as u16;
+        let corners: Vec<Corner> = (0..count)
+            .map(|vertex| Corner::new(vertex, false, vertex == 2 || vertex == count - 1))
+            .collect();
+        let scene = Scene {
+            vertices: &vertices,
+            elements: Elements::new(&corners),
+            projection: Projection::Parallel,
+            unrounded: Unrounded::UNKNOWN,
+        };
+        let with_seams = Options { with_seams: true, ..Options::default() };
+        let found = stretches(&scene, with_seams, 1000);
+        let seams: Vec<&Stretch> = found.iter().filter(|stretch| stretch.edge.is_none()).collect();
+        // Where the slanted triangle is at 5100: at x = 100. A square counts as two triangles.
+        assert_eq!(seams.len(), usize::from(count) - 5, "{found:?}");
+        for seam in &seams {
+            let (from, to) = seam.ends;
+            assert!(seam.visible && [from, to].iter().all(|end| (end.x - 100).abs() <= 1));
+            assert!((from.y - to.y).abs() > 2000, "{from:?} {to:?}");
+        }
+    }
+}
