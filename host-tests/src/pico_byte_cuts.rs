@@ -304,9 +304,8 @@ impl RecordedPico {
         }
         scenario.judge(&operations, &states);
         let mut seen = BTreeSet::new();
-        let front = operations.iter().map(|operation| operation.offset).min().unwrap_or(0);
         for (number, operation) in (0..).zip(&operations) {
-            for cut in cuts_within(number, operation, front, effort, random) {
+            for cut in cuts_within(number, operation, effort, random) {
                 self.try_one(scenario, cut, &states, &mut seen, effort, random)?;
                 *self.tally.cuts.entry(name_of(operation)).or_default() += 1;
             }
@@ -428,29 +427,20 @@ fn share_of(time: Duration, random: &mut Random) -> Duration {
 }
 
 /// The cuts within an operation: of a page before each `step`th byte, and within some of them; of a
-/// sector before some bytes; and of both with bits at random. `front` is where the record of a model
-/// lies: of the pages behind it, each is cut before a random byte alone, because they are many and
-/// nothing counts of them before the record does.
+/// sector before some bytes; and of both with bits at random.
 fn cuts_within(
     number: u32,
     operation: &FlashOperation,
-    front: u32,
     effort: Effort,
     random: &mut Random,
 ) -> Vec<Cut> {
-    /// In a sector, one byte is like the others.
+    /// In a sector, and in a page of a large model, one byte is like the others.
     const SELDOM: u32 = 97;
-    let is_of_model = operation.offset < RECORDS;
-    let is_content = is_of_model && operation.offset != front;
-    let changes = operation.changes;
-    let step = effort.bytes * if operation.is_erasure { SELDOM } else { 1 };
+    let is_large = operation.offset < RECORDS && operation.changes > 64;
+    let step = effort.bytes * if operation.is_erasure || is_large { SELDOM } else { 1 };
     let mut cuts = Vec::new();
-    let mut bytes: Vec<u32> = if is_content && changes > 0 {
-        let count = if operation.is_erasure { 4 } else { 1 };
-        (0..count).map(|_| random.below(changes.into()) as u32).collect()
-    } else {
-        (0..changes).step_by(step as usize).chain(changes.checked_sub(1)).collect()
-    };
+    let mut bytes: Vec<u32> = (0..operation.changes).step_by(step as usize).collect();
+    bytes.extend(operation.changes.checked_sub(1));
     bytes.dedup();
     for byte in bytes {
         cuts.push(Cut::Within(number, byte, 0));
@@ -458,7 +448,7 @@ fn cuts_within(
             cuts.push(Cut::Within(number, byte, 1 + random.below(255) as u8));
         }
     }
-    let scattered = if is_content { effort.scattered.min(1) } else { effort.scattered };
+    let scattered = if is_large { 1 } else { effort.scattered };
     for share in [128, 4, 252, 64, 192].into_iter().take(scattered) {
         cuts.push(Cut::Scattered(number, share, random.below(1 << 24) as u32));
     }
