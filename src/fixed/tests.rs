@@ -179,3 +179,34 @@ fn coarser_units_are_rounded_half_away_from_zero() {
         assert_eq!(shift_right_rounding(value, bits), expected, "{value} >> {bits}");
     }
 }
+
+#[test]
+fn lengths_have_no_more_decimals_than_tell_them_apart() {
+    for (length, text) in [(210.0, "210"), (7.3, "7.3"), (-0.25, "-0.25"), (0.001, "0.001")] {
+        assert_eq!(format!("{}", Length(Millimetres::from_num(length))), text);
+    }
+}
+
+#[test]
+fn numbers_of_the_camera_have_up_to_six_decimals_and_no_zeros_behind() {
+    for (number, text) in [
+        (-2.5, "-2.5"),
+        (0.000_001, "0.000001"),
+        (10.01, "10.01"),
+        (1e15, "1000000000000000"),
+        (-1e-7, "0"),
+    ] {
+        assert_eq!(format!("{}", SixDecimals(number)), text);
+    }
+}
+
+#[test]
+fn hundredths_are_the_nearest_and_not_negative() {
+    let hundredths = |text: &str| Decimal::parse(text).map(Decimal::to_hundredths);
+    assert_eq!(hundredths("28.1"), Ok(Ok(2810)));
+    assert_eq!(hundredths("0.006"), Ok(Ok(1)));
+    assert_eq!(hundredths("12e3"), Ok(Ok(1_200_000)));
+    for refused in ["-1", "-0.001", "21474837"] {
+        assert_eq!(hundredths(refused), Ok(Err(OutOfRange)), "{refused}");
+    }
+}

@@ -458,3 +458,6 @@ impl<'m> Machine<'m> {
         self.pins.brake().set_rule(rule);
     }
 }
+
+#[cfg(test)]
+mod tests;

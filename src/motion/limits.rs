@@ -391,4 +391,17 @@ pub(crate) mod tests {
             Some(LimitsError::TooManySteps { possible: 6250, .. })
         ));
     }
+
+    #[test]
+    fn speeds_are_told_as_they_were_set() {
+        let limits = Limits::new(&settings()).expect("valid");
+        for set in [5.0, 60.0, 3000.0, 12_345.5, 32_000.0] {
+            let told = mm_per_min(slice_speed(Millimetres::from_num(set)).expect("a speed"));
+            assert!((told.to_num::<f64>() - set).abs() < 1e-3 * set + 0.01, "{told} {set}");
+        }
+        // 50 mm/s: 2500 mm²/s² are shed by 200 mm/s² in 6.25 mm.
+        let feed = limits.feed(Millimetres::from_num(3000)).to_num::<f64>();
+        assert!((feed - 6.25).abs() < 1e-3, "{feed}");
+        assert!(limits.feed(Millimetres::ZERO) > 0);
+    }
 }

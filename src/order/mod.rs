@@ -573,3 +573,6 @@ fn measure<I: Index>(drawing: Drawing<'_, I>, tour: &[Leg<I>], shape: Shape, rep
     }
     report.optimal = report.pen_up == report.bound;
 }
+
+#[cfg(test)]
+mod tests;

@@ -485,4 +485,28 @@ mod tests {
             }
         }
     }
+
+    #[test]
+    fn names_of_pens_are_numbers_or_their_hashes() {
+        // As the authors of the hash publish it.
+        assert_eq!(pen_name(" a "), PenName::Other(0xE40C_292C));
+        assert_eq!(pen_name("foobar"), PenName::Other(0xBF9C_F968));
+        assert_eq!(pen_name("the PEN3"), PenName::Number(2));
+        assert_eq!(pen_name("2"), PenName::Number(1));
+        assert_eq!(pen_name("pen99"), PenName::Number(u8::MAX));
+        assert_eq!(pen_name(""), PenName::Number(0));
+    }
+
+    #[test]
+    fn a_title_keeps_its_text() {
+        assert_eq!(title(" $title= A  b "), Some(" A  b "));
+        assert_eq!([title("$page=3"), title("title=a"), title("$title")], [None; 3]);
+    }
+
+    #[test]
+    fn curves_of_another_type_are_refused() {
+        assert!(matches!(Command::parse("cstype bspline"), Ok(Command::Nothing)));
+        let refused = Command::parse("cstype bezier");
+        assert!(matches!(refused, Err(CommandError::NotAChoice { .. })), "{refused:?}");
+    }
 }

@@ -276,3 +276,54 @@ fn number_to_set(text: &str) -> Option<Option<i32>> {
     }
     split_number(rest).filter(|(_, rest)| rest.is_empty()).map(|(number, _)| Some(number))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::format;
+    use std::string::String;
+
+    /// The line with its number and its checksum.
+    fn numbered(number: i32, text: &str) -> String {
+        let line = format!("N{number} {text}");
+        let xor = line.bytes().fold(0, |xor, byte| xor ^ byte);
+        format!("{line}*{xor}")
+    }
+
+    fn receive(numbering: &mut Numbering, line: &str) -> Result<Named, (CommandError, Named)> {
+        match numbering.receive(Ok(line)) {
+            Received::Line(_, label) | Received::Answer(Ok(()), label) => Ok(label.named),
+            Received::Answer(Err(error), label) => Err((error, label.named)),
+        }
+    }
+
+    #[test]
+    fn a_number_is_split_from_its_line() {
+        assert_eq!(split_number("N12 G0"), Some((12, "G0")));
+        assert_eq!(split_number(" N-3x"), Some((-3, "x")));
+        assert_eq!(split_number("N123456789"), Some((123_456_789, "")));
+        assert_eq!(["G0 N1", "N", "N-", "N1234567890", ""].map(split_number), [None; 5]);
+    }
+
+    #[test]
+    fn lines_come_in_order_and_are_answered_again() {
+        let mut numbering = Numbering::default();
+        assert_eq!(receive(&mut numbering, &numbered(1, "v 0 1 0")), Ok(Named::Line(1)));
+        let late = receive(&mut numbering, &numbered(4, "v 0 1 0"));
+        assert_eq!(late, Err((CommandError::OutOfOrder { expected: 2 }, Named::Expected(2))));
+        assert_eq!(receive(&mut numbering, &numbered(2, "v 0 1 0")), Ok(Named::Line(2)));
+        // What was refused is refused again; what was not is not.
+        let label = Label { checksum: None, named: Named::Line(2) };
+        numbering.note(Label { named: Named::Line(1), ..label }, Err(CommandError::Unnumbered));
+        assert_eq!(receive(&mut numbering, &numbered(2, "v 0 1 0")), Ok(Named::Line(2)));
+        numbering.note(label, Err(CommandError::Unnumbered));
+        let number = CommandError::Unnumbered.number();
+        let again = receive(&mut numbering, &numbered(2, "v 0 1 0"));
+        assert_eq!(again.map_err(|(error, _)| error), Err(CommandError::RefusedBefore(number)));
+        assert_eq!(receive(&mut numbering, &numbered(1, "v 0 1 0")), Ok(Named::Line(1)));
+        // A line without a checksum that has a number may be damaged.
+        assert_eq!(receive(&mut numbering, "v 1 2 3"), Ok(Named::Nothing));
+        let without = receive(&mut numbering, "N3 v 0 1 0");
+        assert_eq!(without, Err((CommandError::Unnumbered, Named::Expected(3))));
+    }
+}

@@ -370,4 +370,12 @@ mod tests {
         let long = text.replace(",2,", ",1048577,");
         assert_eq!(StreamHeader::parse(&long), Err(CommandError::NumberOutOfRange));
     }
+
+    #[test]
+    fn a_header_says_where_all_targets_lie() {
+        let header = StreamHeader::parse("0,0,7,2,5,10,20,30,0,0,0,0").unwrap();
+        let holds = |x, y| header.holds(PagePoint { x, y });
+        assert!(holds(5, 10) && holds(20, 30) && holds(6, 20));
+        assert!(!holds(4, 20) && !holds(21, 20) && !holds(6, 9) && !holds(6, 31));
+    }
 }

@@ -351,3 +351,103 @@ impl AreaWriter {
         })
     }
 }
+
+#[cfg(all(test, feature = "host"))]
+mod tests {
+    use super::*;
+    use crate::boards::host::CutArea;
+    use std::vec::Vec;
+
+    /// Bytes of which no two neighbours are the same.
+    fn contents(seed: u8, length: usize) -> Vec<u8> {
+        (0..length).map(|at| (at as u8).wrapping_mul(37).wrapping_add(seed)).collect()
+    }
+
+    /// Fills the area of a flash by pieces of all lengths.
+    fn fill(flash: &mut CutArea, low: &[u8], high: &[u8]) -> Result<(), NotWritten> {
+        let area = flash.area();
+        let mut writer = AreaWriter::begin(area, flash)?;
+        for (side, bytes) in [(Side::Low, low), (Side::High, high)] {
+            let (mut rest, mut length) = (bytes, 1);
+            while !rest.is_empty() {
+                let (piece, behind) = rest.split_at(length.min(rest.len()));
+                writer.push(side, piece, area, flash)?;
+                (rest, length) = (behind, length % 300 + 7);
+            }
+        }
+        writer.finish(&[7; RECORD_WORDS], area, flash)
+    }
+
+    fn is_sound(area: Area<'_>) -> bool {
+        let check = &mut || Ok::<_, ()>(());
+        area.record().is_some_and(|record| area.is_sound(&record, check) == Ok(true))
+    }
+
+    #[test]
+    fn what_is_filled_from_both_ends_is_read_again_and_each_sector_erased_once() {
+        for (low, high) in [(0, 0), (1, 3), (256, 256), (511, 6000), (9000, 2999), (8192, 7680)] {
+            let (low, high) = (contents(1, low), contents(2, high));
+            let mut flash = CutArea::new(4 * SECTOR_BYTES);
+            fill(&mut flash, &low, &high).unwrap();
+            let area = flash.area();
+            let record = area.record().unwrap();
+            assert_eq!((record.words, record.lengths), ([7; 58], [low.len(), high.len()]));
+            assert!(is_sound(area));
+            assert!(flash.erasures.iter().all(|&times| times <= 1), "{:?}", flash.erasures);
+            assert_eq!(flash.pages, 1 + low.len().div_ceil(256) + high.len().div_ceil(256));
+            let words = (0..low.len().div_ceil(4)).map(|index| area.word(Area::LOW + index));
+            let bytes: Vec<u8> = words.flat_map(u32::to_le_bytes).collect();
+            assert!(bytes.starts_with(&low));
+            for after in 0..high.len().saturating_sub(2) {
+                assert_eq!(area.high_3(after), high[after..after + 3]);
+            }
+        }
+    }
+
+    #[test]
+    fn every_damaged_byte_is_found() {
+        let mut flash = CutArea::new(2 * SECTOR_BYTES);
+        let (low, high) = (contents(1, 301), contents(2, 259));
+        fill(&mut flash, &low, &high).unwrap();
+        let area = flash.area();
+        for at in 0..2 * SECTOR_BYTES {
+            let byte = flash.bytes()[at];
+            flash.set_byte(at, byte ^ 4);
+            let counts = at < 256 || (256..557).contains(&at) || at >= 2 * SECTOR_BYTES - 259;
+            assert_eq!(is_sound(area), !counts, "byte {at}");
+            flash.set_byte(at, byte);
+        }
+        assert!(is_sound(area));
+    }
+
+    #[test]
+    fn a_full_area_takes_nothing_more() {
+        let mut flash = CutArea::new(SECTOR_BYTES);
+        let area = flash.area();
+        let mut writer = AreaWriter::begin(area, &mut flash).unwrap();
+        assert!(writer.has_room(area, 7 * 256, 8 * 256));
+        assert!(!writer.has_room(area, 7 * 256 + 1, 8 * 256));
+        assert!(!writer.has_room(area, usize::MAX, 1));
+        writer.push(Side::High, &contents(1, 8 * 256), area, &mut flash).unwrap();
+        writer.push(Side::Low, &contents(2, 7 * 256), area, &mut flash).unwrap();
+        assert!(writer.has_room(area, 0, 0) && !writer.has_room(area, 1, 0));
+        writer.finish(&[7; RECORD_WORDS], area, &mut flash).unwrap();
+        assert!(is_sound(area));
+        let too_much = fill(&mut flash, &contents(1, 10 * 256), &contents(2, 6 * 256));
+        assert_eq!((too_much, area.record()), (Err(NotWritten), None));
+        let mut none = CutArea::new(0);
+        assert!(AreaWriter::begin(none.area(), &mut none).is_err());
+    }
+
+    #[test]
+    fn an_area_is_cleared_by_a_page_and_nothing_erased() {
+        let mut flash = CutArea::new(SECTOR_BYTES);
+        fill(&mut flash, &[1], &[2]).unwrap();
+        let area = flash.area();
+        let (pages, erasures) = (flash.pages, flash.erasures.clone());
+        area.clear(&mut flash).unwrap();
+        assert_eq!((area.record(), flash.pages), (None, pages + 1));
+        area.clear(&mut flash).unwrap();
+        assert_eq!((flash.pages, flash.erasures), (pages + 1, erasures));
+    }
+}

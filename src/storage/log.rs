@@ -271,8 +271,13 @@ mod tests {
             (parts, points) = (next, next_points);
             assert_eq!(read(&mut flash), Noted { parts, points });
         }
-        // Another state has another log.
+        // Notes of a page less its head are too long by a byte, and leave the log as it was.
+        assert!(LOG.begin(&mut flash, 7, &[0; 241]).is_err());
+        assert_eq!(read(&mut flash), Noted { parts, points });
+        // Another state has another log, and a page with another mark is none.
         assert!(LOG.read(&mut flash, 8, &mut [0; NOTE_BYTES]).is_none());
+        flash.bytes[4096] ^= 1;
+        assert!(LOG.read(&mut flash, 7, &mut [0; NOTE_BYTES]).is_none());
         assert!(flash.bytes[..4096].iter().chain(&flash.bytes[8192..]).all(|byte| *byte == 0xFF));
     }
 }

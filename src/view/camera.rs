@@ -316,6 +316,29 @@ fn normalized(a: Direction) -> Option<Direction> {
 mod tests {
     use super::*;
 
+    use crate::geometry::Precision;
+
+    /// The box with these opposite corners.
+    struct Cuboid([Position; 2]);
+
+    impl Positions for Cuboid {
+        fn fraction_bits(&self) -> u32 {
+            0
+        }
+
+        fn bounds(&self) -> Option<(Position, Position)> {
+            Some((self.0[0], self.0[1]))
+        }
+
+        fn positions(&self) -> impl Iterator<Item = Position> {
+            self.0.into_iter()
+        }
+
+        fn precision(&self) -> Precision {
+            Precision::default()
+        }
+    }
+
     fn near(a: Direction, b: Direction) -> bool {
         [0, 1, 2].iter().all(|&axis: &usize| libm::fabs(a[axis] - b[axis]) < 1e-12)
     }
@@ -378,5 +401,38 @@ mod tests {
                 "{angles:?}"
             );
         }
+    }
+
+    #[test]
+    fn the_automatic_eye_looks_at_the_point_from_its_side() {
+        let cube = Cuboid([Position::ORIGIN, Position { x: 2, y: 2, z: 2 }]);
+        let at = Some([10.0, 20.0, 30.0]);
+        let camera = Camera::axonometric(&cube, 90.0, 0.0, at, None).unwrap();
+        let Pose::Towards { eye, at, .. } = camera.pose else { panic!("{camera:?}") };
+        assert!(near(at, [10.0, 20.0, 30.0]));
+        // 3.5 radii away, which are estimated within 6 %, along the y axis.
+        let far = (eye[1] - 20.0) / (3.5 * libm::sqrt(3.0));
+        assert!((far - 1.0).abs() < 0.06, "{far}");
+        assert!(near(eye, [10.0, eye[1], 30.0]), "{eye:?}");
+        let camera =
+            Camera::automatic(&cube, Lens::Oblique { angle: 45.0, ratio: 0.5 }, None, None);
+        let Pose::Towards { eye, at, .. } = camera.unwrap().pose else { panic!() };
+        assert!(near(at, [1.0; 3]) && near(eye, [1.0, eye[1], 1.0]) && eye[1] < -4.0, "{eye:?}");
+    }
+
+    #[test]
+    fn parallel_lines_of_sight_point_to_the_user() {
+        let eye = [3.0, -4.0, 12.0];
+        let pose = Pose::Towards { eye, at: [0.0; 3], up: None };
+        let lines = |lens| Camera { pose, lens }.sight_lines(4).unwrap();
+        assert_eq!(lines(Lens::Perspective), SightLines::Through([48, -64, 192]));
+        let SightLines::Along(direction) = lines(Lens::Orthographic) else { panic!("parallel") };
+        let direction = direction.map(|part| part as f64 / libm::ldexp(1.0, 60));
+        assert!(near(direction, [0.25, -1.0 / 3.0, 1.0]), "{direction:?}");
+        // An eye beyond the range of numbers.
+        let pose = Pose::Towards { eye: eye.map(|part| part * 1e18), at: [0.0; 3], up: None };
+        let far = Camera { pose, lens: Lens::Perspective }.sight_lines(4).unwrap();
+        let SightLines::Along(far) = far else { panic!("{far:?}") };
+        assert!(near(far.map(|part| part as f64 / libm::ldexp(1.0, 60)), direction), "{far:?}");
     }
 }

@@ -511,4 +511,58 @@ mod tests {
             assert_eq!(radii.by_ref().filter(|r| *r < 1e-5).count(), 2);
         });
     }
+
+    /// Positions of a random cloud in whole units, seen with and without an error of each.
+    #[test]
+    fn the_error_bound_is_twice_what_an_error_of_the_positions_moves() {
+        with_model(&[["0", "0", "0"], ["900", "0", "0"], ["0", "700", "400"]], |model| {
+            for lens in [Lens::Perspective, Lens::Orthographic] {
+                let camera = Camera { lens, ..camera([-800.0, -900.0, 700.0], [300.0; 3]) };
+                let view = View::new(&camera, model).unwrap();
+                assert_eq!(view.error_bound(0), 1);
+                for units in [1, 7, 1000] {
+                    let bound = view.error_bound(units);
+                    let mut most = 0;
+                    for corner in 0..8 {
+                        let sign = |bit: u32| if corner >> bit & 1 == 0 { 1 } else { -1 };
+                        let off = [0, 1, 2].map(|axis| sign(axis) * units.cast_signed());
+                        let [x, y, z] = off;
+                        let [from, to] =
+                            [Position::ORIGIN, Position { x, y, z }].map(|p| view.vertex(p));
+                        let moved = [to.x - from.x, to.y - from.y, to.z - from.z];
+                        most = moved.iter().fold(most, |most, by| by.unsigned_abs().max(most));
+                    }
+                    // The vertices are rounded.
+                    assert!(2 * most <= bound + 2 && bound <= 2 * most + 5, "{bound} {most}");
+                }
+            }
+        });
+    }
+
+    #[test]
+    fn the_stretch_of_depth_is_that_of_a_length_along_the_view() {
+        assert_eq!(
+            [1.0, 0.25, 8.0].map(as_ratio).map(|(a, b)| f64::from(a) / f64::from(b)),
+            [1.0, 0.25, 8.0]
+        );
+        // A long thin box, seen from its front and from its side.
+        let long = [["0", "0", "0"], ["8", "0", "0"], ["0", "1", "0"], ["0", "0", "1"]];
+        with_model(&long, |model| {
+            for from in [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]] {
+                let at = [4.0, 0.5, 0.5];
+                let eye = [0, 1, 2].map(|axis| at[axis] + 100.0 * from[axis]);
+                let up = Some([0.0, 0.0, 1.0]);
+                let pose = Pose::Towards { eye, at, up };
+                let view = View::new(&Camera { pose, lens: Lens::Orthographic }, model).unwrap();
+                let [a, b, c] = [0, 1, 2].map(|n| view.vertex(model.vertices()[n]));
+                let (length, width) =
+                    if from[0] > 0.0 { (a.z - b.z, c.x - a.x) } else { (c.z - a.z, b.x - a.x) };
+                let ratio = f64::from(length.abs()) / f64::from(width.abs());
+                let lengths = if from[0] > 0.0 { 8.0 } else { 1.0 / 8.0 };
+                let (above, below) = view.depth_stretch();
+                let stretch = f64::from(above) / f64::from(below);
+                assert!((ratio / lengths / stretch - 1.0).abs() < 1e-4, "{ratio} {stretch}");
+            }
+        });
+    }
 }

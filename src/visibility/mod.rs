@@ -324,3 +324,6 @@ fn check<I: Index>(scene: &Scene<'_, I>) -> Result<(), VisibilityError> {
         None => Ok(()),
     }
 }
+
+#[cfg(test)]
+mod tests;

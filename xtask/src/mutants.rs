@@ -90,9 +90,10 @@ pub fn run_sample(count: u32, part: Part) -> Result<()> {
         .args(["--features", FEATURES])
         .args(files)
         .args(["--sharding", "round-robin", "--shard", &format!("{shard}/{shards}")])
+        // For the build as well, which would make the examples anew besides.
+        .args(["--cargo-arg", "--lib"])
         .args(["--timeout", &PATIENCE.to_string(), "--no-shuffle", "--output"])
-        .arg(&output)
-        .args(["--", "--lib"]);
+        .arg(&output);
     say!("penup: {}", describe(&command))?;
     run(&mut command)
 }

@@ -1,0 +1,247 @@
+//! Compares what is visible at points along the edges of random scenes with an answer by rays.
+
+use super::*;
+use crate::geometry::Precision;
+use crate::model::Corner;
+use crate::stage::NeverCancel;
+use std::vec::Vec;
+
+type Point = [f64; 3];
+
+/// Shapes of prisms, convex and concave.
+const SHAPES: [&[[i32; 2]]; 5] = [
+    &[[0, 0], [2, 0], [0, 2]],
+    &[[0, 0], [2, 0], [2, 2], [0, 2]],
+    &[[0, 0], [2, 0], [2, 1], [1, 1], [1, 2], [0, 2]],
+    &[[0, 0], [2, 1], [4, 0], [3, 2], [4, 4], [2, 3], [0, 4], [1, 2]],
+    &[[0, 0], [4, 0], [4, 1], [1, 1], [1, 2], [4, 2], [4, 3], [0, 3]],
+];
+
+/// Prisms at random places that may pass through each other, and bars between them.
+#[derive(Default)]
+struct RandomScene {
+    vertices: Vec<Vertex>,
+    elements: Vec<Vec<u16>>,
+}
+
+impl RandomScene {
+    fn new(seed: u32) -> Self {
+        let mut state = seed.wrapping_mul(0x9E37_79B9) | 1;
+        let mut random = |reach: i32| {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as i32 % (2 * reach + 1) - reach
+        };
+        let mut scene = Self::default();
+        for _ in 0..2 + seed % 3 {
+            let shape =
+                SHAPES[random(2).unsigned_abs() as usize + random(1).unsigned_abs() as usize];
+            let base = [random(80_000), random(80_000), 260_000 + random(80_000)];
+            let steps = [(); 3].map(|()| [(); 3].map(|()| random(15_000)));
+            let (first, count) = (scene.vertices.len() as u16, shape.len() as u16);
+            for top in 0..2 {
+                for [along, across] in shape {
+                    let [x, y, z] = [0, 1, 2].map(|axis: usize| {
+                        let [u, v, w] = steps.map(|step| step[axis]);
+                        base[axis] + along * u + across * v + 3 * top * w
+                    });
+                    scene.vertices.push(Vertex { x, y, z });
+                }
+            }
+            scene.elements.push((first..first + count).collect());
+            // Some prisms are open.
+            if seed % 4 != 1 {
+                scene.elements.push((first + count..first + 2 * count).rev().collect());
+            }
+            for n in 0..count {
+                let next = (n + 1) % count;
+                let side = [n, next, next + count, n + count];
+                scene.elements.push(side.map(|corner| first + corner).to_vec());
+            }
+        }
+        let last = scene.vertices.len() as u16 - 1;
+        scene.elements.push([0, last].to_vec());
+        scene.elements.push([2, last - 1].to_vec());
+        scene
+    }
+
+    fn corners(&self) -> Vec<Corner> {
+        let corners = self.elements.iter().flat_map(|element| {
+            let is_bar = element.len() == 2;
+            let last = element.len() - 1;
+            element.iter().enumerate().map(move |(n, &to)| Corner::new(to, is_bar, n == last))
+        });
+        corners.collect()
+    }
+
+    fn point(&self, vertex: u16) -> Point {
+        let Vertex { x, y, z } = self.vertices[usize::from(vertex)];
+        [x, y, z].map(f64::from)
+    }
+
+    /// Whether a point of an edge is visible; `None` where rounding would decide it.
+    fn is_visible(&self, projection: Projection, edge: (u16, u16), at: Point) -> Option<bool> {
+        let page = |[x, y, z]: Point| match projection {
+            Projection::Perspective => [x / z, y / z].map(|part| part * 300_000.0),
+            Projection::Parallel => [x, y],
+        };
+        let [px, py] = page(at);
+        let mut is_visible = true;
+        for face in self.elements.iter().filter(|element| element.len() > 2) {
+            if face.contains(&edge.0) && face.contains(&edge.1) {
+                continue;
+            }
+            let points: Vec<Point> = face.iter().map(|&vertex| self.point(vertex)).collect();
+            let side = |n: usize, m: usize| [0, 1, 2].map(|axis| points[m][axis] - points[n][axis]);
+            let normal = cross(side(0, 1), side(1, 2));
+            let [a, b] = [at, points[0]].map(|point| dot(normal, point));
+            // How far the plane is behind the point, along the line of sight.
+            let behind = match projection {
+                Projection::Perspective => (b / a - 1.0) * at[2],
+                Projection::Parallel => (b - a) / normal[2],
+            };
+            let (mut is_inside, mut distance) = (false, f64::MAX);
+            for n in 0..points.len() {
+                let [[ax, ay], [bx, by]] = [n, (n + 1) % points.len()].map(|n| page(points[n]));
+                let (dx, dy) = (bx - ax, by - ay);
+                let along = ((px - ax) * dx + (py - ay) * dy) / (dx * dx + dy * dy);
+                let along = along.clamp(0.0, 1.0);
+                let (fx, fy) = (ax + along * dx - px, ay + along * dy - py);
+                distance = distance.min(libm::sqrt(fx * fx + fy * fy));
+                if (ay > py) != (by > py) && px < ax + (py - ay) / dy * dx {
+                    is_inside = !is_inside;
+                }
+            }
+            if distance > 1e-3 && (!is_inside || behind > 1e-3) {
+                continue;
+            }
+            if distance < 1e-3 && behind > 1.0 {
+                continue;
+            }
+            if distance < 1e-3 || behind > -1e-3 || !behind.is_finite() {
+                return None;
+            }
+            is_visible = false;
+        }
+        Some(is_visible)
+    }
+}
+
+fn cross(a: Point, b: Point) -> Point {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+fn dot(a: Point, b: Point) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+#[derive(Default)]
+struct Stretches(Vec<Stretch>);
+
+impl StretchSink for Stretches {
+    fn stretch(&mut self, stretch: Stretch) -> Result<(), SinkFull> {
+        self.0.push(stretch);
+        Ok(())
+    }
+}
+
+fn stretches(scene: &Scene<'_>, options: Options, spare_bytes: usize) -> Vec<Stretch> {
+    let mut words = std::vec![0; scratch_bytes(scene).div_ceil(8) + spare_bytes / 8];
+    let mut found = Stretches::default();
+    let result =
+        find_stretches(scene, options, Scratch::new(&mut words), &mut NeverCancel, &mut found);
+    assert_eq!(result, Ok(Report::default()));
+    found.0
+}
+
+#[test]
+fn what_is_visible_is_what_rays_reach() {
+    const SAMPLES: u32 = 12;
+    let options = Options { with_hidden: true, ..Options::default() };
+    let (mut visible, mut hidden, mut unclear) = (0, 0, 0);
+    for seed in 0..60 {
+        let projection = [Projection::Perspective, Projection::Parallel][seed as usize % 2];
+        let random = RandomScene::new(seed);
+        let positions = random.vertices.iter().map(|vertex| [vertex.x, vertex.y, vertex.z]);
+        let positions: Vec<[i32; 3]> = positions.collect();
+        let corners = random.corners();
+        let unrounded = match seed % 3 {
+            0 => Unrounded::UNKNOWN,
+            _ => Unrounded::new(&positions, Precision::default(), 1),
+        };
+        let (vertices, elements) = (&random.vertices[..], Elements::new(&corners));
+        let scene = Scene { vertices, elements, projection, unrounded };
+        // The least memory has a grid of one cell.
+        let found = stretches(&scene, options, 0);
+        assert_eq!(found, stretches(&scene, options, 1 << 14), "seed {seed}");
+        let visible_alone = stretches(&scene, Options::default(), 1000);
+        let is_visible = |stretch: &&Stretch| stretch.visible;
+        assert!(found.iter().filter(is_visible).eq(&visible_alone), "seed {seed}");
+        let mut edges: Vec<(u16, u16)> = Vec::new();
+        for element in &random.elements {
+            for (n, &from) in element.iter().enumerate() {
+                let to = element[(n + 1) % element.len()];
+                edges.push((from.min(to), from.max(to)));
+            }
+        }
+        edges.sort_unstable();
+        edges.dedup();
+        for edge in edges {
+            let of_edge = |stretch: &&Stretch| {
+                stretch.edge == Some(edge) || stretch.edge == Some((edge.1, edge.0))
+            };
+            let of_edge: Vec<&Stretch> = found.iter().filter(of_edge).collect();
+            for sample in 0..SAMPLES {
+                let part = (f64::from(sample) + 0.437) / f64::from(SAMPLES);
+                let (a, b) = (random.point(edge.0), random.point(edge.1));
+                let at = [0, 1, 2].map(|axis: usize| a[axis] + part * (b[axis] - a[axis]));
+                let Some(expected) = random.is_visible(projection, edge, at) else {
+                    unclear += 1;
+                    continue;
+                };
+                let there = of_edge.iter().filter(|stretch| {
+                    let part = if stretch.edge == Some(edge) { part } else { 1.0 - part };
+                    let along = |at: EdgeParameter| at.numerator as f64 / at.denominator as f64;
+                    (along(stretch.from)..along(stretch.to)).contains(&part)
+                });
+                let there: Vec<bool> = there.map(|stretch| stretch.visible).collect();
+                assert_eq!(there, [expected], "seed {seed}, {edge:?} at {part}");
+                if expected { visible += 1 } else { hidden += 1 }
+            }
+        }
+    }
+    assert!(visible > 5000 && hidden > 5000, "{visible} {hidden}");
+    assert!(unclear < 1000, "{unclear}");
+}
+
+/// The seam of two triangles that pass through each other, and that of a triangle and a square.
+#[test]
+fn faces_that_pass_through_each_other_have_a_seam() {
+    let at = |x, y, z| Vertex { x, y, z };
+    let triangle = [at(-3000, -2000, 2000), at(3000, -2000, 8000), at(0, 4000, 5000)];
+    let level = [at(-3500, -3000, 5100), at(3500, -3000, 5100), at(3500, 5000, 5100)];
+    for corners in [3, 4] {
+        let fourth = [at(-3500, 5000, 5100)];
+        let vertices: Vec<Vertex> =
+            triangle.into_iter().chain(level).chain(fourth.into_iter().take(corners - 3)).collect();
+        let count = vertices.len() as u16;
+        let corners: Vec<Corner> = (0..count)
+            .map(|vertex| Corner::new(vertex, false, vertex == 2 || vertex == count - 1))
+            .collect();
+        let scene = Scene {
+            vertices: &vertices,
+            elements: Elements::new(&corners),
+            projection: Projection::Parallel,
+            unrounded: Unrounded::UNKNOWN,
+        };
+        let with_seams = Options { with_seams: true, ..Options::default() };
+        let found = stretches(&scene, with_seams, 1000);
+        let seams: Vec<&Stretch> = found.iter().filter(|stretch| stretch.edge.is_none()).collect();
+        // Where the slanted triangle is at 5100: at x = 100. A square counts as two triangles.
+        assert_eq!(seams.len(), usize::from(count) - 5, "{found:?}");
+        for seam in &seams {
+            let (from, to) = seam.ends;
+            assert!(seam.visible && [from, to].iter().all(|end| (end.x - 100).abs() <= 1));
+            assert!((from.y - to.y).abs() > 2000, "{from:?} {to:?}");
+        }
+    }
+}
