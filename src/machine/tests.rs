@@ -271,7 +271,6 @@ fn jobs_take_as_long_as_they_did_with_all_settings() {
         (&[(Setting::Tool, 1.0)], [87.633, 92.925]),
         (&[(Setting::DotLength, 3.0), (Setting::SteadySpeed, 1.0)], [19.695, 22.968]),
         (&[(Setting::BacklashX, 0.3), (Setting::BacklashY, 0.2)], [30.869, 38.596]),
-        (&[(Setting::BacklashX, 0.3), (Setting::BacklashDistance, 1.0)], [23.931, 28.796]),
         (&[(Setting::PointDistance, 0.02)], [29.330, 34.625]),
     ];
     let targets = strokes();
@@ -287,6 +286,10 @@ fn jobs_take_as_long_as_they_did_with_all_settings() {
             let (mut path, mut events) = (TargetList::new(&targets), Events::default());
             machine.start(&mut path).expect("within the travel");
             machine.fill(&mut path, &mut events);
+            let steps = events.0.iter().map(|event| event.step());
+            let end = steps.fold((0, 0), |(x, y), step| (x + step.0, y + step.1));
+            let last = targets.last().expect("a target").point;
+            assert_eq!(end, (last.x, last.y), "the whole job: {changes:?}");
             let ticks: u64 = events.0.iter().map(|event| u64::from(event.ticks())).sum();
             let seconds = ticks as f64 / f64::from(TICKS_PER_SECOND);
             let off = seconds / known - 1.0;
