@@ -233,7 +233,7 @@ pub const PICO: BoardRow = BoardRow {
     flash: Region { start: 0x1000_0000, size: 2 << 20 },
     boot_loader: 256,
     ram: Region { start: 0x2000_0000, size: 264 << 10 },
-    budget: ImageBudget { flash: 688 << 10, ram: 252 << 10, stack: 12 << 10 },
+    budget: ImageBudget { flash: 640 << 10, ram: 252 << 10, stack: 12 << 10 },
     clock_hertz: 125_000_000,
     pins: Pins {
         step_x: 2,
@@ -260,8 +260,8 @@ pub const PICO: BoardRow = BoardRow {
         steps: 1776,
     },
     scene: Scene { vertices: 2744, corners: 8232, faces: 2058, lines: 1871, odd_points: 1000 },
-    // Enough for 70,000 triangles.
-    model_flash: 1072 << 10,
+    // Enough for 75,000 triangles.
+    model_flash: 1120 << 10,
     emulator: Emulator::Rp2040js,
     flashing: Some(Flashing {
         chip: "RP2040",

@@ -9,7 +9,7 @@
 //! | limit switches of x and y, emergency stop (closed: low) | GP8, GP9, GP10 |
 //! | STEP_Z, DIR_Z of a motor that lifts the pen (high: down) | GP11, GP12 |
 //! | nothing: `usb` uses the pin when a host resets the bus | GP15 |
-//! | a model that is too large for the memory | the 1072 KiB of flash before the records |
+//! | a model that is too large for the memory | the 1120 KiB of flash before the records |
 //! | settings, last job and its progress | the last 288 KiB of flash |
 //! | next block of steps | DMA_IRQ_0, priority 0 |
 //! | pen's heights, and the steps of its motor | PIO0_IRQ_0, priority 1 |
