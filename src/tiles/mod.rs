@@ -100,8 +100,9 @@ const PLACE: usize = 8000;
 /// elements beside them.
 const REGION_MARGIN: u16 = 16;
 
-/// For each element of a tile so many bytes are needed in most models, for what lies beside the tile
-/// and for the search, too. A tile with more elements than that is divided before it is loaded.
+/// For each element of a tile so many bytes are needed in most models, for what lies beside the
+/// tile and for the search, too. A tile with more elements than that is divided before it is
+/// loaded.
 const LIKELY_BYTES: usize = 72;
 
 /// The search for the stretches of a model, tile after tile.
