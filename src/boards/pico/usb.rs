@@ -216,14 +216,19 @@ impl Sender {
         false
     }
 
-    /// Sends `bytes`. It waits while the queue is full, but not for a host that is gone.
+    /// Sends `bytes`. It waits while the queue is full, but not for a host that is gone. A program
+    /// that has opened the port gets nothing before its greeting: what is answered until then was
+    /// requested by the one before.
     pub fn write(&mut self, bytes: &[u8]) {
+        let is_for_another = WAS_OPENED.load(Ordering::Relaxed);
         for &byte in bytes {
-            if !self.is_cut && self.enqueue(byte) {
+            if !self.is_cut && !is_for_another && self.enqueue(byte) {
                 continue;
             }
             self.is_cut = byte != b'\n';
-            HAS_MISSED.store(true, Ordering::Relaxed);
+            if !is_for_another {
+                HAS_MISSED.store(true, Ordering::Relaxed);
+            }
         }
         if !HOST_IS_GONE.load(Ordering::Relaxed) {
             critical_section::with(|_| serve());
