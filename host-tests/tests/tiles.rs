@@ -17,7 +17,6 @@ use penup_host_tests::random::Random;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
 use penup_host_tests::scene_files::{self, Stretches};
 use proptest::prelude::*;
-use std::cell::Cell;
 
 /// A stretch in an order that does not depend on when it was found: its ends, where it begins and
 /// ends, whether it is visible, its pen, and the vertices that its edge joins.
@@ -370,52 +369,6 @@ fn a_mesh_is_drawn_in_a_fraction_of_its_memory() {
     }
     let refused = in_tiles(source, SIGHT, options, 1 << 10, true);
     assert!(matches!(refused, Err(VisibilityError::Scratch(_))), "{refused:?}");
-}
-
-/// A scene whose reading is counted.
-struct Counted<'s> {
-    scene: Given<'s>,
-    corners: Cell<usize>,
-}
-
-impl ModelSource for Counted<'_> {
-    fn corner_count(&self) -> usize {
-        self.scene.corner_count()
-    }
-    fn corner(&self, index: usize) -> Corner<u32> {
-        self.corners.set(self.corners.get() + 1);
-        self.scene.corner(index)
-    }
-    fn pen(&self, corner: usize) -> u8 {
-        self.scene.pen(corner)
-    }
-    fn position(&self, vertex: u32) -> Option<Position> {
-        self.scene.position(vertex)
-    }
-    fn vertex(&self, vertex: u32) -> Vertex {
-        self.scene.vertex(vertex)
-    }
-}
-
-#[test]
-fn faces_in_no_order_are_not_all_read_for_each_tile() {
-    let mut scene = torus();
-    let mut faces: Vec<Vec<_>> =
-        scene.corners.split_inclusive(|corner| corner.is_last()).map(<[_]>::to_vec).collect();
-    let mut random = Random::new(7);
-    for last in (1..faces.len()).rev() {
-        faces.swap(last, random.below(last as u64 + 1) as usize);
-    }
-    scene.corners = faces.concat();
-    let source = &Counted {
-        scene: Given { scene: &scene, pens: Pens::default() },
-        corners: Cell::default(),
-    };
-    let (_, tiles) = in_tiles(source, SIGHT, Options::default(), 20_000, false).unwrap();
-    assert!(tiles > 40, "{tiles}");
-    // Of each tile's own faces, all corners are read some 25 times.
-    let (read, corners) = (source.corners.get(), source.corner_count());
-    assert!(read < tiles * corners, "{read} of {corners} corners for {tiles} tiles");
 }
 
 /// Cancels the search when it has been asked so many times.
