@@ -211,11 +211,14 @@ impl Machine<'_> {
 
     /// Appends the next part of a line on which slack is taken up on the way, or what is left of
     /// the slack where a line has ended. There is room. Returns whether there was any.
-    #[inline(never)] // Only with this setting: inlined, it would fill the cache.
+    #[inline]
     pub(super) fn push_on_the_way(&mut self, segmenter: &Segmenter) -> bool {
-        if !self.spreads_slack() {
-            return false;
-        }
+        self.spreads_slack() && self.push_spread(segmenter)
+    }
+
+    /// The same where slack is taken up on the way at all.
+    #[inline(never)] // Only with this setting: inlined, it would fill the cache.
+    fn push_spread(&mut self, segmenter: &Segmenter) -> bool {
         if !self.runner.is_in_line() || segmenter.ink != Some(LineType::Full) {
             return self.push_slack_due();
         }

@@ -54,11 +54,14 @@ impl Pattern {
 
     /// The number of moves from the start of the line to the end of piece number `piece`, counted
     /// from 0.
-    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    #[inline]
     pub const fn end_of(self, piece: u32) -> u32 {
-        if self.repeats == 0 {
-            return self.moves;
-        }
+        if self.repeats == 0 { self.moves } else { self.end_of_dash(piece) }
+    }
+
+    /// The same of a line with gaps.
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    const fn end_of_dash(self, piece: u32) -> u32 {
         let Dashes { lengths, period, .. } = self.line_type.dashes();
         let Some(first) = lengths.first() else { return self.moves };
         let (count, period) = (lengths.len() as u32, period as u32);

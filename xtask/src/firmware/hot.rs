@@ -3,7 +3,8 @@
 //! The section `.hot` of that memory map lists functions by patterns over their mangled names,
 //! because the library forbids the attribute that would place them. A pattern that matches nothing
 //! causes no error of the linker: the function then lies elsewhere, and planning becomes slower. It
-//! happens when a module is renamed, or when the compiler inlines the function.
+//! happens when a module is renamed, or when the compiler inlines the function. Nor does the linker
+//! know that the functions must fit into the cache together.
 
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol};
@@ -11,12 +12,24 @@ use object::{Object, ObjectSection, ObjectSymbol};
 /// The name of the section, in the memory map and in the image.
 const SECTION: &str = ".hot";
 
+/// The size of the flash's cache, in bytes (RP2040 data sheet, 2.6.3). It has two ways, so code of
+/// this size that lies side by side has a place of its own there.
+const CACHE_BYTES: u64 = 16 << 10;
+
 /// Checks the section of the image `elf` against the memory map `map`.
 ///
 /// # Errors
-/// The map has no such section or no patterns, or a pattern matches no function in the section.
+/// The map has no such section or no patterns, a pattern matches no function in the section, or the
+/// section is larger than the cache.
 pub fn check(elf: &object::File, map: &str) -> Result<()> {
     let section = elf.section_by_name(SECTION).context("the image has no section .hot")?;
+    ensure!(
+        section.size() <= CACHE_BYTES,
+        "the section {SECTION} has {} bytes, more than the {CACHE_BYTES} of the flash's cache, so \
+         that its functions drive each other out. Delete those from boards/pico.x that are run the \
+         least.",
+        section.size()
+    );
     let range = section.address()..section.address() + section.size();
     let symbols = elf.symbols().filter(|symbol| range.contains(&(symbol.address() & !1)));
     let names: Vec<&str> = symbols.filter_map(|symbol| symbol.name().ok()).collect();
