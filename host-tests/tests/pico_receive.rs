@@ -102,9 +102,9 @@ fn the_status_waits_for_one_sector_at_most() -> TestResult {
     let lines = job_lines("lattice3.obj", &["$page=60x60", "$margin=5"]);
     let (plot, model) = lines.split_last().ok_or("a job")?;
     stream(&mut line, model)?;
+    line.emulator.ask_in_erasures(true)?;
     line.emulator.take_status_waits();
     line.emulator.send(format!("{plot}\n").as_bytes())?;
-    // Whenever an erasure begins, somebody waits.
     loop {
         let heard = line.status()?;
         if heard.starts_with("<Run") && !heard.contains("|Stage:") {
@@ -126,6 +126,7 @@ fn so_it_does_while_defaults_are_restored() -> TestResult {
         assert_eq!(ask_all(&mut line, text)?, ["ok"], "{text}");
     }
     line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    line.emulator.ask_in_erasures(true)?;
     line.emulator.take_status_waits();
     let begun = line.emulator.clock()?;
     line.emulator.send(b"$RST=*\n")?;
@@ -136,6 +137,7 @@ fn so_it_does_while_defaults_are_restored() -> TestResult {
     let longest = answered.into_iter().max().unwrap_or_default();
     assert!(longest > SLOWEST_ERASE / 2, "{longest:?}");
     assert!(longest < SLOWEST_ERASE + Duration::from_millis(20), "{longest:?}");
+    line.emulator.ask_in_erasures(false)?;
     // Ctrl-X between both leaves nothing that is in force, but not kept.
     line.emulator.send(b"$130=300\nG10 L2 P1 X5\n$RST=*\n")?;
     while !line.hear()?.starts_with("[MSG:Restoring defaults") {}

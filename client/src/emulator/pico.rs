@@ -11,9 +11,9 @@ use process::{
     PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
 };
 use record::{
-    CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG, JUMP, PIN, READS,
-    RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH, SWITCH_ZERO, TIMED, UF2,
-    USB, USB_HOST, USB_LINE, USB_RESETS, at,
+    ASK_IN_ERASURES, CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG,
+    JUMP, PIN, READS, RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH,
+    SWITCH_ZERO, TIMED, UF2, USB, USB_HOST, USB_LINE, USB_RESETS, at,
 };
 
 use super::running::{Running, Shared};
@@ -416,6 +416,15 @@ impl Pico {
     /// The emulator has ended.
     pub fn set_erase_time(&mut self, time: Duration) -> io::Result<()> {
         self.send(ERASE_TIME, 0, time.as_micros() as u64)
+    }
+
+    /// Asks for the status at the serial line whenever an erasure of flash begins, from now on or no
+    /// longer. The question comes in the board's own time, however late the computer is.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn ask_in_erasures(&mut self, asks: bool) -> io::Result<()> {
+        self.send(ASK_IN_ERASURES, u8::from(asks), 0)
     }
 
     /// Sends bytes to one of the serial lines of the board.

@@ -40,6 +40,7 @@ pub(super) const BOOT_SCATTERED: u8 = 17;
 pub(super) const OPERATION_BEGAN: u8 = 37;
 pub(super) const OPERATION_CHANGES: u8 = 38;
 pub(super) const OPERATIONS: u8 = 39;
+pub(super) const ASK_IN_ERASURES: u8 = 18;
 pub(super) const DELAY_ALARM: u8 = 48;
 pub(super) const RESET: u8 = 4;
 pub(super) const RUN_PIN: u8 = 32;
