@@ -92,7 +92,8 @@ impl<'a> Scratch<'a> {
         let count = fill(items_mut(self.words, room).unwrap_or(&mut []))?.min(room);
         let words = core::mem::take(&mut self.words);
         // `count` items fit, so this is at most what is left.
-        let (taken, rest) = words.split_at_mut(Self::bytes_for::<T>(count) / size_of::<u64>());
+        let word_count = Self::bytes_for::<T>(count) / size_of::<u64>();
+        let (taken, rest) = words.split_at_mut_checked(word_count).unwrap_or_default();
         self.words = rest;
         Ok(items_mut(taken, count).unwrap_or(&mut []))
     }

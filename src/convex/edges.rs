@@ -100,7 +100,7 @@ pub fn from_edges<I: Index>(
     };
     let viewpoint = Viewpoint {
         eye: points::drawn_in_eye(eye, positions, graph.numbers, precision),
-        inside: Some(inside.map(|number| positions[number.get()])),
+        inside: Some(inside.map(|number| positions.get(number.get()).copied().unwrap_or_default())),
     };
     let outline = graph.find_outline(&viewpoint, inside, &mut scratch, cancel)?;
     let visible = scratch.take::<u8>(positions.len())?;

@@ -124,7 +124,7 @@ pub fn from_vertices<I: Index>(
         *slot = number;
     }
     let distinct = points::weld(positions, numbers);
-    let numbers = &mut numbers[..distinct];
+    let numbers = numbers.get_mut(..distinct).unwrap_or_default();
     let summary = SolidSummary { welded: positions.len() - distinct, ..SolidSummary::default() };
     if distinct < 4 {
         return Err(SolidError::TooFewVertices { distinct });

@@ -83,7 +83,7 @@ pub(super) fn weld<I: Index>(points: &[Point], numbers: &mut [I]) -> usize {
 /// different, and there are at least four.
 pub(super) fn span<I: Index>(points: &[Point], numbers: &[I]) -> Span<I> {
     let point = |number: I| points[number.get()];
-    let (a, b) = (numbers[0], numbers[1]);
+    let [a, b, ..] = *numbers else { return Span::Line };
     let mut off_line = numbers
         .iter()
         .copied()

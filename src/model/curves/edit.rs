@@ -24,8 +24,8 @@ impl CurveList {
         if plug && range.start < last {
             let before: usize = (0..range.start).filter_map(length).sum();
             let last = length(last).unwrap_or(0);
-            let curves = store.curves_mut().get_mut(before..self.completed);
-            curves.unwrap_or(&mut []).rotate_right(last);
+            let curves = store.curves_mut().get_mut(before..self.completed).unwrap_or(&mut []);
+            curves.rotate_left(curves.len().saturating_sub(last));
             gone = range.start + 1..range.start + 2;
         }
         let mut number = 0;

@@ -61,7 +61,7 @@ impl<I: Index> Model<'_, I> {
                 at += length;
             }
             if let Some(between) = corners.get_mut(hole..last.end).filter(|_| last.start > hole) {
-                between.rotate_right(last.len());
+                between.rotate_left(between.len().saturating_sub(last.len()));
                 self.move_pen(last, hole);
                 self.remove_elements(bars, range.start + 1..range.end + 1);
                 return;
