@@ -49,7 +49,7 @@ pub enum Error {
     #[error(
         "cannot open {device}: {source}\nIs it the right port, is the plotter plugged in, may you \
          use the port \
-         (on Linux: group dialout), and does no other program hold it?"
+         (on Linux: group dialout)?"
     )]
     Port {
         /// The path or device as the user wrote it.
@@ -68,6 +68,15 @@ pub enum Error {
     NoPlotter {
         /// The ports that were looked at, with what was found there.
         looked: Vec<String>,
+    },
+    /// No plotter answers, and ports that may lead to one are used by other programs.
+    #[error(
+        "another program uses {}: close it there, or let it end, and try again",
+        devices.join(" and ")
+    )]
+    PortsHeld {
+        /// The ports.
+        devices: Vec<String>,
     },
     /// More than one plotter was found.
     #[error("there are {} plotters: choose one by --port {}", devices.len(), devices.join(" or "))]
@@ -354,7 +363,10 @@ pub const EXIT_CODES: [ExitCode; 7] = [
         meaning: "a file cannot be read, drawn or written, or the emulator fails",
     },
     ExitCode { number: 2, meaning: "the command line is not understood" },
-    ExitCode { number: NO_PLOTTER, meaning: "there is no plotter, or something else answers" },
+    ExitCode {
+        number: NO_PLOTTER,
+        meaning: "there is no plotter, its port is in use, or something else answers",
+    },
     ExitCode { number: REFUSED, meaning: "the plotter is busy, or refuses what it was sent" },
     ExitCode { number: BROKEN_OFF, meaning: "the work broke off: alarm, restart, broken line" },
     ExitCode { number: EXIT_CODE, meaning: "given up by Ctrl-C" },
@@ -373,6 +385,7 @@ impl Error {
             Self::Port { .. }
             | Self::Ports { .. }
             | Self::NoPlotter { .. }
+            | Self::PortsHeld { .. }
             | Self::SeveralPlotters { .. }
             | Self::NotPenup { .. }
             | Self::Silent { line: None, .. } => NO_PLOTTER,

@@ -7,7 +7,7 @@ use crate::error::Error;
 use crate::link::{Link as _, SerialLink};
 use penup_job::protocol::{Reply, ReplyReader, STATUS_QUERY, Status, is_penup};
 use serde::Serialize;
-use serialport::SerialPortType;
+use serialport::{SerialPortInfo, SerialPortType};
 use std::io;
 use std::path::Path;
 use std::thread;
@@ -54,6 +54,8 @@ pub enum Found {
     },
     /// Nothing answers.
     Silence,
+    /// Another program uses the port.
+    Held,
     /// The port cannot be opened.
     Closed {
         /// The reason that the operating system gives.
@@ -74,11 +76,14 @@ pub fn list() -> Result<Vec<Port>, Error> {
 /// Opens the port that the user named, or finds the only plotter.
 ///
 /// # Errors
-/// The port cannot be opened, or there is no plotter, or more than one.
+/// The port cannot be opened, another program uses it, or there is no plotter, or more than one.
 pub fn open(device: &str) -> Result<SerialLink, Error> {
     if device != AUTOMATIC {
-        let link = SerialLink::open(device);
-        return link.map_err(|source| Error::Port { device: device.to_owned(), source });
+        let device = device.to_owned();
+        return SerialLink::open(&device).map_err(|source| match is_held(&device, &source) {
+            true => Error::PortsHeld { devices: vec![device] },
+            false => Error::Port { device, source },
+        });
     }
     find().map(SerialLink::found_again_by_search)
 }
@@ -86,7 +91,7 @@ pub fn open(device: &str) -> Result<SerialLink, Error> {
 /// Finds the only plotter.
 ///
 /// # Errors
-/// There is no plotter, or more than one.
+/// There is no plotter, or more than one, or another program may be using it.
 pub fn find() -> Result<SerialLink, Error> {
     let mut asked = ask_all(&candidates()?);
     let is_plotter = |port: &Port| matches!(port.found, Found::Plotter { .. });
@@ -95,6 +100,11 @@ pub fn find() -> Result<SerialLink, Error> {
     if plotters > 1 {
         let devices = found.into_iter().map(|(port, _)| port.device).collect();
         return Err(Error::SeveralPlotters { devices });
+    }
+    let held = others.iter().filter(|(port, _)| port.found == Found::Held);
+    let held: Vec<String> = held.map(|(port, _)| port.device.clone()).collect();
+    if plotters == 0 && !held.is_empty() {
+        return Err(Error::PortsHeld { devices: held });
     }
     found.into_iter().find_map(|(_, link)| link).ok_or_else(|| Error::NoPlotter {
         looked: others.into_iter().map(|(port, _)| port.to_string()).collect(),
@@ -109,6 +119,7 @@ impl std::fmt::Display for Port {
             Found::Other { said } if said.is_empty() => write!(formatter, "no plotter")?,
             Found::Other { said } => write!(formatter, "no penup plotter, it said \"{said}\"")?,
             Found::Silence => write!(formatter, "nothing answers")?,
+            Found::Held => write!(formatter, "another program uses it")?,
             Found::Closed { reason } => write!(formatter, "cannot be opened: {reason}")?,
             Found::Unasked => write!(formatter, "not asked, because it is not on USB")?,
         }
@@ -172,6 +183,7 @@ fn ask(candidate: &Candidate) -> (Port, Option<SerialLink>) {
     }
     let mut link = match SerialLink::open(device) {
         Ok(link) => link,
+        Err(error) if is_held(device, &error) => return (port(Found::Held), None),
         Err(error) => return (port(Found::Closed { reason: error.to_string() }), None),
     };
     match found_at(&mut link) {
@@ -179,6 +191,14 @@ fn ask(candidate: &Candidate) -> (Port, Option<SerialLink>) {
         Ok(found) => (port(found), None),
         Err(error) => (port(Found::Closed { reason: error.to_string() }), None),
     }
+}
+
+/// Whether a port cannot be opened because another program uses it. On Windows the library reports a
+/// port that does not exist by the same kind of error.
+fn is_held(device: &str, error: &serialport::Error) -> bool {
+    let is_listed = |ports: Vec<SerialPortInfo>| ports.iter().any(|port| port.port_name == device);
+    error.kind() == serialport::ErrorKind::NoDevice
+        && (cfg!(unix) || serialport::available_ports().is_ok_and(is_listed))
 }
 
 fn found_at(link: &mut SerialLink) -> io::Result<Found> {

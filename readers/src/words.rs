@@ -6,7 +6,6 @@
 //! [`as_option`] a line that was sent, and [`explained`] a refusal. For refusals whose text would
 //! not help here, the library's table of errors has another text.
 
-use penup::machine::SETTINGS;
 use penup::plotter::OPTIONS;
 use penup::protocol::{ErrorEntry, error_entries};
 
@@ -139,7 +138,8 @@ fn named(name: &str, value: Option<&str>) -> String {
 fn form(name: &str) -> Option<Form> {
     let words = WORDS.iter().find(|(word, _)| *word == name);
     words.map(|(_, words)| Form::Words(words)).or_else(|| {
-        if SETTINGS.iter().any(|info| name.parse() == Ok(info.number)) {
+        // One that the library does not know may be a typing error, or of newer firmware.
+        if name.parse::<u16>().is_ok() {
             return Some(Form::Setting);
         }
         let option = OPTIONS.iter().find(|option| option.name == name)?;

@@ -254,6 +254,29 @@ fn the_only_plotter_is_found_and_two_are_not_chosen_from() {
 }
 
 #[test]
+fn a_port_that_another_program_uses_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (_wire, silent_name) = pseudo_terminal();
+    let plotter = Library::new();
+    let other = serialport::new(&plotter.device, 115_200).open().expect("opened");
+    let ports = [plotter.device.as_str(), &silent_name];
+    let (code, said, error) = with_ports(folder.path(), &ports, &["ports"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(said.starts_with(&format!("{}: another program uses it\n", plotter.device)), "{said}");
+    let in_use = format!(
+        "penup: another program uses {}: close it there, or let it end, and try again\n",
+        plotter.device
+    );
+    for arguments in [&["status"][..], &["status", "--port", &plotter.device]] {
+        let (code, _, error) = with_ports(folder.path(), &ports, arguments);
+        assert_eq!((code, error), (Some(3), in_use.clone()), "{arguments:?}");
+    }
+    drop(other);
+    let (code, _, error) = with_ports(folder.path(), &ports, &["status"]);
+    assert_eq!(code, Some(0), "{error}");
+}
+
+#[test]
 fn the_machine_moves_is_set_and_refuses_in_its_words() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
@@ -304,7 +327,9 @@ fn settings_are_saved_changed_and_restored() {
     let (code, _, error) = run(&["set", "100=1"]);
     assert_eq!(code, Some(4));
     assert!(error.contains("100"), "{error}");
-    assert_eq!(run(&["set", "999=1"]).0, Some(4));
+    let (code, _, error) = run(&["set", "999=1"]);
+    assert_eq!(code, Some(4));
+    assert!(error.contains("refuses setting 999 of the machine to 1: "), "{error}");
     let (code, said, error) = run(&["settings", "restore", "machine.toml"]);
     assert_eq!((code, said), (Some(0), "2 settings are changed\n".into()), "{error}");
     let (_, again, _) = run(&["settings", "save"]);
