@@ -14,6 +14,7 @@ macro_rules! say {
 }
 
 mod bench;
+mod beside;
 mod command;
 mod corpus;
 mod dependencies;
@@ -22,10 +23,12 @@ mod flash;
 mod firmware;
 mod fuzz;
 mod gallery;
+mod growth;
 mod large;
 mod mutants;
 mod page;
 mod panics;
+mod python;
 mod senders;
 mod set_up;
 mod side_by_side;
@@ -94,6 +97,14 @@ enum Task {
         /// Those of planning for each step event alone, on the Cortex-M3.
         #[arg(long, conflicts_with = "board")]
         motion: bool,
+        /// Times on this computer beside Open CASCADE and vpype, which it installs into
+        /// target/beside (some 10 minutes).
+        #[arg(long, conflicts_with_all = ["board", "motion"])]
+        beside: bool,
+        /// How the instructions for a face or a stroke grow with a drawing on this computer, and
+        /// the pictures of it in docs; needs valgrind (some 30 minutes).
+        #[arg(long, conflicts_with_all = ["board", "motion", "beside"])]
+        growth: bool,
     },
     /// Prints how deep the stacks of the emulated boards become over the heaviest jobs (some 2
     /// minutes).
@@ -238,6 +249,8 @@ fn carry_out() -> Result<()> {
         Some(Task::Page) => page::build()?,
         Some(Task::PageTest(arguments)) => page::test(&arguments)?,
         Some(Task::Bench { motion: true, .. }) => bench::count_motion()?,
+        Some(Task::Bench { beside: true, .. }) => beside::compare()?,
+        Some(Task::Bench { growth: true, .. }) => growth::measure()?,
         Some(Task::Bench { board, .. }) => match board.emulator {
             Emulator::Qemu { .. } => bench::count()?,
             Emulator::Rp2040js => bench::count_cycles(board)?,
