@@ -41,10 +41,10 @@ pub fn measure() -> Result<()> {
     build.current_dir(crate::root()).args(["build", "--quiet", "--release"]);
     build.args(["--package", "penup-host-tests"]);
     run(build.args(["--example", "hidden_growth", "--example", "order_growth"]))?;
-    let hidden = |name, kind, seams: &'static [&'static str]| {
+    let hidden = |name, kind: &str, seams: &[&str]| {
         let count = |faces: u32| {
             let faces = faces.to_string();
-            let arguments = [&[kind, &faces], seams].concat();
+            let arguments = [&[kind, faces.as_str()], seams].concat();
             instructions("hidden_growth", "*find_stretches*", &arguments)
         };
         curve(name, &FACES, count)
@@ -60,7 +60,7 @@ pub fn measure() -> Result<()> {
         ],
     };
     meshes.write("growth-hidden-lines.svg")?;
-    let ordered = |kind| {
+    let ordered = |kind: &'static str| {
         let count = |strokes: u32| {
             let arguments = ["0", "1", kind, &strokes.to_string()];
             instructions("order_growth", "*Strokes*order*", &arguments)

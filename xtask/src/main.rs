@@ -146,6 +146,13 @@ enum Task {
     },
     /// Does the same with a mesh of 10,000 faces (some 6 minutes).
     Mesh,
+    /// Sends a drawing of many points to a simulated board with the Pico's memory, and checks how
+    /// much memory the client takes for each (some minutes).
+    Points {
+        /// How many points.
+        #[arg(default_value_t = 1_000_000)]
+        count: u32,
+    },
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
         /// How many of each; from 4864 on, before every byte that a save changes (some 10 minutes).
@@ -261,6 +268,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
+        Some(Task::Points { count }) => test::many_points(count)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::PowerSoak { seed, bytes: true, only, .. }) => test::byte_cuts(seed, only)?,
         Some(Task::PowerSoak { minutes, seed, long, streamed, .. }) => {
