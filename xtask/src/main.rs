@@ -102,7 +102,7 @@ enum Task {
         #[arg(long, conflicts_with_all = ["board", "motion"])]
         beside: bool,
         /// How the instructions for a face or a stroke grow with a drawing on this computer, and
-        /// the pictures of it in docs; needs valgrind (some 30 minutes).
+        /// the pictures of it in docs; needs valgrind (most of an hour).
         #[arg(long, conflicts_with_all = ["board", "motion", "beside"])]
         growth: bool,
     },
@@ -152,6 +152,9 @@ enum Task {
         /// How many points.
         #[arg(default_value_t = 1_000_000)]
         count: u32,
+        /// How many of them each polyline has.
+        #[arg(long, default_value_t = 1000)]
+        stroke: u32,
     },
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
@@ -268,7 +271,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
-        Some(Task::Points { count }) => test::many_points(count)?,
+        Some(Task::Points { count, stroke }) => test::many_points(count, stroke)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::PowerSoak { seed, bytes: true, only, .. }) => test::byte_cuts(seed, only)?,
         Some(Task::PowerSoak { minutes, seed, long, streamed, .. }) => {

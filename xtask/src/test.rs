@@ -89,14 +89,15 @@ pub fn random_solids(count: u32) -> Result<()> {
     )
 }
 
-/// Lets the client send a drawing of `count` points to a simulated board, and checks its memory;
-/// `everything` sends 20,000.
-pub fn many_points(count: u32) -> Result<()> {
+/// Lets the client send a drawing of `count` points, `stroke` in each polyline, to a simulated
+/// board, and checks its memory; `everything` sends 20,000.
+pub fn many_points(count: u32, stroke: u32) -> Result<()> {
     step(
         workspace("test")
             .args(["--package", "penup-client", "--test", "command", "many_points::"])
             .args(["--", "--nocapture"])
-            .env("PENUP_POINTS", count.to_string()),
+            .env("PENUP_POINTS", count.to_string())
+            .env("PENUP_STROKE", stroke.to_string()),
     )
 }
 

@@ -15,25 +15,27 @@ use std::fmt::Write as _;
 use std::io::{Read as _, Write as _};
 use std::time::Duration;
 
-/// The points of a polyline.
-const STROKE: usize = 1000;
+/// The points of a row.
+const ROW: usize = 1000;
 
 /// The bytes that the program may take for each point.
 const BYTES_A_POINT: usize = 200;
 
-/// How many points are sent when the environment does not say it.
+/// How many points are sent, and how many points a polyline has, when the environment does not say
+/// it.
 const POINTS: usize = 20_000;
+const STROKE: usize = ROW;
 
-/// An SVG file of so many points in rows.
-fn svg(points: usize) -> String {
+/// An SVG file of so many points in rows, with so many in each polyline.
+fn svg(points: usize, stroke: usize) -> String {
     let mut text = String::from(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"400mm\" height=\"400mm\" \
          viewBox=\"0 0 400 400\">\n",
     );
-    for first in (0..points).step_by(STROKE) {
+    for first in (0..points).step_by(stroke) {
         text += "<polyline fill=\"none\" stroke=\"black\" points=\"";
-        for number in first..points.min(first + STROKE) {
-            let (row, column) = (number / STROKE, number % STROKE);
+        for number in first..points.min(first + stroke) {
+            let (row, column) = (number / ROW, number % ROW);
             let x = 20.0 + 0.2 * column as f64;
             let y = 20.0 + 0.3 * row as f64 + 0.1 * (column % 2) as f64;
             let _ = write!(text, "{x:.1},{y:.1} ");
@@ -51,10 +53,10 @@ fn peak(process: &str) -> Option<usize> {
 }
 
 /// Lets the program draw so many points. Returns its greatest resident memory in bytes.
-fn memory_for(points: usize) -> usize {
+fn memory_for(points: usize, stroke: usize) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     let [file, said] = ["points.svg", "said.txt"].map(|name| folder.path().join(name));
-    fs::write(&file, svg(points)).expect("written");
+    fs::write(&file, svg(points, stroke)).expect("written");
     let (mut wire, terminal) = TTYPort::pair().expect("a pseudo-terminal");
     wire.set_timeout(Duration::from_millis(1)).expect("set");
     let device = terminal.name().expect("a name");
@@ -86,7 +88,7 @@ fn memory_for(points: usize) -> usize {
     };
     let said = fs::read_to_string(said).expect("what it said");
     assert!(status.success(), "{status}: {said}");
-    let (strokes, sent) = (points.div_ceil(STROKE), format!("with {points} points are sent"));
+    let (strokes, sent) = (points.div_ceil(stroke), format!("with {points} points are sent"));
     assert!(said.contains(&format!("{strokes} strokes {sent}")), "{said}");
     assert!(most > 0);
     most
@@ -94,10 +96,13 @@ fn memory_for(points: usize) -> usize {
 
 #[test]
 fn a_drawing_larger_than_the_board_takes_little_memory_for_each_point() {
-    let points = std::env::var("PENUP_POINTS").map_or(POINTS, |text| text.parse().expect("points"));
+    let number = |name, usual| {
+        std::env::var(name).map_or(usual, |text| text.parse().expect("a number of points"))
+    };
+    let (points, stroke) = (number("PENUP_POINTS", POINTS), number("PENUP_STROKE", STROKE));
     // So much is taken by the program itself.
-    let least = memory_for(10);
-    let most = memory_for(points);
+    let least = memory_for(10, stroke);
+    let most = memory_for(points, stroke);
     let each = most.saturating_sub(least) as f64 / points as f64;
     println!("{points} points: {most} bytes at most, {each:.0} for each beside {least} for 10");
     assert!(each < BYTES_A_POINT as f64, "{each:.0} bytes a point");
