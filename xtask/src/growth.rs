@@ -59,7 +59,6 @@ pub fn measure() -> Result<()> {
             hidden("icosphere", "icosphere", &[], &FACES)?,
             // The largest one would take as long as all others.
             hidden("terrain, with seams", "terrain", &["seams"], &FACES[..4])?,
-            hidden("terrain", "terrain", &[], &FACES[..4])?,
         ],
     };
     meshes.write("growth-hidden-lines.svg")?;
