@@ -1,13 +1,14 @@
-//! What the effort of `order` buys as drawings grow: `order_growth EFFORT SEEDS COUNT...` for COUNT
-//! strokes of four kinds of drawings, each the mean of SEEDS drawings. EFFORT is a number, `auto`
-//! (as a board has it), or `computer` (as a computer that computes for a plotter has it).
+//! What the effort of `order` buys as drawings grow: `order_growth EFFORT SEEDS [KIND] COUNT...` for
+//! COUNT strokes of four kinds of drawings or of one, each the mean of SEEDS drawings. EFFORT is a
+//! number, `auto` (as a board has it), or `computer` (as a computer that computes for a plotter has
+//! it).
 //!
 //! It prints the seconds here, the units of work, the pen-up length in steps of 1/80 mm, and the
 //! seconds that the pen travels at 100 mm/s and 800 mm/s².
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 use penup::order::{Effort, Method, Options, Pace};
-use penup_host_tests::order_drawings::KINDS;
+use penup_host_tests::order_drawings::{KINDS, Kind};
 use std::time::Instant;
 
 /// The effort with this name, or of so many units for each move.
@@ -21,13 +22,15 @@ fn effort_of(word: &str) -> Option<Effort> {
 }
 
 fn main() {
-    let usage = "EFFORT SEEDS COUNT...";
-    let mut words = std::env::args().skip(1);
+    let usage = "EFFORT SEEDS [KIND] COUNT...";
+    let mut words = std::env::args().skip(1).peekable();
     let effort = words.next().and_then(|word| effort_of(&word)).expect(usage);
-    let mut numbers = words.map(|word| word.parse::<u32>().expect("a number"));
-    let seeds = numbers.next().expect(usage);
-    for count in numbers {
-        for (name, make) in KINDS {
+    let number = |word: String| word.parse::<u32>().expect("a number");
+    let seeds = words.next().map(number).expect(usage);
+    let only = words.next_if(|word| KINDS.iter().any(|(name, _)| name == word));
+    for count in words.map(number) {
+        let is_chosen = |(name, _): &(&str, Kind)| only.as_ref().is_none_or(|only| only == name);
+        for (name, make) in KINDS.into_iter().filter(is_chosen) {
             let (mut seconds, mut units, mut pen_up, mut travel) = (0.0, 0, 0, 0.0);
             for seed in 1..=seeds {
                 let drawing = make(count, seed);

@@ -123,7 +123,7 @@ fn print(counts: &str) -> Result<()> {
 }
 
 /// The number in groups of three digits with spaces between them.
-fn thousands(number: u64) -> String {
+pub fn thousands(number: u64) -> String {
     let digits = number.to_string();
     let groups: Vec<&str> = digits
         .as_bytes()

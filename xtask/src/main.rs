@@ -14,6 +14,7 @@ macro_rules! say {
 }
 
 mod bench;
+mod beside;
 mod command;
 mod corpus;
 mod dependencies;
@@ -22,10 +23,12 @@ mod flash;
 mod firmware;
 mod fuzz;
 mod gallery;
+mod growth;
 mod large;
 mod mutants;
 mod page;
 mod panics;
+mod python;
 mod senders;
 mod set_up;
 mod side_by_side;
@@ -94,6 +97,14 @@ enum Task {
         /// Those of planning for each step event alone, on the Cortex-M3.
         #[arg(long, conflicts_with = "board")]
         motion: bool,
+        /// Times on this computer beside Open CASCADE and vpype, which it installs into
+        /// target/beside (some 10 minutes).
+        #[arg(long, conflicts_with_all = ["board", "motion"])]
+        beside: bool,
+        /// How the instructions for a face or a stroke grow with a drawing on this computer, and
+        /// the pictures of it in docs; needs valgrind (most of an hour).
+        #[arg(long, conflicts_with_all = ["board", "motion", "beside"])]
+        growth: bool,
     },
     /// Prints how deep the stacks of the emulated boards become over the heaviest jobs (some 2
     /// minutes).
@@ -135,6 +146,16 @@ enum Task {
     },
     /// Does the same with a mesh of 10,000 faces (some 6 minutes).
     Mesh,
+    /// Sends a drawing of many points to a simulated board with the Pico's memory, and checks how
+    /// much memory the client takes for each (some minutes).
+    Points {
+        /// How many points.
+        #[arg(default_value_t = 1_000_000)]
+        count: u32,
+        /// How many of them each polyline has.
+        #[arg(long, default_value_t = 1000)]
+        stroke: u32,
+    },
     /// Cuts the emulated Pico's power at many instants, and in as many writes of its flash.
     Cuts {
         /// How many of each; from 4864 on, before every byte that a save changes (some 10 minutes).
@@ -238,6 +259,8 @@ fn carry_out() -> Result<()> {
         Some(Task::Page) => page::build()?,
         Some(Task::PageTest(arguments)) => page::test(&arguments)?,
         Some(Task::Bench { motion: true, .. }) => bench::count_motion()?,
+        Some(Task::Bench { beside: true, .. }) => beside::compare()?,
+        Some(Task::Bench { growth: true, .. }) => growth::measure()?,
         Some(Task::Bench { board, .. }) => match board.emulator {
             Emulator::Qemu { .. } => bench::count()?,
             Emulator::Rp2040js => bench::count_cycles(board)?,
@@ -248,6 +271,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Scenes { count }) => test::random_scenes(count)?,
         Some(Task::Solids { count }) => test::random_solids(count)?,
         Some(Task::MotionSoak { first, seeds }) => test::motion_soak(first, seeds)?,
+        Some(Task::Points { count, stroke }) => test::many_points(count, stroke)?,
         Some(Task::Cuts { count }) => test::power_cuts(count)?,
         Some(Task::PowerSoak { seed, bytes: true, only, .. }) => test::byte_cuts(seed, only)?,
         Some(Task::PowerSoak { minutes, seed, long, streamed, .. }) => {

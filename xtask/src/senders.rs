@@ -14,9 +14,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context as _, Result, bail, ensure};
 
-use crate::command::{cargo, describe, output, run, run_within};
+use crate::command::{cargo, describe, run, run_within};
 use crate::table::BOARDS;
-use crate::{firmware, set_up};
+use crate::{firmware, python, set_up};
 
 /// A program, what installs it, and the script that tries it.
 struct Program {
@@ -55,7 +55,7 @@ const PROGRAMS: [Program; 5] = [
 /// The serial ports that are tried, as the example names them.
 const PORTS: [&str; 3] = ["lm3s6965", "pico", "pico-usb"];
 
-/// How long an installation may take.
+/// How long an installation from npm may take.
 const INSTALL_LIMIT: Duration = Duration::from_secs(600);
 /// How long a script may take.
 const SCRIPT_LIMIT: Duration = Duration::from_secs(900);
@@ -172,28 +172,12 @@ fn folder_of(program: &Program) -> PathBuf {
 /// Finds or installs a program, and returns its folder.
 fn install(program: &Program) -> Result<PathBuf> {
     let folder = folder_of(program);
-    let wanted = program.python.iter().chain(program.node.as_ref()).copied();
-    let wanted = wanted.collect::<Vec<_>>().join("\n");
-    // This file is written last, so if it is right, the installation is complete.
-    let done = folder.join("installed");
-    if fs::read_to_string(&done).is_ok_and(|found| found == wanted) {
-        return Ok(folder);
-    }
-    ensure!(output("python3", &["--version"]).is_some(), "there is no python3");
-    say!("penup: installing {} into {}", program.name, folder.display())?;
-    fs::create_dir_all(&folder)?;
-    let environment = folder.join("python");
-    let mut python = Command::new("python3");
-    run_within(INSTALL_LIMIT, python.args(["-m", "venv", "--clear"]).arg(&environment))?;
-    let mut pip = Command::new(environment.join("bin/pip"));
-    pip.args(["install", "--quiet", "--disable-pip-version-check"]).args(program.python);
-    run_within(INSTALL_LIMIT, &mut pip)?;
-    if let Some(package) = program.node {
+    python::install(program.name, &folder, program.python, program.node, || {
+        let Some(package) = program.node else { return Ok(()) };
         let mut npm = Command::new("npm");
         npm.args(["install", "--no-audit", "--no-fund", "--loglevel=error", "--prefix"]);
-        run_within(INSTALL_LIMIT, npm.arg(&folder).arg(package))?;
-    }
-    fs::write(done, wanted)?;
+        run_within(INSTALL_LIMIT, npm.arg(&folder).arg(package))
+    })?;
     Ok(folder)
 }
 

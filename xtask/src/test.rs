@@ -89,6 +89,18 @@ pub fn random_solids(count: u32) -> Result<()> {
     )
 }
 
+/// Lets the client send a drawing of `count` points, `stroke` in each polyline, to a simulated
+/// board, and checks its memory; `everything` sends 20,000.
+pub fn many_points(count: u32, stroke: u32) -> Result<()> {
+    step(
+        workspace("test")
+            .args(["--package", "penup-client", "--test", "command", "many_points::"])
+            .args(["--", "--nocapture"])
+            .env("PENUP_POINTS", count.to_string())
+            .env("PENUP_STROKE", stroke.to_string()),
+    )
+}
+
 /// Simulates `count` power failures of each kind; `everything` does 200. From 4864 on, the power
 /// fails before every byte of flash that a save changes.
 pub fn power_cuts(count: u32) -> Result<()> {

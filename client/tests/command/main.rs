@@ -6,6 +6,8 @@
 mod at_a_port;
 #[cfg(unix)]
 mod machine;
+#[cfg(target_os = "linux")]
+mod many_points;
 
 use std::fs;
 use std::path::Path;

@@ -1,0 +1,112 @@
+//! The memory of the program for a drawing that is larger than the board.
+//!
+//! It sends the drawing to a simulated board at a pseudo-terminal, which has the memory of the
+//! Raspberry Pi Pico. `cargo xtask points` does so with 1,000,000 points. Linux only: its kernel
+//! says how much memory a program has taken.
+
+use super::*;
+use penup::board_table::PICO;
+use penup::machine::Settings;
+use penup_client::link::Link as _;
+use penup_client::preview::InMemory;
+use penup_job::room::Room;
+use serialport::{SerialPort as _, TTYPort};
+use std::fmt::Write as _;
+use std::io::{Read as _, Write as _};
+use std::time::Duration;
+
+/// The points of a row.
+const ROW: usize = 1000;
+
+/// The bytes that the program may take for each point.
+const BYTES_A_POINT: usize = 200;
+
+/// By how many bytes the memory of the program differs from one start to the next.
+const SLACK: usize = 1_000_000;
+
+/// How many points are sent, and how many points a polyline has, when the environment does not say
+/// it.
+const POINTS: usize = 20_000;
+const STROKE: usize = ROW;
+
+/// An SVG file of so many points in rows, with so many in each polyline.
+fn svg(points: usize, stroke: usize) -> String {
+    let mut text = String::from(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"400mm\" height=\"400mm\" \
+         viewBox=\"0 0 400 400\">\n",
+    );
+    for first in (0..points).step_by(stroke) {
+        text += "<polyline fill=\"none\" stroke=\"black\" points=\"";
+        for number in first..points.min(first + stroke) {
+            let (row, column) = (number / ROW, number % ROW);
+            let x = 20.0 + 0.2 * column as f64;
+            let y = 20.0 + 0.3 * row as f64 + 0.1 * (column % 2) as f64;
+            let _ = write!(text, "{x:.1},{y:.1} ");
+        }
+        text += "\"/>\n";
+    }
+    text + "</svg>\n"
+}
+
+/// The greatest resident memory of a process so far, in bytes; `None` if it has ended.
+fn peak(process: &str) -> Option<usize> {
+    let status = fs::read_to_string(format!("/proc/{process}/status")).ok()?;
+    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    Some(1024 * line.trim().strip_suffix(" kB")?.parse::<usize>().ok()?)
+}
+
+/// Lets the program draw so many points. Returns its greatest resident memory in bytes.
+fn memory_for(points: usize, stroke: usize) -> usize {
+    let folder = tempfile::tempdir().expect("a folder");
+    let [file, said] = ["points.svg", "said.txt"].map(|name| folder.path().join(name));
+    fs::write(&file, svg(points, stroke)).expect("written");
+    let (mut wire, terminal) = TTYPort::pair().expect("a pseudo-terminal");
+    wire.set_timeout(Duration::from_millis(1)).expect("set");
+    let device = terminal.name().expect("a name");
+    // Only one may hold it: the program.
+    drop(terminal);
+    let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["plot", "points.svg", "--compute", "host", "--page", "400x400", "--effort", "0"])
+        .args(["--port", &device])
+        .current_dir(folder.path())
+        .stderr(fs::File::create(&said).expect("a file"))
+        .spawn()
+        .expect("the program runs");
+    let process = program.id().to_string();
+    let mut board = InMemory::<u16>::new(Room::of_board(&PICO), Settings::default());
+    let (mut buffer, mut most) = ([0; 4096], 0);
+    let status = loop {
+        // An error says that the program does not hold its end, or has sent nothing.
+        if let Ok(count) = wire.read(&mut buffer) {
+            board.send(&buffer[..count]).expect("memory");
+        }
+        // The board draws as fast as it computes.
+        let count = board.receive(&mut buffer, Duration::from_millis(200)).expect("memory");
+        // The program may have left: then nobody listens.
+        let _ = wire.write_all(&buffer[..count]);
+        most = most.max(peak(&process).unwrap_or(0));
+        if let Some(status) = program.try_wait().expect("a state") {
+            break status;
+        }
+    };
+    let said = fs::read_to_string(said).expect("what it said");
+    assert!(status.success(), "{status}: {said}");
+    let (strokes, sent) = (points.div_ceil(stroke), format!("with {points} points are sent"));
+    assert!(said.contains(&format!("{strokes} strokes {sent}")), "{said}");
+    assert!(most > 0);
+    most
+}
+
+#[test]
+fn a_drawing_larger_than_the_board_takes_little_memory_for_each_point() {
+    let number = |name, usual| {
+        std::env::var(name).map_or(usual, |text| text.parse().expect("a number of points"))
+    };
+    let (points, stroke) = (number("PENUP_POINTS", POINTS), number("PENUP_STROKE", STROKE));
+    // So much is taken by the program itself.
+    let least = memory_for(10, stroke);
+    let most = memory_for(points, stroke);
+    let each = most.saturating_sub(least) as f64 / points as f64;
+    println!("{points} points: {most} bytes at most, {each:.0} for each beside {least} for 10");
+    assert!(most <= least + BYTES_A_POINT * points + SLACK, "{each:.0} bytes a point");
+}
