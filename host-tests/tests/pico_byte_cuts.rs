@@ -137,7 +137,8 @@ fn cut_model(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> T
     board.finish()?;
     board.restart()?;
     board.record(|board| draw(board, &models[1]))?;
-    board.try_all(&mut scenario, effort, random)
+    board.try_all(&mut scenario, effort, random)?;
+    board.try_instants_of_writes(&mut scenario, effort, random)
 }
 
 type Portion = fn(&mut RecordedPico, Effort, &mut Random) -> TestResult;

@@ -364,7 +364,9 @@ mod tests {
         assert_eq!((slack.step(), slack.pulses()), ((0, 0), (0, -1)));
         assert_eq!([direction, pen, lift].map(StepEvent::pulses), [(0, 0); 3]);
         assert_eq!(pen.kind(), EventKind::Pen { height: 65 });
-        assert_eq!(lift.kind(), EventKind::Lift { step: true, down: true });
+        for (step, down) in [(false, false), (false, true), (true, false), (true, true)] {
+            assert_eq!(StepEvent::lift(step, down, 9).kind(), EventKind::Lift { step, down });
+        }
         for start in [LengthStart::Next, LengthStart::AfterNext, LengthStart::Anew] {
             let told = StepEvent::step_length(0xABCD, start);
             assert!(told.is_told() && !told.skips_next());

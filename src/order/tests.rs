@@ -194,3 +194,31 @@ fn with_more_memory_no_order_fails_that_was_found_with_less() {
         assert!(is_enough);
     }
 }
+
+#[test]
+fn lines_in_pieces_need_little_more_memory_than_whole_ones() {
+    let least_words = |pieces: i32| {
+        let (mut points, mut segments) = (Vec::new(), Vec::new());
+        for line in 0..20 {
+            for at in 0..=pieces {
+                let x = 97 * (line % 5) + 30 * at / pieces;
+                points.push(PagePoint { x, y: 61 * (line / 5) + line % 3 * at });
+                if at > 0 {
+                    let last = points.len() as u16 - 1;
+                    segments.push(Segment::new(last - 1, last).inked(LineType::Full, 0));
+                }
+            }
+        }
+        let drawing = Drawing { points: &points, segments: &segments };
+        let mut tour = std::vec![Leg::new(0u16, false); segments.len()];
+        let mut is_enough = |words: &usize| {
+            let mut memory = std::vec![0; *words];
+            let scratch = Scratch::new(&mut memory);
+            order(drawing, Options::default(), scratch, &mut NeverCancel, &mut tour).is_ok()
+        };
+        (0..2000).find(&mut is_enough).expect("some memory is enough")
+    };
+    let [whole, in_pieces] = [1, 3].map(least_words);
+    // Of the 40 points within lines, each needs some numbers of 16 bits.
+    assert!(in_pieces <= whole + 40, "{whole} and {in_pieces} words");
+}

@@ -268,3 +268,77 @@ impl Runner<'_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::drawing::{LineType, PagePoint};
+    use crate::motion::limits::tests::settings;
+    use crate::motion::{Block, EventKind, Limits, Move};
+    use std::vec::Vec;
+
+    #[derive(Default)]
+    struct Events(Vec<StepEvent>);
+
+    impl EventQueue for Events {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+        fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+            self.0.push(event);
+            Ok(())
+        }
+    }
+
+    const PEN: PenPositions = PenPositions {
+        up_height: 0,
+        down_height: 100,
+        up_ticks: 2_000_000,
+        down_ticks: 2_000_000,
+        ramp_ticks: 0,
+        dot_length: PathLength::ZERO,
+        lift: None,
+        overlap: PenOverlap { down_ticks: 1_500_000, up_ticks: 1_000_000 },
+    };
+
+    /// A runner that is to travel so many steps and then to draw a stroke.
+    fn runner(blocks: &mut [Block], travel: i32) -> Runner<'_> {
+        let mut runner = Runner::new(Limits::new(&settings()).expect("valid"), PEN, blocks);
+        for (x, ink) in [(travel, None), (travel + 2000, Some(LineType::Full))] {
+            let (motors, way) = (PagePoint { x, y: 0 }, (x - runner.end().x, 0));
+            let length = runner.limits().length(way.0, way.1).expect("short");
+            let (offsets, whole, is_gap) = ([0; 2], length, false);
+            let piece = Move { motors, offsets, page: motors, way, whole, length, is_gap };
+            runner.push(&piece, ink, PathLength::MAX).expect("room");
+        }
+        runner
+    }
+
+    #[test]
+    fn the_pen_is_told_between_two_steps_and_not_just_behind_one() {
+        for travel in (3000..3300).step_by(7) {
+            let mut blocks = [Block::EMPTY; 8];
+            let (mut runner, mut events) = (runner(&mut blocks, travel), Events::default());
+            assert_eq!(runner.capacity(), 8);
+            while runner.produce(&mut events) == Ok(Progress::More) {}
+            let is_down = |event: &StepEvent| event.kind() == EventKind::Pen { height: 100 };
+            let told = events.0.iter().position(is_down).expect("the pen goes down");
+            let [before, pen, behind] = [told - 1, told, told + 1].map(|at| events.0[at]);
+            assert!(before.is_step() && behind.is_step(), "while the machine moves");
+            let (before, behind) = (f64::from(before.ticks()), f64::from(pen.ticks()));
+            assert!(before > 0.9 * behind, "{travel}: {before} {behind}");
+        }
+    }
+
+    #[test]
+    fn a_pen_that_somebody_else_has_raised_is_not_on_its_way_down() {
+        let mut blocks = [Block::EMPTY; 8];
+        let (mut runner, mut events) = (runner(&mut blocks, 3000), Events::default());
+        while !runner.timing.is_lowering() {
+            assert_eq!(runner.produce(&mut events), Ok(Progress::More));
+        }
+        runner.forget_path(runner.page_end());
+        runner.forget_pen();
+        assert!(!runner.timing.is_lowering() && !runner.is_pen_up());
+    }
+}
