@@ -271,46 +271,19 @@ impl Runner<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::tests::{Events, PEN, push};
     use super::*;
-    use crate::drawing::{LineType, PagePoint};
+    use crate::drawing::LineType;
     use crate::motion::limits::tests::settings;
-    use crate::motion::{Block, EventKind, Limits, Move};
-    use std::vec::Vec;
-
-    #[derive(Default)]
-    struct Events(Vec<StepEvent>);
-
-    impl EventQueue for Events {
-        fn room(&self) -> usize {
-            usize::MAX
-        }
-        fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-            self.0.push(event);
-            Ok(())
-        }
-    }
-
-    const PEN: PenPositions = PenPositions {
-        up_height: 0,
-        down_height: 100,
-        up_ticks: 2_000_000,
-        down_ticks: 2_000_000,
-        ramp_ticks: 0,
-        dot_length: PathLength::ZERO,
-        lift: None,
-        overlap: PenOverlap { down_ticks: 1_500_000, up_ticks: 1_000_000 },
-    };
+    use crate::motion::{Block, EventKind, Limits};
 
     /// A runner that is to travel so many steps and then to draw a stroke.
     fn runner(blocks: &mut [Block], travel: i32) -> Runner<'_> {
-        let mut runner = Runner::new(Limits::new(&settings()).expect("valid"), PEN, blocks);
-        for (x, ink) in [(travel, None), (travel + 2000, Some(LineType::Full))] {
-            let (motors, way) = (PagePoint { x, y: 0 }, (x - runner.end().x, 0));
-            let length = runner.limits().length(way.0, way.1).expect("short");
-            let (offsets, whole, is_gap) = ([0; 2], length, false);
-            let piece = Move { motors, offsets, page: motors, way, whole, length, is_gap };
-            runner.push(&piece, ink, PathLength::MAX).expect("room");
-        }
+        let overlap = PenOverlap { down_ticks: 1_500_000, up_ticks: 1_000_000 };
+        let limits = Limits::new(&settings()).expect("valid");
+        let mut runner = Runner::new(limits, PenPositions { overlap, ..PEN }, blocks);
+        push(&mut runner, [travel, 0], None);
+        push(&mut runner, [travel + 2000, 0], Some(LineType::Full));
         runner
     }
 
