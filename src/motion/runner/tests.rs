@@ -88,3 +88,29 @@ fn a_bend_that_is_known_late_binds_the_chord_in_work() {
     assert!(late < before, "{late} {before}");
     assert_eq!(limit(&runner), Some(late));
 }
+
+#[test]
+fn a_cruise_is_given_up_where_a_bend_appears_behind_it() {
+    let mut settings = settings();
+    settings.jerk_m_per_s3 = Millimetres::from_num(20);
+    let limits = Limits::new(&settings).expect("valid");
+    let (mut blocks, mut events) = ([Block::EMPTY; 64], Events::default());
+    let mut runner = Runner::new(limits, PEN, &mut blocks);
+    push(&mut runner, [6000, 0], Some(LineType::Full));
+    let cruises = |runner: &Runner<'_>| matches!(&runner.plan, Some(Plan::Interval(interval)) if interval.is_cruise());
+    while !cruises(&runner) {
+        assert_eq!(runner.produce(&mut events), Ok(Progress::More));
+    }
+    // A straight line in pieces gives no reason.
+    for piece in 1..=4 {
+        push(&mut runner, [6000 + 40 * piece, 0], Some(LineType::Full));
+        assert!(cruises(&runner));
+    }
+    // Chords of half a circle of 1 mm.
+    for number in 1..=9 {
+        let (sin, cos) = libm::sincos(f64::from(number) * core::f64::consts::PI / 9.0);
+        let [x, y] = [sin, 1.0 - cos].map(|part| libm::round(100.0 * part) as i32);
+        push(&mut runner, [6160 + x, y], Some(LineType::Full));
+    }
+    assert!(!cruises(&runner));
+}
