@@ -679,7 +679,7 @@ mod tests {
         let mut slowed = 0;
         for step in 0..700 {
             match step {
-                90 => both.tell(length / 2 & !1, LengthStart::Next),
+                90 => both.tell((length / 2) & !1, LengthStart::Next),
                 160 => both.tell(length, LengthStart::AfterNext),
                 200 | 201 | 330 => {
                     // A pulse that is none of a step.
