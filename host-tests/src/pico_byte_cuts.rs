@@ -304,8 +304,9 @@ impl RecordedPico {
         }
         scenario.judge(&operations, &states);
         let mut seen = BTreeSet::new();
+        let front = operations.iter().map(|operation| operation.offset).min().unwrap_or_default();
         for (number, operation) in (0..).zip(&operations) {
-            for cut in cuts_within(number, operation, effort, random) {
+            for cut in cuts_within(number, operation, front, effort, random) {
                 self.try_one(scenario, cut, &states, &mut seen, effort, random)?;
                 *self.tally.cuts.entry(name_of(operation)).or_default() += 1;
             }
@@ -331,48 +332,91 @@ impl RecordedPico {
         effort: Effort,
         random: &mut Random,
     ) -> Result {
-        let operations = self.operations.clone();
-        let mut states: Vec<Option<Shown>> = vec![None; operations.len() + 1];
-        let begin = operations[0].began;
+        let mut states = vec![None; self.operations.len() + 1];
+        let begin = self.operations[0].began;
         let end = self.changes.last().map_or(begin, |change| change.at);
         for _ in 0..effort.instants {
             let instant = if random.once_in(3) {
-                let operation = operations[random.below(operations.len() as u64) as usize];
-                let lasts = OPERATION_TIME[usize::from(operation.is_erasure)];
-                operation.began + share_of(lasts, random)
+                self.instant_of_a_write(random)
             } else {
                 begin + share_of(end - begin, random)
             };
-            let begun = operations.iter().take_while(|it| it.began <= instant).count();
-            let cut = match begun.checked_sub(1).map(|last| (last as u32, operations[last])) {
-                Some((number, last)) => {
-                    let lasts = OPERATION_TIME[usize::from(last.is_erasure)].as_micros();
-                    let passed = (instant - last.began).as_micros();
-                    if passed < lasts {
-                        let share = (256 * passed / lasts) as u8;
-                        Cut::Scattered(number, share, random.below(1 << 24) as u32)
-                    } else {
-                        Cut::Between(number + 1)
-                    }
-                }
-                None => Cut::Between(0),
-            };
-            for done in [cut.done(), (cut.done() + 1).min(operations.len() as u32)] {
-                if states[done as usize].is_none() {
-                    let state = self.boot(Cut::Between(done), &[])?;
-                    states[done as usize] = Some(state);
+            self.try_instant(scenario, instant, &[], &mut states, effort, random)?;
+        }
+        Ok(())
+    }
+
+    /// As [`RecordedPico::try_instants`], but each instant is within an operation, and the
+    /// scenario's questions are asked. It is for what changes by operations alone.
+    ///
+    /// # Errors
+    /// As [`RecordedPico::try_all`].
+    ///
+    /// # Panics
+    /// As [`RecordedPico::try_all`].
+    pub fn try_instants_of_writes(
+        &mut self,
+        scenario: &mut dyn Scenario,
+        effort: Effort,
+        random: &mut Random,
+    ) -> Result {
+        let questions: Vec<String> =
+            scenario.questions().iter().map(|text| (*text).to_owned()).collect();
+        let questions: Vec<&str> = questions.iter().map(String::as_str).collect();
+        let mut states = vec![None; self.operations.len() + 1];
+        for _ in 0..effort.instants {
+            let instant = self.instant_of_a_write(random);
+            self.try_instant(scenario, instant, &questions, &mut states, effort, random)?;
+        }
+        Ok(())
+    }
+
+    /// A random instant at which a page is written or a sector erased.
+    fn instant_of_a_write(&self, random: &mut Random) -> Duration {
+        let operation = self.operations[random.below(self.operations.len() as u64) as usize];
+        operation.began + share_of(OPERATION_TIME[usize::from(operation.is_erasure)], random)
+    }
+
+    /// Cuts the power at an instant. `states` are those between the operations, as far as they are
+    /// known.
+    fn try_instant(
+        &mut self,
+        scenario: &mut dyn Scenario,
+        instant: Duration,
+        questions: &[&str],
+        states: &mut [Option<Shown>],
+        effort: Effort,
+        random: &mut Random,
+    ) -> Result {
+        let begun = self.operations.iter().take_while(|it| it.began <= instant).count();
+        let cut = match begun.checked_sub(1).map(|last| (last as u32, self.operations[last])) {
+            Some((number, last)) => {
+                let lasts = OPERATION_TIME[usize::from(last.is_erasure)].as_micros();
+                let passed = (instant - last.began).as_micros();
+                if passed < lasts {
+                    let share = (256 * passed / lasts) as u8;
+                    Cut::Scattered(number, share, random.below(1 << 24) as u32)
+                } else {
+                    Cut::Between(number + 1)
                 }
             }
-            let shown = self.boot(cut, &[])?;
-            assert_shown(cut, &shown, |at| states[at as usize].as_ref());
-            self.tally.instants += 1;
-            if random.once_in(effort.complete) {
-                self.boot(cut, &[])?;
-                self.line.emulator.pin_changes()?;
-                let drawn = self.drawn_until(instant);
-                if scenario.complete(self, &shown, drawn)? {
-                    self.tally.completed += 1;
-                }
+            None => Cut::Between(0),
+        };
+        for done in [cut.done(), (cut.done() + 1).min(self.operations.len() as u32)] {
+            if states[done as usize].is_none() {
+                let state = self.boot(Cut::Between(done), questions)?;
+                states[done as usize] = Some(state);
+            }
+        }
+        let shown = self.boot(cut, questions)?;
+        assert_shown(cut, &shown, |at| states[at as usize].as_ref());
+        self.tally.instants += 1;
+        if random.once_in(effort.complete) {
+            self.boot(cut, &[])?;
+            self.line.emulator.pin_changes()?;
+            let drawn = self.drawn_until(instant);
+            if scenario.complete(self, &shown, drawn)? {
+                self.tally.completed += 1;
             }
         }
         Ok(())
@@ -427,28 +471,39 @@ fn share_of(time: Duration, random: &mut Random) -> Duration {
 }
 
 /// The cuts within an operation: of a page before each `step`th byte, and within some of them; of a
-/// sector before some bytes; and of both with bits at random.
+/// sector before some bytes; and of both with bits at random. What a model in flash consists of is
+/// cut at few bytes, because it is many pages, of which none counts before the record at `front`
+/// does.
 fn cuts_within(
     number: u32,
     operation: &FlashOperation,
+    front: u32,
     effort: Effort,
     random: &mut Random,
 ) -> Vec<Cut> {
-    /// In a sector, and in a page of a large model, one byte is like the others.
+    /// In a sector one byte is like the others.
     const SELDOM: u32 = 97;
-    let is_large = operation.offset < RECORDS && operation.changes > 64;
-    let step = effort.bytes * if operation.is_erasure || is_large { SELDOM } else { 1 };
-    let mut cuts = Vec::new();
-    let mut bytes: Vec<u32> = (0..operation.changes).step_by(step as usize).collect();
-    bytes.extend(operation.changes.checked_sub(1));
+    let is_content = operation.offset < RECORDS && operation.offset != front;
+    let last = operation.changes.checked_sub(1);
+    let mut bytes: Vec<u32> = if is_content {
+        let some = random.below(u64::from(operation.changes).max(1)) as u32;
+        if operation.is_erasure { vec![0, some] } else { vec![some] }
+    } else {
+        let step = effort.bytes * if operation.is_erasure { SELDOM } else { 1 };
+        (0..operation.changes).step_by(step as usize).collect()
+    };
+    if !is_content || operation.is_erasure {
+        bytes.extend(last);
+    }
     bytes.dedup();
+    let mut cuts = Vec::new();
     for byte in bytes {
         cuts.push(Cut::Within(number, byte, 0));
         if random.once_in(8) {
             cuts.push(Cut::Within(number, byte, 1 + random.below(255) as u8));
         }
     }
-    let scattered = if is_large { 1 } else { effort.scattered };
+    let scattered = if is_content { effort.scattered.min(1) } else { effort.scattered };
     for share in [128, 4, 252, 64, 192].into_iter().take(scattered) {
         cuts.push(Cut::Scattered(number, share, random.below(1 << 24) as u32));
     }

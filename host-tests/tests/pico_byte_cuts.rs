@@ -137,7 +137,8 @@ fn cut_model(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> T
     board.finish()?;
     board.restart()?;
     board.record(|board| draw(board, &models[1]))?;
-    board.try_all(&mut scenario, effort, random)
+    board.try_all(&mut scenario, effort, random)?;
+    board.try_instants_of_writes(&mut scenario, effort, random)
 }
 
 type Portion = fn(&mut RecordedPico, Effort, &mut Random) -> TestResult;
@@ -164,7 +165,7 @@ fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
 
 /// Prints how many cuts there were of each kind.
 #[test]
-#[ignore = "`cargo xtask power-soak --bytes` runs it for most of an hour"]
+#[ignore = "`cargo xtask power-soak --bytes` runs it for more than an hour"]
 fn before_every_byte() -> TestResult {
     let seed = wish("PENUP_SEED", 1);
     let only = std::env::var("PENUP_PORTION").ok();

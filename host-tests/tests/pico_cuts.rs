@@ -79,7 +79,7 @@ fn one_stroke() -> Vec<String> {
 #[ignore = "`cargo xtask power-soak --long` runs it for most of an hour"]
 fn a_job_of_half_an_hour_is_whole_after_ten_cuts() -> TestResult {
     let seed = wish("PENUP_SEED", 1);
-    let job = job("lattice4.obj", &["$page=200x200", "$margin=3", "$201=500", "$202=1000"]);
+    let job = job("lattice4.obj", &["$page=200x200", "$margin=3", "$201=150", "$202=400"]);
     println!("{} strokes, {:?}", job.whole.len(), job.time);
     assert!(job.time >= Duration::from_secs(30 * 60), "{:?}", job.time);
     let begun = Instant::now();

@@ -179,3 +179,53 @@ fn positions_far_along_a_long_edge_are_distinguished() {
     assert_eq!(EdgeParameter::zero_between(0, 7), EdgeParameter::START);
     assert_eq!(EdgeParameter::zero_between(7, 0), EdgeParameter::END);
 }
+
+/// Whatever lies in a plane lies in one for [`are_coplanar`], too, once each coordinate is off by
+/// as much as it may be, in the directions that matter most.
+#[test]
+fn points_of_a_plane_stay_in_it_within_their_errors() {
+    let mut state = 1u32;
+    let mut random = |reach: i32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as i32 % (2 * reach + 1) - reach
+    };
+    let mut tried = 0;
+    for round in 0..4000 {
+        let off = [1, 2, 5, 40, 300][round % 5];
+        let reach = 90 * off;
+        let a = [(); 3].map(|()| random(reach));
+        let [u, v] = [(); 2].map(|()| [(); 3].map(|()| random(reach)));
+        let (along, across) = (random(3), random(3));
+        let add = |to: [i32; 3]| [0, 1, 2].map(|n| a[n] + to[n]);
+        let w = [0, 1, 2].map(|n| along * u[n] + across * v[n]);
+        let exact = [a, add(u), add(v), add(w)];
+        let precision = Precision { written: off.unsigned_abs(), unit: off.unsigned_abs() };
+        assert!(are_coplanar(exact, precision));
+        // How the determinant changes with each coordinate, by trying it.
+        let height = |points: [[i32; 3]; 4]| {
+            let [a, points @ ..] = points;
+            let [u, v, w] = points.map(|to| difference(to, a));
+            let uv = cross(u, v);
+            (0..3).map(|n| uv[n] * i128::from(w[n])).sum::<i128>()
+        };
+        for sign in [1, -1] {
+            let mut moved = exact;
+            for point in 0..4 {
+                for axis in 0..3 {
+                    let mut nearby = exact;
+                    nearby[point][axis] += 1;
+                    let slope = height(nearby).signum() as i32;
+                    moved[point][axis] += sign * off * if slope == 0 { 1 } else { slope };
+                }
+            }
+            let [u, v] = [1, 2].map(|to| difference(moved[to], moved[0]));
+            let side = largest(u).max(largest(v)).max(largest([0, 1, 2].map(|n| v[n] - u[n])));
+            let area = cross(u, v).iter().map(|part| part.unsigned_abs()).max().unwrap_or(0);
+            if area >= WIDTHS * off.unsigned_abs() as u128 * side as u128 {
+                assert!(are_coplanar(moved, precision), "{exact:?} {moved:?}");
+                tried += 1;
+            }
+        }
+    }
+    assert!(tried > 1000, "{tried}");
+}

@@ -297,3 +297,26 @@ fn jobs_take_as_long_as_they_did_with_all_settings() {
         }
     }
 }
+
+#[test]
+fn the_planned_position_leaves_out_the_slack_that_is_taken_up_on_the_way() {
+    let mut settings = settings([70.0, 600.0, 0.0, 0.05]);
+    for setting in [Setting::BacklashX, Setting::BacklashY, Setting::BacklashDistance] {
+        settings.set(setting, Value::from_num(0.4)).expect("a valid setting");
+    }
+    let corners = [(3000, 3000), (6000, 3500), (4000, 5000), (5000, 4500), (4500, 5500)];
+    for count in 1..=corners.len() {
+        let target = |(at, &(x, y)): (usize, &(i32, i32))| Target {
+            point: PagePoint { x, y },
+            ink: (at > 0).then_some(LineType::Full),
+        };
+        let targets: Vec<Target> = corners[..count].iter().enumerate().map(target).collect();
+        let mut blocks = std::vec![Block::EMPTY; 32];
+        let pins = PulserState::new();
+        let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
+        let (mut path, mut events) = (TargetList::new(&targets), Events::default());
+        machine.start(&mut path).expect("within the travel");
+        machine.fill(&mut path, &mut events);
+        assert_eq!(machine.planned_position(), targets[count - 1].point, "{count}");
+    }
+}

@@ -350,11 +350,16 @@ mod tests {
 
     /// A block of some chords, each as long as it has moves, times a thousand units.
     fn joined(chords: &[(i32, i32)]) -> Block {
+        joined_of(chords.iter().map(|&(dx, dy)| (dx, dy, 1000)))
+    }
+
+    /// A block of some chords, each move of which has a length of its own.
+    fn joined_of(chords: impl Iterator<Item = (i32, i32, u32)>) -> Block {
         let limits = Limits { centripetal: false, ..Limits::default() };
         let mut memory = [Block::EMPTY; 1];
         let mut ring = Lookahead::new(&mut memory);
-        for &(dx, dy) in chords {
-            let length = PathLength::from_bits(1000 * Line::by(dx, dy).remaining());
+        for (dx, dy, move_length) in chords {
+            let length = PathLength::from_bits(move_length * Line::by(dx, dy).remaining());
             let line = Block { dx, dy, length, ..Block::EMPTY };
             if !ring.join(&line, &limits) {
                 ring.push(line).expect("room");
@@ -399,6 +404,23 @@ mod tests {
         for least in 0..20_000u64 {
             let stand = course.to_whole_step(least << 14);
             assert_eq!(stand, (least.div_ceil(1000) * 1000) << 14, "{least}");
+        }
+    }
+
+    #[test]
+    fn a_stop_is_behind_a_move_of_the_chord_in_which_it_is() {
+        let lengths = [1000, 1300, 700, 1500, 900];
+        let chords = CHORDS.into_iter().zip(lengths).map(|((dx, dy), length)| (dx, dy, length));
+        let course = BlockCursor::new(&joined_of(chords.clone()), PathLength::ZERO);
+        let mut places = std::vec![0];
+        for (dx, dy, length) in chords {
+            for _ in Line::by(dx, dy) {
+                places.push(places[places.len() - 1] + u64::from(length));
+            }
+        }
+        for least in 0..=places[places.len() - 1] {
+            let expected = places.iter().find(|place| **place >= least).expect("a place");
+            assert_eq!(course.to_whole_step(least << 14), expected << 14, "{least}");
         }
     }
 }

@@ -326,3 +326,53 @@ pub trait EventQueue {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tape_holds_moves_and_whether_the_pen_is_up_or_down() {
+        for height in 0..128u8 {
+            let expected = if height < 64 { Instruction::PenUp } else { Instruction::PenDown };
+            assert_eq!(StepEvent::pen(height, 7).instruction(), Some(expected), "{height}");
+        }
+        assert_eq!(StepEvent::lift(true, false, 7).instruction(), None);
+        let up = StepEvent::levels(StepEvent::STEP_Y | StepEvent::DRIVERS_ON, 7);
+        assert_eq!(up.instruction(), Some(Instruction::Move(Direction::Up)));
+        let left = StepEvent::levels(StepEvent::STEP_X | StepEvent::DOWN_X, 7);
+        assert_eq!(left.instruction(), Some(Instruction::Move(Direction::Left)));
+        let slack = StepEvent::levels(StepEvent::STEP_X | StepEvent::AT_REST, 7);
+        assert_eq!(slack.instruction(), None);
+    }
+
+    #[test]
+    fn a_word_tells_one_thing() {
+        let step = StepEvent::levels(StepEvent::STEP_X | StepEvent::DOWN_Y, 9);
+        let direction = StepEvent::levels(StepEvent::DOWN_X | StepEvent::DRIVERS_ON, 9);
+        let slack =
+            StepEvent::levels(StepEvent::STEP_Y | StepEvent::DOWN_Y | StepEvent::AT_REST, 9);
+        let pen = StepEvent::pen(65, 9);
+        let lift = StepEvent::lift(true, true, 9);
+        for event in [step, direction, slack, pen, lift] {
+            assert!(!event.is_told() && event.ticks() == 9, "{event:?}");
+            assert_eq!(event.is_step(), event == step, "{event:?}");
+            assert_eq!(event.is_slack(), event == slack, "{event:?}");
+            assert_eq!(StepEvent::from_bits(event.to_bits()), event);
+        }
+        assert_eq!(step.step(), (1, 0));
+        assert_eq!((slack.step(), slack.pulses()), ((0, 0), (0, -1)));
+        assert_eq!([direction, pen, lift].map(StepEvent::pulses), [(0, 0); 3]);
+        assert_eq!(pen.kind(), EventKind::Pen { height: 65 });
+        for (step, down) in [(false, false), (false, true), (true, false), (true, true)] {
+            assert_eq!(StepEvent::lift(step, down, 9).kind(), EventKind::Lift { step, down });
+        }
+        for start in [LengthStart::Next, LengthStart::AfterNext, LengthStart::Anew] {
+            let told = StepEvent::step_length(0xABCD, start);
+            assert!(told.is_told() && !told.skips_next());
+            assert_eq!(told.told_length(), (0xABCD, start));
+        }
+        let skip = StepEvent::skip_next();
+        assert!(skip.is_told() && skip.skips_next());
+    }
+}

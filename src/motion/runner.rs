@@ -1109,3 +1109,6 @@ impl<'m> Runner<'m> {
 fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
     before == after && matches!(after, None | Some(LineType::Full))
 }
+
+#[cfg(test)]
+mod tests;

@@ -70,3 +70,22 @@ impl<'l> SteadySpeed<'l> {
         self.lowest.min(self.bends.take_lowered()).max(PathLength::DELTA)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stretch_counts_its_moves_and_ends_at_a_sharp_corner() {
+        let limits = Limits::new(&super::super::limits::tests::settings()).expect("valid");
+        let mut stretch = SteadySpeed::new(&limits, PagePoint { x: 100, y: 100 });
+        assert_eq!(stretch.moves(), 0);
+        for moves in 1..=20 {
+            assert!(stretch.add(PagePoint { x: 100 + 50 * moves, y: 100 + moves * moves / 2 }));
+            assert_eq!(stretch.moves(), moves.unsigned_abs());
+        }
+        assert!(!stretch.add(PagePoint { x: 100, y: 300 }), "it turns back");
+        assert_eq!(stretch.moves(), 20);
+        assert!(stretch.limit() < PathLength::MAX);
+    }
+}

@@ -529,4 +529,65 @@ mod tests {
             choose_first(&points, &mut segments, options, pen, scratch, &mut CancelAfter(3));
         assert_eq!(first, Err(OrderError::Aborted));
     }
+    /// Says the same of any strokes.
+    struct Always(u64);
+
+    impl Meanwhile for Always {
+        fn milliseconds(&self, _: u32, _: u64) -> u64 {
+            self.0
+        }
+    }
+
+    #[test]
+    fn strokes_are_chosen_until_they_take_as_long_as_the_order_and_a_second_more() {
+        let (points, before) = polylines::<u16>(600, 1, 1);
+        let mut memory = std::vec![0; 1 << 17];
+        let drawing = Drawing { points: &points, segments: &before };
+        let scratch = Scratch::new(&mut memory);
+        let (order_takes, _) =
+            milliseconds_to_order(drawing, scratch, &mut NeverCancel).expect("room");
+        let enough = order_takes + SPARE_MILLISECONDS;
+        for (each, parts) in [(enough / 4, 4), (enough / 4 + 1, 4), (enough / 4 - 1, 5)] {
+            let mut segments = before.clone();
+            let (scratch, options) = (Scratch::new(&mut memory), Options::default());
+            // An order that takes a multiple of four is needed for the first row.
+            assert_eq!(enough % 4, 0);
+            let pen = Always(each);
+            let first =
+                choose_first(&points, &mut segments, options, &pen, scratch, &mut NeverCancel);
+            assert_eq!(first.expect("room").parts, parts, "{each} of {enough}");
+        }
+    }
+
+    /// Counts the calls.
+    struct Calls(u32);
+
+    impl Cancel for Calls {
+        fn check(&mut self) -> Result<(), Aborted> {
+            self.0 += 1;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn while_the_pen_is_busy_the_rest_is_improved_for_longer() {
+        let (points, mut segments) = polylines::<u16>(600, 1, 3);
+        let mut memory = std::vec![0; 1 << 17];
+        let options = Options::default();
+        let scratch = Scratch::new(&mut memory);
+        let first =
+            choose_first(&points, &mut segments, options, &Pen(500), scratch, &mut NeverCancel)
+                .expect("room");
+        let [short, long] = [0, 60_000].map(|spare_milliseconds| {
+            let mut tour = std::vec![Leg::new(0, false); segments.len()];
+            let (drawn, rest) = tour.split_at_mut(first.segments);
+            first_legs(drawn);
+            let drawing = Drawing { points: &points, segments: &segments };
+            let (first, mut calls) = (First { spare_milliseconds, ..first }, Calls(0));
+            let scratch = Scratch::new(&mut memory);
+            let report = order_rest(drawing, first, drawn, options, scratch, &mut calls, rest);
+            (report.expect("an order").pen_up, calls.0)
+        });
+        assert!(long.0 < short.0 && long.1 > 2 * short.1, "{short:?} {long:?}");
+    }
 }

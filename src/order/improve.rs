@@ -466,3 +466,21 @@ fn next_move<I: Index>(
     }
     Ok(None)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tour_is_begun_at_each_corner_of_the_page() {
+        let ends = [-1000, 1000];
+        let points = ends.map(|x| ends.map(|y| PagePoint { x, y }));
+        let nearest = CORNERS.map(|corner| {
+            let far = |point: &&PagePoint| from_corner(**point, corner);
+            points.iter().flatten().min_by_key(far).expect("a point")
+        });
+        for (at, point) in nearest.iter().enumerate() {
+            assert!(!nearest[..at].contains(point), "{nearest:?}");
+        }
+    }
+}

@@ -157,3 +157,68 @@ fn large_drawings_have_tours_no_longer_than_they_had() {
         }
     }
 }
+
+#[test]
+fn a_drawing_of_more_segments_than_a_tour_can_number_is_refused() {
+    let points = [PagePoint { x: 0, y: 0 }, PagePoint { x: 1, y: 1 }];
+    for (count, is_refused) in [(32_767, false), (32_768, true)] {
+        let segments = std::vec![Segment::new(0u16, 1).inked(LineType::Full, 0); count];
+        let mut tour = std::vec![Leg::new(0, false); count];
+        let drawing = Drawing { points: &points, segments: &segments };
+        // One that is not refused for its number lacks memory.
+        let options = Options::default();
+        let report = order(drawing, options, Scratch::new(&mut []), &mut NeverCancel, &mut tour);
+        assert_eq!(report == Err(OrderError::TooManySegments), is_refused, "{report:?}");
+        assert!(report.is_err());
+    }
+}
+
+#[test]
+fn with_more_memory_no_order_fails_that_was_found_with_less() {
+    for (segments, reach, shape) in
+        [(30, 60, Shape::OpenPath), (30, 60, Shape::ClosedCycle), (40, 6, Shape::ClosedCycle)]
+    {
+        let (points, segments) = drawing(segments, reach, 5);
+        let drawing = Drawing { points: &points, segments: &segments };
+        let options = Options { shape, effort: Effort::Units(1), ..Options::default() };
+        let mut tour = std::vec![Leg::new(0u16, false); segments.len()];
+        let mut is_enough = false;
+        for words in 0..800 {
+            let mut memory = std::vec![0; words];
+            let scratch = Scratch::new(&mut memory);
+            match order(drawing, options, scratch, &mut NeverCancel, &mut tour) {
+                Ok(_) => is_enough = true,
+                Err(error) => assert!(!is_enough, "{words} words: {error:?}"),
+            }
+        }
+        assert!(is_enough);
+    }
+}
+
+#[test]
+fn lines_in_pieces_need_little_more_memory_than_whole_ones() {
+    let least_words = |pieces: i32| {
+        let (mut points, mut segments) = (Vec::new(), Vec::new());
+        for line in 0..20 {
+            for at in 0..=pieces {
+                let x = 97 * (line % 5) + 30 * at / pieces;
+                points.push(PagePoint { x, y: 61 * (line / 5) + line % 3 * at });
+                if at > 0 {
+                    let last = points.len() as u16 - 1;
+                    segments.push(Segment::new(last - 1, last).inked(LineType::Full, 0));
+                }
+            }
+        }
+        let drawing = Drawing { points: &points, segments: &segments };
+        let mut tour = std::vec![Leg::new(0u16, false); segments.len()];
+        let mut is_enough = |words: &usize| {
+            let mut memory = std::vec![0; *words];
+            let scratch = Scratch::new(&mut memory);
+            order(drawing, Options::default(), scratch, &mut NeverCancel, &mut tour).is_ok()
+        };
+        (0..2000).find(&mut is_enough).expect("some memory is enough")
+    };
+    let [whole, in_pieces] = [1, 3].map(least_words);
+    // Of the 40 points within lines, each needs some numbers of 16 bits.
+    assert!(in_pieces <= whole + 40, "{whole} and {in_pieces} words");
+}

@@ -264,4 +264,20 @@ mod tests {
             assert_eq!(requests(bytes).len(), 1, "{bytes:?}");
         }
     }
+
+    #[test]
+    fn each_byte_asks_for_something_else_and_a_set_holds_all_that_was_put_in() {
+        let (mut all, mut each) = (RealTime::default(), Vec::new());
+        for byte in *b"?!~\x18\x85\x90\x91\x92\x93\x94\x95\x96\x97\xFB\xFD" {
+            let found = requests(&[b' ', byte]);
+            let [request] = found[..] else { panic!("{byte:#x}: {found:?}") };
+            assert!(!all.has(request), "{byte:#x}");
+            all = all.and(request);
+            each.push(request);
+            assert!(each.iter().all(|request| all.has(*request)), "{byte:#x}");
+            assert!(each.len() == 1 || !request.has(all), "{byte:#x}");
+        }
+        assert_eq!(requests(b"\x84"), [RealTime::HOLD]);
+        assert_eq!(requests(b"\xC3\x85\x85"), [RealTime::CANCEL_JOG], "a letter, and a byte");
+    }
 }

@@ -466,4 +466,21 @@ mod tests {
         assert_eq!(refused(at(0, 6)), None);
         assert_eq!(refused(at(0, 7)), Some(ArcError::EndOffCircle));
     }
+    #[test]
+    fn an_arc_is_refused_beyond_its_greatest_extent() {
+        const MOST: i32 = 1 << 22;
+        for turned in [false, true] {
+            let point = |far: i32| if turned { at(0, -far) } else { at(far, 0) };
+            let arc = |far: i32| Arc::new(at(0, 0), point(far), point(-far), Turn::Clockwise);
+            assert!(arc(MOST).is_ok());
+            assert_eq!(arc(MOST + 1).err(), Some(ArcError::TooWide));
+            // Steps of x and y count as so many units.
+            let weighted = |weight: u16| {
+                let turn = Turn::Clockwise;
+                Arc::weighted([weight; 2], at(0, 0), point(MOST), point(-MOST), turn)
+            };
+            assert!(weighted(256).is_ok());
+            assert_eq!(weighted(257).err(), Some(ArcError::TooWide));
+        }
+    }
 }

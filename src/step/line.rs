@@ -272,4 +272,10 @@ mod tests {
         }
         assert_eq!((x, y), (far, 1 - far));
     }
+
+    #[test]
+    fn the_greatest_offset_is_just_less_than_half_a_step() {
+        let most = i32::from(Line::GREATEST_OFFSET);
+        assert!(2 * most < Line::OFFSET_UNIT && 2 * (most + 1) > Line::OFFSET_UNIT);
+    }
 }

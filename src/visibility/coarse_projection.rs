@@ -452,4 +452,37 @@ mod tests {
         assert!(undecided < 64 * 64 * 64 / 20, "{undecided}");
         Ok(())
     }
+    /// Where an edge is cut, its ends are rounded to points that are none of the scene's.
+    #[cfg(feature = "tiles")]
+    #[test]
+    fn whatever_is_rounded_from_between_vertices_lies_within_the_margin() {
+        let ends = [
+            [Vertex::new(-70_000, 300, 90_001), Vertex::new(50_001, 77_000, 524_288)],
+            [Vertex::new(-300, -40, 501), Vertex::new(17, 33, 777)],
+            [Vertex::new(-9, 4, 11), Vertex::new(12, 13, 401)],
+            // On one line of sight.
+            [Vertex::new(10_000, -20_000, 300_000), Vertex::new(17_000, -34_000, 510_000)],
+        ];
+        for vertices in ends {
+            for projection in [Projection::Perspective, Projection::Parallel] {
+                let places = vertices.map(|vertex| page_position(projection, vertex));
+                let [low, high] = [i64::min, i64::max].map(|choose| {
+                    let [x, y] = [0, 1].map(|axis: usize| choose(places[0][axis], places[1][axis]));
+                    (x, y)
+                });
+                let (low, high) = with_margin(projection, &vertices, low, high);
+                for part in 0..=997 {
+                    let between = |a: i32, b: i32| {
+                        libm::round(f64::from(a) + f64::from(b - a) * f64::from(part) / 997.0)
+                    };
+                    let [a, b] = vertices;
+                    let [x, y, z] = [between(a.x, b.x), between(a.y, b.y), between(a.z, b.z)]
+                        .map(|at| at as i32);
+                    let [x, y] = page_position(projection, Vertex::new(x, y, z));
+                    let is_within = (low.0..=high.0).contains(&x) && (low.1..=high.1).contains(&y);
+                    assert!(is_within, "{projection:?} {vertices:?} at {part}");
+                }
+            }
+        }
+    }
 }

@@ -245,3 +245,63 @@ fn faces_that_pass_through_each_other_have_a_seam() {
         }
     }
 }
+
+#[test]
+fn a_scene_of_more_corners_than_can_be_numbered_is_refused() {
+    let vertices = [Vertex::new(0, 0, 1), Vertex::new(1, 0, 1)];
+    for (count, is_refused) in [(65_535, false), (65_536, true)] {
+        let corners: Vec<Corner> =
+            (0..count).map(|at| Corner::new((at % 2) as u16, true, at % 2 == 1)).collect();
+        let scene = Scene {
+            vertices: &vertices,
+            elements: Elements::new(&corners),
+            projection: Projection::Parallel,
+            unrounded: Unrounded::UNKNOWN,
+        };
+        // One that is not refused for its number lacks memory.
+        let scratch = Scratch::new(&mut []);
+        let mut found = Stretches::default();
+        let result =
+            find_stretches(&scene, Options::default(), scratch, &mut NeverCancel, &mut found);
+        let is_too_many = result == Err(VisibilityError::TooManyCorners(65_535));
+        assert_eq!(is_too_many, is_refused, "{result:?}");
+        assert!(result.is_err());
+    }
+}
+
+/// A large square that leans a little away from the eye covers most cells. Before its farther part
+/// lies a small one, and between both a bar, all within one unit of the coarse depth.
+#[test]
+fn a_face_hides_although_its_coarse_depth_is_that_of_a_cover() {
+    for lowest in 0..32 {
+        let at = |x, y, z| Vertex { x, y, z: 1000 + lowest + z };
+        let cover = [(-400, 0), (400, 0), (400, 30), (-400, 30)]
+            .map(|(x, far)| at(1000 * x, 1000 * (far / 15 * 400 - 400), far));
+        // There the large one is at 22 or beyond.
+        let small =
+            [(4, 21), (9, 21), (9, 29), (4, 29)].map(|(x, y)| at(10_000 * x, 10_000 * y, 20));
+        let bar = [at(45_000, 220_000, 21), at(85_000, 280_000, 21)];
+        // Behind all of them, so that there are many cells.
+        let others = (0..60).map(|n| at(1000 * n, 1000 * (n % 3 % 2), 90));
+        let vertices: Vec<Vertex> =
+            cover.into_iter().chain(small).chain(bar).chain(others).collect();
+        let corners: Vec<Corner> = (0..70u16)
+            .map(|vertex| {
+                let is_last = matches!(vertex, 3 | 7 | 9) || vertex > 9 && vertex % 3 == 0;
+                Corner::new(vertex, matches!(vertex, 8 | 9), is_last)
+            })
+            .collect();
+        let scene = Scene {
+            vertices: &vertices,
+            elements: Elements::new(&corners),
+            projection: Projection::Parallel,
+            unrounded: Unrounded::UNKNOWN,
+        };
+        let options = Options { with_hidden: true, ..Options::default() };
+        let found = stretches(&scene, options, 1 << 14);
+        let of_bar: Vec<&Stretch> =
+            found.iter().filter(|stretch| stretch.edge == Some((8, 9))).collect();
+        let [whole] = of_bar[..] else { panic!("{of_bar:?}") };
+        assert!(!whole.visible, "{lowest}: {of_bar:?}");
+    }
+}

@@ -2,6 +2,7 @@
 
 use crate::event_checker;
 use crate::motion_cases::Case;
+use crate::motion_paths::STEPS_PER_MM;
 use crate::order_reference::Sheet;
 use crate::pin_machine;
 use penup::drawing::{LineType, PagePoint};
@@ -13,13 +14,18 @@ use std::collections::BTreeSet;
 /// The most points. The reference for the order is slow.
 const MOST_POINTS: usize = 60;
 
+/// For how many seconds at most the machine goes from point to point, in the order of the input and
+/// at the least speed. A main loop that was simulated for hours would take the fuzzer's time.
+const MOST_SECONDS: f64 = 60.0;
+
 /// Orders a drawing and draws it, while the user holds and goes on, and changes the speed. The
 /// order must draw each line once, the pins must keep every rule and limit and ink just the lines,
 /// and the pen must end raised.
 ///
 /// The first eight bytes choose the speed, the acceleration, the jerk, the junction deviation, how
 /// late the main loop is, and two holds and an override. Each further pair of bytes is a point, in
-/// tenths of a millimetre; a point that lies at the right border ends a stroke instead.
+/// tenths of a millimetre; a point that lies at the right border ends a stroke instead. Points too
+/// far away are left out.
 pub fn fuzz(input: &[u8]) {
     let [speed, acceleration, jerk, deviation, late, holds @ .., percent] = match *input {
         [a, b, c, d, e, f, g, h, ..] => [a, b, c, d, e, f, g, h],
@@ -31,12 +37,22 @@ pub fn fuzz(input: &[u8]) {
         jerk: if jerk < 64 { 0.0 } else { 100.0 * 1.03_f64.powi(jerk.into()) },
         deviation: f64::from(deviation % 16) / 100.0,
     };
+    let percent = percent.clamp(10, 200);
     let mut strokes = vec![Vec::new()];
+    let (mut at, mut seconds) = ([0; 2], 0.0);
     for pair in input[8..].chunks_exact(2).take(MOST_POINTS) {
         let [x, y] = [pair[0], pair[1]].map(|tenths| 10 * i32::from(tenths));
-        match strokes.last_mut() {
-            Some(stroke) if pair[0] < 0xFF => stroke.push((x, y)),
-            _ => strokes.push(Vec::new()),
+        if pair[0] == 0xFF {
+            strokes.push(Vec::new());
+            continue;
+        }
+        let way = f64::from(x - at[0]).hypot(f64::from(y - at[1])) / STEPS_PER_MM;
+        let takes = way / (case.speed * f64::from(percent.min(100)) / 100.0);
+        if seconds + takes <= MOST_SECONDS
+            && let Some(stroke) = strokes.last_mut()
+        {
+            (at, seconds) = ([x, y], seconds + takes);
+            stroke.push((x, y));
         }
     }
     let sheet = Sheet::from_polylines(&strokes);
@@ -54,7 +70,7 @@ pub fn fuzz(input: &[u8]) {
         if !started {
             started = true;
             turn.machine.start(&mut first).expect("within the travel");
-            turn.machine.set_override(percent.clamp(10, 200));
+            turn.machine.set_override(percent);
         }
         if holds.next_if(|at| turn.now >= *at).is_some() {
             turn.machine.hold();

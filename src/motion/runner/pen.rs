@@ -268,3 +268,50 @@ impl Runner<'_> {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::tests::{Events, PEN, push};
+    use super::*;
+    use crate::drawing::LineType;
+    use crate::motion::limits::tests::settings;
+    use crate::motion::{Block, EventKind, Limits};
+
+    /// A runner that is to travel and then to draw a stroke. The pen may go down so long before.
+    fn runner(blocks: &mut [Block], down_ticks: u32) -> Runner<'_> {
+        let overlap = PenOverlap { down_ticks, up_ticks: 1_000_000 };
+        let limits = Limits::new(&settings()).expect("valid");
+        let mut runner = Runner::new(limits, PenPositions { down_ticks, overlap, ..PEN }, blocks);
+        push(&mut runner, [3000, 0], None);
+        push(&mut runner, [5000, 0], Some(LineType::Full));
+        runner
+    }
+
+    #[test]
+    fn the_pen_is_told_between_two_steps_and_not_just_behind_one() {
+        for down_ticks in (6_000_000..9_000_000).step_by(33_370) {
+            let mut blocks = [Block::EMPTY; 8];
+            let (mut runner, mut events) = (runner(&mut blocks, down_ticks), Events::default());
+            assert_eq!(runner.capacity(), 8);
+            while runner.produce(&mut events) == Ok(Progress::More) {}
+            let is_down = |event: &StepEvent| event.kind() == EventKind::Pen { height: 100 };
+            let told = events.0.iter().position(is_down).expect("the pen goes down");
+            let [before, pen, behind] = [told - 1, told, told + 1].map(|at| events.0[at]);
+            assert!(before.is_step() && behind.is_step(), "while the machine moves");
+            let (before, behind) = (f64::from(before.ticks()), f64::from(pen.ticks()));
+            assert!(before > 0.9 * behind, "{down_ticks}: {before} {behind}");
+        }
+    }
+
+    #[test]
+    fn a_pen_that_somebody_else_has_raised_is_not_on_its_way_down() {
+        let mut blocks = [Block::EMPTY; 8];
+        let (mut runner, mut events) = (runner(&mut blocks, 1_500_000), Events::default());
+        while !runner.timing.is_lowering() {
+            assert_eq!(runner.produce(&mut events), Ok(Progress::More));
+        }
+        runner.forget_path(runner.page_end());
+        runner.forget_pen();
+        assert!(!runner.timing.is_lowering() && !runner.is_pen_up());
+    }
+}

@@ -231,4 +231,15 @@ mod tests {
         let is_sorted = entries.is_sorted_by(|one, next| one.number < next.number);
         assert!(is_sorted, "{entries:?}");
     }
+    #[test]
+    fn each_error_is_told_in_a_sentence() {
+        for error in error_samples() {
+            let text = std::format!("{error}");
+            assert!(text.len() > 8, "{error:?}: {text}");
+            #[cfg(feature = "tiles")]
+            if let CommandError::Stored(stored) = error {
+                assert_eq!(std::format!("{stored}"), text);
+            }
+        }
+    }
 }
