@@ -43,7 +43,8 @@ fn cut_settings(board: &mut RecordedPico, effort: Effort, random: &mut Random) -
     board.order(["$131=300", "$131=301"])?;
     board.record(|board| board.order(["$130=123"]))?;
     let mut settings = OldOrNew { list: ["$$"], values: ["$130=420.000", "$130=123.000"] };
-    board.try_all(&mut settings, effort, random)
+    board.try_all(&mut settings, effort, random)?;
+    board.try_instants_of_writes(&mut settings, effort, random)
 }
 
 /// The record of parameters.
@@ -51,7 +52,8 @@ fn cut_parameters(board: &mut RecordedPico, effort: Effort, random: &mut Random)
     board.order(["G10 L2 P2 X1 Y2", "G10 L2 P1 X3 Y4"])?;
     board.record(|board| board.order(["G10 L2 P1 X5 Y6"]))?;
     let mut parameters = OldOrNew { list: ["$#"], values: ["[G54:3.000", "[G54:5.000"] };
-    board.try_all(&mut parameters, effort, random)
+    board.try_all(&mut parameters, effort, random)?;
+    board.try_instants_of_writes(&mut parameters, effort, random)
 }
 
 /// Draws the old job and records the new one.
@@ -88,7 +90,7 @@ fn cut_points(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> 
     let mut job = KeptJob { old, new: Job::new(lines) };
     record_job(board, &job)?;
     board.try_all(&mut job, effort, random)?;
-    board.try_instants(&mut job, Effort { instants: effort.instants / 10, ..effort }, random)
+    board.try_instants(&mut job, effort, random)
 }
 
 /// A drawing that is sent while it is drawn, over another one that was.
@@ -109,7 +111,7 @@ fn cut_streamed(board: &mut RecordedPico, effort: Effort, random: &mut Random) -
     let lines = new.lines(0);
     board.record(|board| board.order(lines.iter().map(String::as_str)))?;
     board.try_all(&mut new, effort, random)?;
-    board.try_instants(&mut new, Effort { instants: effort.instants / 10, ..effort }, random)
+    board.try_instants(&mut new, effort, random)
 }
 
 /// A model that is larger than the memory, over another one.
