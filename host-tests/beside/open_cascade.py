@@ -2,7 +2,8 @@
 
 FILE is an OBJ file of flat faces; EYE and AT are three numbers with commas between them. The script
 prints `ready` when the solid is in memory. Then it finds the visible lines once for each line of
-its standard input, and prints the milliseconds and the length of these lines.
+its standard input, and prints the milliseconds of processor time and the length of
+these lines.
 
 The projection is a parallel one: in perspective, this algorithm also draws faces that only their
 distance from the eye turns away from it.
@@ -82,7 +83,7 @@ def main():
     print("ready", flush=True)
     ink = None
     for _ in sys.stdin:
-        began = time.perf_counter()
+        began = time.thread_time()
         algorithm = HLRBRep_PolyAlgo()
         algorithm.Projector(projector)
         algorithm.Load(shell)
@@ -90,7 +91,7 @@ def main():
         # This asks for each edge what hides it. Its lines become shapes only when they are wanted.
         found = HLRBRep_PolyHLRToShape()
         found.Update(algorithm)
-        milliseconds = 1000 * (time.perf_counter() - began)
+        milliseconds = 1000 * (time.thread_time() - began)
         if ink is None:
             kinds = found.VCompound(), found.OutLineVCompound()
             ink = sum(length(kind) for kind in kinds if kind is not None and not kind.IsNull())
