@@ -1,5 +1,5 @@
-"""Tries what vpype writes with each profile of vpype-gcode, sent line by line to an emulated
-board."""
+"""Tries what vpype writes with each profile of vpype-gcode, sent to an emulated board as senders for
+Grbl do."""
 
 import importlib.metadata
 import os
@@ -13,6 +13,9 @@ from board import Board, Checks, figure, wait_for
 
 HEIGHT = 80
 """The height of the page in millimetres."""
+
+BUFFER = 128
+"""The bytes that Grbl's receive buffer holds."""
 
 DIGIT = 0.0001
 """The last digit that every profile writes."""
@@ -77,17 +80,35 @@ port.write(b"\x18")
 wait_for(lambda: port.readline().startswith(b"Grbl"), 20)
 
 
-def send(line):
-    """Sends a line, and returns its answer. Other lines may come before it: the greeting behind
-    `$RST=$` begins with an empty one."""
-    port.write(line.encode() + b"\n")
+def answer():
+    """The next answer to a line. Other lines may come before it: the greeting behind `$RST=$` begins
+    with an empty one."""
     while True:
         received = port.readline()
-        answer = received.decode().strip()
+        text = received.decode().strip()
         if not received:
-            sys.exit(f"there is no answer to {line}")
-        if answer == "ok" or answer.startswith("error"):
-            return answer
+            sys.exit("a line is not answered")
+        if text == "ok" or text.startswith("error"):
+            return text
+
+
+def send(line):
+    """Sends a line, and returns its answer."""
+    port.write(line.encode() + b"\n")
+    return answer()
+
+
+def stream(lines):
+    """Sends lines as senders for Grbl do, as many before the answers as its buffer holds, and yields
+    each line with its answer."""
+    waiting = []
+    for line in lines:
+        while waiting and sum(map(len, waiting)) + len(waiting) + len(line) >= BUFFER:
+            yield waiting.pop(0), answer()
+        port.write(line.encode() + b"\n")
+        waiting.append(line)
+    for line in waiting:
+        yield line, answer()
 
 
 def is_idle():
@@ -108,12 +129,11 @@ for profile, (downward, settings) in PROFILES.items():
     answers += [send(line) for line in settings]
     board.forget()
     with open(written) as file:
-        for line in file:
-            answer = send(line.rstrip("\n"))
-            # These boards have no switches: Grbl refuses homing while it is off.
-            answers.append("ok" if line.startswith("$H") and answer == "error:5" else answer)
+        # These boards have no switches: Grbl refuses homing while it is off.
+        answers += ["ok" if line.startswith("$H") and said == "error:5" else said
+                    for line, said in stream(line.rstrip("\n") for line in file)]
     wait_for(is_idle)
-    refused = [answer for answer in answers if answer != "ok"]
+    refused = [said for said in answers if said != "ok"]
     checks.check(f"{profile} is accepted", not refused, refused)
     # The ink is judged by what vpype has written, so that its rounding excuses nothing of ours.
     points, roundings = points_of(written)
