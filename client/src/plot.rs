@@ -129,7 +129,14 @@ impl Plot<'_> {
             return self.go_on(sender, known, progress);
         }
         let job = &self.source.job;
-        let compute = if self.args.from > 0 { Compute::Host } else { self.args.compute };
+        let compute = match self.args.from > 0 || self.args.reloop {
+            true if self.args.compute == Compute::Board => {
+                let reason = "--from and --reloop need this computer: leave out --compute board";
+                return Err(Error::NotStreamed { reason: reason.to_owned() });
+            }
+            true => Compute::Host,
+            false => self.args.compute,
+        };
         let choice = compute::choose(known, job, compute)?;
         if known.kept > 0 && choice.host.is_none() {
             self.note(&[format!(
@@ -149,7 +156,7 @@ impl Plot<'_> {
             let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
             return Err(Error::NotStreamed { reason: reason.to_owned() });
         }
-        let (streamed, report) = host.streamed(form, self.args.from)?;
+        let (streamed, report) = self.streamed(&mut host, form, self.args.from)?;
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(
             "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
@@ -157,11 +164,21 @@ impl Plot<'_> {
         )]);
         self.send(sender, &streamed, progress)?;
         // Strokes that were left out once are drawn from then on.
-        let whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
+        let whole = if passes > 1 { self.streamed(&mut host, form, 0)?.0 } else { streamed };
         for _ in 1..passes {
             self.send(sender, &whole, progress)?;
         }
         Ok(report)
+    }
+
+    /// Computes the drawing, to be sent without its first `from` strokes.
+    fn streamed(
+        &self,
+        host: &mut InMemory<u32>,
+        form: Form,
+        from: u32,
+    ) -> Result<(StreamedJob, Option<JobReport>), Error> {
+        host.streamed(form, from, self.args.reloop)
     }
 
     /// Sends the rest of this drawing, which a loss of power or a reset has stopped.
@@ -182,10 +199,10 @@ impl Plot<'_> {
             return Err(refused("this computer cannot compute it"));
         };
         // The drawing may have begun behind its first strokes, by --from.
-        let (mut whole, report) = host.streamed(Form::Strokes, 0)?;
+        let (mut whole, report) = self.streamed(&mut host, Form::Strokes, 0)?;
         let begin = whole.size().strokes.checked_sub(stopped.all);
         if let Some(begin) = begin.filter(|begin| *begin > 0) {
-            whole = host.streamed(Form::Strokes, begin)?.0;
+            whole = self.streamed(&mut host, Form::Strokes, begin)?.0;
         }
         let Some(begin) = begin.filter(|_| whole.id() == stopped.id) else {
             return Err(refused(
@@ -202,7 +219,7 @@ impl Plot<'_> {
         if self.args.at_origin {
             sender.ask(GO_ON_AT_ORIGIN)?;
         }
-        let mut rest = host.streamed(Form::Strokes, begin + stopped.drawn)?.0;
+        let mut rest = self.streamed(&mut host, Form::Strokes, begin + stopped.drawn)?.0;
         rest.set_id(stopped.id);
         let Stopped { drawn, all, .. } = stopped;
         self.note(&[format!("{drawn} of {all} strokes are drawn: the rest is sent")]);
@@ -255,13 +272,13 @@ impl Plot<'_> {
         if !host.take(job) {
             return Err(busy());
         }
-        let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
+        let (mut streamed, report) = self.streamed(&mut host, Form::Strokes, self.args.from)?;
         let size = streamed.size().strokes;
         let drawn = taken.strokes.and_then(|all| size.checked_sub(all));
         if let Some(drawn) = drawn.filter(|drawn| *drawn > 0) {
             // The rest of a drawing that had stopped has the number of the whole.
             let id = streamed.id();
-            streamed = host.streamed(Form::Strokes, self.args.from + drawn)?.0;
+            streamed = self.streamed(&mut host, Form::Strokes, self.args.from + drawn)?.0;
             streamed.set_id(id);
         }
         if streamed.id() != taken.id || !streamed.skip(taken.targets) {

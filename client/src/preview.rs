@@ -12,7 +12,7 @@ use crate::planned::PlannedBoard;
 use penup::boards::host::CutFlash;
 use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
-use penup::machine::{Setting, Settings};
+use penup::machine::{Path, Setting, Settings};
 use penup::motion::TICKS_PER_SECOND;
 use penup::plotter::{Observer, Plotter, Unobserved};
 use penup::protocol::CommandError;
@@ -22,6 +22,7 @@ use penup::visibility::{EdgeParameter, Stretch};
 use penup_job::machine_settings::is_grid;
 use penup_job::path::{PagePoint, Run};
 use penup_job::protocol::{MODEL, PLOT};
+use penup_job::relooped::Relooped;
 use penup_job::results::{JobReport, JobResult, Lengths, Timings};
 use penup_job::room::Room;
 use penup_job::straight::{TOLERANCE, straightened};
@@ -138,8 +139,9 @@ impl<I: Index> InMemory<I> {
     }
 
     /// Computes the drawing of the model that was sent, as lines that a plotter draws while they
-    /// come, without its first `from` strokes, and the report on all of it. More work is spent on
-    /// the order than by a plotter, because a computer is faster.
+    /// come, without its first `from` strokes, and the report on all of it. Closed strokes begin at
+    /// random points if it `reloops`. More work is spent on the order than by a plotter, because a
+    /// computer is faster.
     ///
     /// # Errors
     /// The drawing is refused, does not fit the machine, or has no such form.
@@ -147,17 +149,28 @@ impl<I: Index> InMemory<I> {
         &mut self,
         form: Form,
         from: u32,
+        reloops: bool,
     ) -> Result<(StreamedJob, Option<JobReport>), Error> {
         self.plotter.set_thorough(true);
         let computed = self.plotter.compute(&mut StopWatch::default(), &mut Unobserved);
         computed.map_err(|refusal| Error::NotDrawn { refusal })?;
         let settings = *self.plotter.machine().settings();
+        let steps = self.steps_per_mm();
         let mut strokes = self.plotter.strokes();
+        let lengths = reloops.then(|| {
+            let strokes = strokes_of(&mut Relooped::of(&mut strokes), steps);
+            Lengths::of(&strokes.into_iter().map(|stroke| stroke.points).collect::<Vec<_>>())
+        });
         if from > 0 && !strokes.begin_at(from) {
             let reason = format!("it has no more than {from} strokes: nothing is left to draw");
             return Err(Error::NotStreamed { reason });
         }
-        let job = StreamedJob::new(&settings, &mut strokes, form).map_err(|error| match error {
+        let mut relooped = reloops.then(|| Relooped::of(&mut strokes));
+        let path: &mut dyn Path = match &mut relooped {
+            Some(relooped) => relooped,
+            None => &mut strokes,
+        };
+        let job = StreamedJob::new(&settings, path, form).map_err(|error| match error {
             StreamError::Machine(error) => {
                 Error::NotDrawn { refusal: CommandError::Machine(error) }
             }
@@ -176,6 +189,10 @@ impl<I: Index> InMemory<I> {
         let sent = String::from_utf8_lossy(&self.board.take_sent()).into_owned();
         let strokes = job.size().strokes.into();
         let report = sent.lines().find_map(|line| JobReport::parse(strokes, line.trim()));
+        let report = match lengths {
+            Some(lengths) => report.map(|report| report.with_moves_of(lengths)),
+            None => report,
+        };
         Ok((job, report))
     }
 

@@ -6,7 +6,8 @@
 //! user wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes
 //! what the plotter must then contain, and [`room`] the memory that takes. [`machine_settings`]
 //! makes the machine that a computer simulates. [`streamed`] makes lines
-//! of what this computer has computed. [`pins`] and [`watch`] follow the pen to its [`path`], whose
+//! of what this computer has computed, and [`relooped`] lets their closed strokes begin elsewhere.
+//! [`pins`] and [`watch`] follow the pen to its [`path`], whose
 //! steps [`straight`] makes lines of, and of which [`sampled`] keeps what a page shows. [`strokes`]
 //! and [`results`] tell what was drawn, [`picture`] shows it, and [`export`] writes it for other
 //! machines.
@@ -20,6 +21,8 @@ pub mod path;
 pub mod picture;
 pub mod pins;
 pub mod protocol;
+#[cfg(feature = "stream")]
+pub mod relooped;
 pub mod results;
 pub mod room;
 pub mod sampled;

@@ -140,6 +140,13 @@ impl JobReport {
         let [pen_down_mm, pen_up_mm, efficiency] = [down, up, efficiency].map(str::to_owned);
         Some(Self { strokes, pen_down_mm, pen_up_mm, efficiency })
     }
+
+    /// The same drawing with other moves between its strokes, as `lengths` says.
+    #[must_use]
+    pub fn with_moves_of(self, lengths: Lengths) -> Self {
+        let pen_up_mm = format!("{:.1}", lengths.pen_up_mm);
+        Self { pen_up_mm, efficiency: format!("{:.1}", 100.0 * lengths.efficiency()), ..self }
+    }
 }
 
 impl fmt::Display for JobReport {

@@ -641,6 +641,38 @@ fn everything_is_drawn_so_many_times() {
     assert!(said.starts_with("a.obj is drawn 3 times: 1 strokes, 50.0 mm drawn"), "{said}");
 }
 
+#[test]
+fn closed_lines_begin_at_random_points_if_the_user_wishes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let mut rows = String::new();
+    for number in 0..20_u32 {
+        let (x, first) = (10 + 4 * number, 4 * number + 1);
+        let corners = [[x, 10], [x + 3, 10], [x + 3, 60], [x, 60]];
+        corners.iter().for_each(|[x, y]| rows.push_str(&format!("v {x} {y} 0\n")));
+        let [a, b, c, d] = [0, 1, 2, 3].map(|corner| first + corner);
+        rows.push_str(&format!("l {a} {b} {c} {d} {a}\n"));
+    }
+    fs::write(folder.path().join("rows.obj"), rows).expect("written");
+    let plot = |options: &[&str]| {
+        let all = [&["plot", "rows.obj", "--port", "auto", "--json"], options].concat();
+        let (code, said, error) = plotter.run(folder.path(), &all);
+        assert_eq!(code, Some(0), "{error}");
+        let said: serde_json::Value = serde_json::from_str(&said).expect("JSON");
+        let length = |name: &str| said["drawn"][name].as_f64().expect("a number");
+        assert_eq!(length("pen_down_mm"), 2120.0);
+        length("pen_up_mm")
+    };
+    let (short, scattered) = (plot(&["--compute", "host"]), plot(&["--reloop"]));
+    assert!(short < 80.0 && scattered > 200.0, "{short} {scattered}");
+    // The rest of the drawing is that of the whole.
+    assert_eq!(plot(&["--reloop", "--from", "19"]), scattered);
+    let refused = ["plot", "rows.obj", "--port", "auto", "--reloop", "--compute", "board"];
+    let (code, _, error) = plotter.run(folder.path(), &refused);
+    assert_eq!(code, Some(1));
+    assert!(error.contains("--reloop need this computer: leave out --compute board"), "{error}");
+}
+
 /// Runs `penup setup` with these answers.
 fn set_up(plotter: &Library, answers: &str) -> (Option<i32>, serde_json::Value, String) {
     let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
