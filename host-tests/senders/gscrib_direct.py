@@ -71,8 +71,8 @@ attempt("a dwell", lambda: machine.sleep(0.1))
 attempt("a wait", lambda: machine.wait())
 attempt("relative moves", lambda: (machine.set_distance_mode("relative"), machine.move(x=1),
                                    machine.set_distance_mode("absolute")))
-# A second of idleness ends the program, which has shown Z; the next one shows M3 and M5.
-time.sleep(2)
+# It ends the program, which has shown Z; the next one shows M3 and M5.
+machine.write("M2")
 attempt("back to the origin", lambda: machine.rapid(x=0, y=0))
 machine.write("G4 P0")
 board.forget()

@@ -16,8 +16,8 @@ pub struct Relooped {
 }
 
 impl Relooped {
-    /// Reads all of `path`, and rewinds it. The point at which a stroke begins depends on the stroke
-    /// alone, so the rest of a drawing has the same strokes as the whole.
+    /// Reads all of `path`, and rewinds it. The point at which a stroke begins depends on the
+    /// stroke alone, so the rest of a drawing has the same strokes as the whole.
     ///
     /// ```
     /// use penup::drawing::{LineType, PagePoint};
@@ -68,7 +68,8 @@ impl Path for Relooped {
     }
 }
 
-/// Lets a stroke begin at another of its points if it is closed. Its first target is the move there.
+/// Lets a stroke begin at another of its points if it is closed. Its first target is the move to
+/// its begin.
 fn reloop(stroke: &mut [StreamedTarget]) {
     let [begin, lines @ ..] = stroke else { return };
     let is_closed = lines.last().is_some_and(|last| last.target.point == begin.target.point);

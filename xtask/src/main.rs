@@ -18,6 +18,7 @@ mod beside;
 mod command;
 mod corpus;
 mod dependencies;
+mod dist;
 mod experiments;
 mod flash;
 mod firmware;
@@ -77,6 +78,9 @@ enum Task {
         #[arg(long, value_parser = board::parser(), default_value = flash::default_board())]
         board: &'static BoardRow,
     },
+    /// Builds the client, the page and the images of the boards, and puts them into target/dist
+    /// with manual pages and completions, for a computer of the same kind that has no compiler.
+    Dist,
     /// Plots FILE on the emulated board; the same as `cargo plot`. Its own --help says how.
     #[command(disable_help_flag = true)]
     Plot {
@@ -286,6 +290,7 @@ fn carry_out() -> Result<()> {
         Some(Task::Mesh) => large::mesh()?,
         Some(Task::Senders(arguments)) => senders::try_all(&arguments)?,
         Some(Task::Corpus(arguments)) => corpus::draw_all(&arguments)?,
+        Some(Task::Dist) => dist::dist()?,
         Some(Task::Panics) => panics::list()?,
         Some(Task::Deny) => dependencies::deny()?,
         Some(Task::Fuzz { seconds, target }) => fuzz::fuzz(seconds, target.as_deref())?,

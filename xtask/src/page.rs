@@ -47,7 +47,7 @@ pub fn build() -> Result<()> {
 }
 
 /// The folder of the page that was built.
-fn folder() -> PathBuf {
+pub fn folder() -> PathBuf {
     crate::root().join("target/page")
 }
 

@@ -11,6 +11,7 @@ use crate::serve::PageServer;
 use crate::table::BoardRow;
 use crate::workspace;
 use clap::Args;
+use std::env;
 use std::io::{self, Write as _};
 use std::path::PathBuf;
 
@@ -20,7 +21,8 @@ pub struct PageArgs {
     /// The file to show [default: an example]
     #[arg(value_name = "FILE")]
     pub file: Option<PathBuf>,
-    /// The folder that `cargo xtask page` has built [default: that of this checkout]
+    /// The folder of the page [default: page beside this program, or what `cargo xtask page` has
+    /// built in this checkout]
     #[arg(long, value_name = "FOLDER")]
     pub folder: Option<PathBuf>,
     /// The port to listen at, on this computer alone; 0 takes one that is free
@@ -46,13 +48,20 @@ pub struct PageArgs {
     pub no_browser: bool,
 }
 
+/// The folder of the page: beside this program if it came with one, else in the checkout.
+fn built_page() -> PathBuf {
+    let beside = env::current_exe().ok().and_then(|program| Some(program.parent()?.join("page")));
+    let built = beside.filter(|folder| folder.join("index.html").is_file());
+    built.unwrap_or_else(|| workspace::root().join("target/page"))
+}
+
 /// Serves the page until the process ends.
 ///
 /// # Errors
 /// The page is not built, the file cannot be read, the port is in use, or the plotter cannot be
 /// joined.
 pub fn serve(args: &PageArgs) -> Result<Outcome, Error> {
-    let folder = args.folder.clone().unwrap_or_else(|| workspace::root().join("target/page"));
+    let folder = args.folder.clone().unwrap_or_else(built_page);
     let bridge = bridge(args)?;
     let server = PageServer::new(&folder, args.file.as_deref(), args.listen, bridge)?;
     let address = server.address();
