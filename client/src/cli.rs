@@ -266,8 +266,8 @@ pub struct PlotArgs {
         help_heading = "Plotter"
     )]
     pub from: u32,
-    /// Begin closed lines at random points, so that the marks of the pen do not stand in a row; this
-    /// computer then computes the drawing. Else they begin where the moves between lines become
+    /// Begin closed lines at random points, so that the marks of the pen do not stand in a row;
+    /// this computer then computes the drawing. Else they begin where the moves between lines become
     /// short
     #[arg(long, help_heading = "Plotter")]
     pub reloop: bool,

@@ -193,8 +193,8 @@ fn ask(candidate: &Candidate) -> (Port, Option<SerialLink>) {
     }
 }
 
-/// Whether a port cannot be opened because another program uses it. On Windows the library reports a
-/// port that does not exist by the same kind of error.
+/// Whether a port cannot be opened because another program uses it. On Windows the library reports
+/// a port that does not exist by the same kind of error.
 fn is_held(device: &str, error: &serialport::Error) -> bool {
     let is_listed = |ports: Vec<SerialPortInfo>| ports.iter().any(|port| port.port_name == device);
     error.kind() == serialport::ErrorKind::NoDevice

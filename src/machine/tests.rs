@@ -2,27 +2,14 @@
 
 use super::*;
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{Block, EventKind, EventQueue, StepEvent, TICKS_PER_SECOND};
+use crate::motion::event::tests::Events;
+use crate::motion::{Block, EventKind, TICKS_PER_SECOND};
 use crate::step::Line;
 use core::f64::consts::TAU;
 use std::vec::Vec;
 
 /// Steps per mm of both axes.
 const STEPS: f64 = 100.0;
-
-/// A queue that is never full.
-#[derive(Default)]
-struct Events(Vec<StepEvent>);
-
-impl EventQueue for Events {
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        self.0.push(event);
-        Ok(())
-    }
-}
 
 /// The speed, mm/s, the acceleration, mm/s², the jerk, m/s³ (0 for none), and the junction
 /// deviation, mm.

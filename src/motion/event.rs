@@ -328,8 +328,23 @@ pub trait EventQueue {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
+    use std::vec::Vec;
+
+    /// A queue that is never full.
+    #[derive(Default)]
+    pub(crate) struct Events(pub(crate) Vec<StepEvent>);
+
+    impl EventQueue for Events {
+        fn room(&self) -> usize {
+            usize::MAX
+        }
+        fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+            self.0.push(event);
+            Ok(())
+        }
+    }
 
     #[test]
     fn a_tape_holds_moves_and_whether_the_pen_is_up_or_down() {

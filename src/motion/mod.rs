@@ -29,7 +29,7 @@ mod brake;
 mod course;
 mod curvature;
 mod emitter;
-mod event;
+pub(crate) mod event;
 mod junction;
 mod lift;
 mod limits;

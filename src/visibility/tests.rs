@@ -153,6 +153,16 @@ fn stretches(scene: &Scene<'_>, options: Options, spare_bytes: usize) -> Vec<Str
     found.0
 }
 
+/// A scene in a parallel projection.
+fn parallel<'a>(vertices: &'a [Vertex], corners: &'a [Corner]) -> Scene<'a, u16> {
+    Scene {
+        vertices,
+        elements: Elements::new(corners),
+        projection: Projection::Parallel,
+        unrounded: Unrounded::UNKNOWN,
+    }
+}
+
 #[test]
 fn what_is_visible_is_what_rays_reach() {
     const SAMPLES: u32 = 12;
@@ -227,12 +237,7 @@ fn faces_that_pass_through_each_other_have_a_seam() {
         let corners: Vec<Corner> = (0..count)
             .map(|vertex| Corner::new(vertex, false, vertex == 2 || vertex == count - 1))
             .collect();
-        let scene = Scene {
-            vertices: &vertices,
-            elements: Elements::new(&corners),
-            projection: Projection::Parallel,
-            unrounded: Unrounded::UNKNOWN,
-        };
+        let scene = parallel(&vertices, &corners);
         let with_seams = Options { with_seams: true, ..Options::default() };
         let found = stretches(&scene, with_seams, 1000);
         let seams: Vec<&Stretch> = found.iter().filter(|stretch| stretch.edge.is_none()).collect();
@@ -252,12 +257,7 @@ fn a_scene_of_more_corners_than_can_be_numbered_is_refused() {
     for (count, is_refused) in [(65_535, false), (65_536, true)] {
         let corners: Vec<Corner> =
             (0..count).map(|at| Corner::new((at % 2) as u16, true, at % 2 == 1)).collect();
-        let scene = Scene {
-            vertices: &vertices,
-            elements: Elements::new(&corners),
-            projection: Projection::Parallel,
-            unrounded: Unrounded::UNKNOWN,
-        };
+        let scene = parallel(&vertices, &corners);
         // One that is not refused for its number lacks memory.
         let scratch = Scratch::new(&mut []);
         let mut found = Stretches::default();
@@ -291,12 +291,7 @@ fn a_face_hides_although_its_coarse_depth_is_that_of_a_cover() {
                 Corner::new(vertex, matches!(vertex, 8 | 9), is_last)
             })
             .collect();
-        let scene = Scene {
-            vertices: &vertices,
-            elements: Elements::new(&corners),
-            projection: Projection::Parallel,
-            unrounded: Unrounded::UNKNOWN,
-        };
+        let scene = parallel(&vertices, &corners);
         let options = Options { with_hidden: true, ..Options::default() };
         let found = stretches(&scene, options, 1 << 14);
         let of_bar: Vec<&Stretch> =

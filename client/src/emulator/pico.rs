@@ -418,8 +418,8 @@ impl Pico {
         self.send(ERASE_TIME, 0, time.as_micros() as u64)
     }
 
-    /// Asks for the status at the serial line whenever an erasure of flash begins, from now on or no
-    /// longer. The question comes in the board's own time, however late the computer is.
+    /// Asks for the status at the serial line whenever an erasure of flash begins, from now on or
+    /// no longer. The question comes in the board's own time, however late the computer is.
     ///
     /// # Errors
     /// The emulator has ended.

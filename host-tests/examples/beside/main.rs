@@ -3,8 +3,8 @@
 //!
 //! The arguments are `open-cascade=PYTHON` and `vpype=PYTHON`, interpreters that have these
 //! programs; one that is not named is left out. Both sides do the work by turns, so that a busy
-//! moment meets both, and the best time of each counts: of the others that of the processor, because
-//! a busy machine interrupts a long job more often than a short one.
+//! moment meets both, and the best time of each counts: of the others that of the processor,
+//! because a busy machine interrupts a long job more often than a short one.
 
 #![allow(clippy::expect_used, reason = "a scene that cannot be drawn ends the program")]
 

@@ -271,9 +271,10 @@ impl Runner<'_> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::tests::{Events, PEN, push};
+    use super::super::tests::{PEN, push};
     use super::*;
     use crate::drawing::LineType;
+    use crate::motion::event::tests::Events;
     use crate::motion::limits::tests::settings;
     use crate::motion::{Block, EventKind, Limits};
 

@@ -1,22 +1,8 @@
 //! Paths of which more becomes known while the machine moves.
 
 use super::*;
+use crate::motion::event::tests::Events;
 use crate::motion::limits::tests::settings;
-use std::vec::Vec;
-
-/// A queue that is never full.
-#[derive(Default)]
-pub(super) struct Events(pub(super) Vec<StepEvent>);
-
-impl EventQueue for Events {
-    fn room(&self) -> usize {
-        usize::MAX
-    }
-    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
-        self.0.push(event);
-        Ok(())
-    }
-}
 
 /// A pen that moves while the machine stands.
 pub(super) const PEN: PenPositions = PenPositions {
