@@ -29,6 +29,7 @@ use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;
 use penup_job::{Job, Settings};
 use penup_readers::page::Page;
+use penup_readers::words::MOSTLY_FLAT;
 use penup_readers::{Arrangement, ReadError, SourceFile};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -279,40 +280,49 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> 
         .settings_for(&source)
         .map_err(|reason| ReadError::Content { file: file.display().to_string(), reason })?;
     if !quiet {
-        note(file, source.notes());
-        let moved = source.bounds().and_then(|bounds| settings.moves_plan(bounds));
-        note(file, moved.as_slice());
-        if source.bounds().is_some() {
-            note(file, idle_on_plan(&settings).as_slice());
+        let (options, changed) = changed(&settings);
+        let has_crease = changed.iter().any(|name| name == "crease");
+        let notes = source.notes().iter().filter(|note| !has_crease || *note != MOSTLY_FLAT);
+        note(file, &notes.cloned().collect::<Vec<_>>());
+        if let Some(bounds) = source.bounds() {
+            note(file, settings.moves_plan(bounds).as_slice());
+            note(file, settings.fits_turned(bounds).as_slice());
+            note(file, idle_on_plan(&options, &changed).as_slice());
         }
     }
     let (extent, is_plan) = (source.extent(), source.bounds().is_some());
     Ok(Source { job: Job::new(source, &settings), settings, extent, is_plan })
 }
 
-/// Names the options that change nothing because the drawing lies flat and is drawn as it lies:
-/// those of the camera. `None` if there are none, or if a view is chosen that shows it in space.
-fn idle_on_plan(settings: &Settings) -> Option<String> {
+/// The options of the plotter with these settings, and the names of those that are not as usual.
+fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
     let mut options = PlotOptions::default();
     let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
     for (name, value) in &settings.values {
         // What the plotter refuses is told when the job is sent.
         let _ = options.set(name, value);
     }
-    let is_of_camera = |line: &&String| {
-        let of = |option: &&PlotOption| line.starts_with(&format!("${}=", option.name));
+    let name = |line: String| Some(line.strip_prefix('$')?.split('=').next()?.to_owned());
+    let names = options
+        .lines()
+        .map(|line| line.to_string())
+        .zip(usual)
+        .filter(|(now, usual)| now != usual)
+        .filter_map(|(now, _)| name(now))
+        .collect();
+    (options, names)
+}
+
+/// Names the options that change nothing because the drawing lies flat and is drawn as it lies:
+/// those of the camera. `None` if there are none, or if a view is chosen that shows it in space.
+fn idle_on_plan(options: &PlotOptions, changed: &[String]) -> Option<String> {
+    let is_of_camera = |name: &&String| {
+        let of = |option: &&PlotOption| option.name == name.as_str();
         let flag = OPTIONS.iter().find(of).and_then(|option| option.flag.get());
         flag.is_some_and(|flag| flag.heading == "Camera")
     };
-    let now: Vec<String> = options.lines().map(|line| line.to_string()).collect();
-    let idle: Vec<String> = now
-        .iter()
-        .zip(&usual)
-        .filter(|(now, usual)| now != usual)
-        .filter(|(now, _)| is_of_camera(now))
-        .filter_map(|(now, _)| now.strip_prefix('$')?.split('=').next())
-        .map(|name| format!("--{name}"))
-        .collect();
+    let idle: Vec<String> =
+        changed.iter().filter(is_of_camera).map(|name| format!("--{name}")).collect();
     (options.shows_plans_flat() && !idle.is_empty()).then(|| {
         format!(
             "the drawing lies flat and is drawn as it lies, so nothing is changed by {}: they are \

@@ -22,6 +22,18 @@ impl Settings {
         self.values.iter().find(|(own, _)| *own == name).map(|(_, value)| value.as_str())
     }
 
+    /// Says that a plan with these least and greatest coordinates, in mm, is too large for the page,
+    /// but fits it if the page is turned, which the plotter does not know. `None` if the plan fits,
+    /// is scaled, or is too large for the turned page, too.
+    pub fn fits_turned(&self, [low, high]: [[f64; 2]; 2]) -> Option<String> {
+        let margin: f64 = self.value("margin")?.parse().ok()?;
+        let [width, height] = [0, 1].map(|axis| high[axis] - low[axis] + 2.0 * margin);
+        let fits = |page: Page| width <= page.width && height <= page.height;
+        let turned = Page { width: self.page.height, height: self.page.width };
+        let helps = !fits(self.page) && fits(turned) && self.value("fit") == Some("off");
+        helps.then(|| "the drawing fits the page if that is turned: --landscape=auto".to_owned())
+    }
+
     /// Says that the plotter moves a plan with these least and greatest coordinates, in mm, because
     /// it does not lie within the margins of the page. `None` if the plan keeps its place, is
     /// scaled, or is too large for the page, which the plotter says by itself.

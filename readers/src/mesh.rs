@@ -3,6 +3,7 @@
 use super::error::ReadError;
 use super::format::Contents;
 use crate::lines::{JobLine, Lines, Origin};
+use crate::words::MOSTLY_FLAT;
 use penup::protocol::LINE_LIMIT;
 use std::collections::HashMap;
 use std::fmt::Write as _;
@@ -164,9 +165,7 @@ impl Mesh {
 
     /// Says that most edges are nearly flat, if they are.
     pub(super) fn crease_note(&self) -> Option<String> {
-        self.flat_part().is_some_and(|part| part >= MOST).then(|| {
-            "most edges are nearly flat: --crease 30 leaves them out, and outlines stay".to_owned()
-        })
+        self.flat_part().is_some_and(|part| part >= MOST).then(|| MOSTLY_FLAT.to_owned())
     }
 
     /// The part of the inner edges that bend by less than [`NEARLY_FLAT`]; `None` if there are few.

@@ -36,6 +36,11 @@ const WORDS: &[(&str, &str)] = &[
     ("131", "along y (setting 131)"),
 ];
 
+/// The note on a solid most of whose edges are nearly flat. It says nothing new to a user who has
+/// given `--crease`.
+pub const MOSTLY_FLAT: &str =
+    "most edges are nearly flat: --crease 30 leaves them out, and outlines stay";
+
 /// What the library says of `error:number`. `None` if it has no such error.
 ///
 /// ```

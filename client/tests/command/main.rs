@@ -248,6 +248,47 @@ fn a_plan_that_the_margin_moves_is_told_and_a_solid_is_not() {
 }
 
 #[test]
+fn a_plan_that_fits_the_turned_page_is_told_how_to_turn_it() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let told = |size: &str, options: &[&str]| {
+        fs::write(folder.path().join("a.obj"), format!("v 0 0 0\nv {size} 0\nl 1 2\n"))
+            .expect("written");
+        let (code, _, noted) =
+            penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
+        (code, noted.contains("the drawing fits the page if that is turned: --landscape=auto"))
+    };
+    assert_eq!(told("250 100", &[]), (Some(4), true));
+    assert_eq!(told("250 100", &["--landscape=auto"]), (Some(0), false));
+    assert_eq!(told("100 250", &["--landscape"]), (Some(4), true));
+    assert_eq!(told("100 250", &["--landscape=auto"]), (Some(0), false));
+    assert_eq!(told("300 100", &[]), (Some(4), false));
+    assert_eq!(told("250 195", &[]), (Some(4), false));
+    assert_eq!(told("250 100", &["--fit"]), (Some(0), false));
+    assert_eq!(told("150 100", &[]), (Some(0), false));
+}
+
+#[test]
+fn creases_are_proposed_to_those_who_do_not_choose_them() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // A square of 9 x 9 smaller ones, each bent a little.
+    let corners = (0..100).map(|index| {
+        let (x, y) = (index % 10, index / 10);
+        format!("v {x} {y} {}\n", f64::from((x + y) % 2) / 10.0)
+    });
+    let faces = (0..90)
+        .filter(|index| index % 10 != 9)
+        .map(|index| format!("f {} {} {} {}\n", index + 1, index + 2, index + 12, index + 11));
+    fs::write(folder.path().join("a.obj"), corners.chain(faces).collect::<String>())
+        .expect("written");
+    for (options, proposed) in [(&[][..], true), (&["--crease", "20"], false), (&["--fit"], true)] {
+        let arguments = [&["preview", "a.obj", "--svg", "a.svg"], options].concat();
+        let (code, _, noted) = penup(folder.path(), &arguments);
+        assert_eq!(code, Some(0), "{noted}");
+        assert_eq!(noted.contains("--crease 30 leaves them out"), proposed, "{options:?}: {noted}");
+    }
+}
+
+#[test]
 fn a_port_that_is_not_there_is_explained() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.obj"), "v 0 0 0\n").expect("written");
