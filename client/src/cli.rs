@@ -18,7 +18,7 @@ use crate::files::STANDARD_INPUT;
 use crate::fit::{FitError, TOLERANCES};
 use crate::machine_settings::AssignedSetting;
 use crate::table::BoardRow;
-use clap::{ArgGroup, Args, Parser, Subcommand};
+use clap::{Args, Parser, Subcommand};
 use clap_complete::Shell;
 use penup::machine::Setting;
 use penup_readers::page::Page;
@@ -315,7 +315,6 @@ pub struct PassesArgs {
 
 /// Options of `penup preview`.
 #[derive(Debug, Args)]
-#[command(group = ArgGroup::new("export").multiple(true))]
 pub struct PreviewArgs {
     /// The file to show.
     #[arg(value_name = "FILE", help = file_help("The file to show"))]
@@ -336,14 +335,14 @@ pub struct PreviewArgs {
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub json: Option<PathBuf>,
     /// Write the drawing for a Grbl machine whose M3 lowers the pen
-    #[arg(long, value_name = "FILE", help_heading = "Output", group = "export")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub gcode: Option<PathBuf>,
     /// Write the drawing as HP-GL, in units of 0.025 mm
-    #[arg(long, value_name = "FILE", help_heading = "Output", group = "export")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub hpgl: Option<PathBuf>,
-    /// Begin closed lines at random points in --gcode and --hpgl, so that the marks of the pen do
-    /// not stand in a row; else they begin where the moves between lines become short
-    #[arg(long, requires = "export", help_heading = "Output")]
+    /// Begin closed lines at random points, so that the marks of the pen do not stand in a row, as
+    /// `penup plot --reloop` does; else they begin where the moves between lines become short
+    #[arg(long, help_heading = "Drawing")]
     pub reloop: bool,
     /// Plot speed, acceleration and jerk over time to this SVG file
     #[arg(long, value_name = "FILE", help_heading = "Output")]

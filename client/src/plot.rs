@@ -17,6 +17,7 @@ use crate::progress::{Bar, Progress};
 use crate::run::{Outputs, Source, note, read, summary, write_pictures};
 use crate::sender::{Patience, Sender, Stopped};
 use crate::workspace;
+use penup::index::Index;
 use penup::machine::{self, Setting};
 use penup_job::picture::Picture;
 use penup_job::protocol::{GO_ON_AT_ORIGIN, Status};
@@ -148,6 +149,7 @@ impl Plot<'_> {
         self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
         let passes = self.args.passes.multipass;
         let Some(mut host) = choice.host else { return draw_by(sender, job, passes, progress) };
+        host.set_reloops(self.args.reloop);
         let form = sender.form()?;
         let shows_pen = known.settings.is_some_and(|settings| {
             settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser)
@@ -156,7 +158,7 @@ impl Plot<'_> {
             let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
             return Err(Error::NotStreamed { reason: reason.to_owned() });
         }
-        let (streamed, report) = self.streamed(&mut host, form, self.args.from)?;
+        let (streamed, report) = host.streamed(form, self.args.from)?;
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(
             "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
@@ -164,21 +166,11 @@ impl Plot<'_> {
         )]);
         self.send(sender, &streamed, progress)?;
         // Strokes that were left out once are drawn from then on.
-        let whole = if passes > 1 { self.streamed(&mut host, form, 0)?.0 } else { streamed };
+        let whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
         for _ in 1..passes {
             self.send(sender, &whole, progress)?;
         }
         Ok(report)
-    }
-
-    /// Computes the drawing, to be sent without its first `from` strokes.
-    fn streamed(
-        &self,
-        host: &mut InMemory<u32>,
-        form: Form,
-        from: u32,
-    ) -> Result<(StreamedJob, Option<JobReport>), Error> {
-        host.streamed(form, from, self.args.reloop)
     }
 
     /// Sends the rest of this drawing, which a loss of power or a reset has stopped.
@@ -198,11 +190,12 @@ impl Plot<'_> {
         let Some(mut host) = compute::choose(known, &self.source.job, Compute::Host)?.host else {
             return Err(refused("this computer cannot compute it"));
         };
+        host.set_reloops(self.args.reloop);
         // The drawing may have begun behind its first strokes, by --from.
-        let (mut whole, report) = self.streamed(&mut host, Form::Strokes, 0)?;
+        let (mut whole, report) = host.streamed(Form::Strokes, 0)?;
         let begin = whole.size().strokes.checked_sub(stopped.all);
         if let Some(begin) = begin.filter(|begin| *begin > 0) {
-            whole = self.streamed(&mut host, Form::Strokes, begin)?.0;
+            whole = host.streamed(Form::Strokes, begin)?.0;
         }
         let Some(begin) = begin.filter(|_| whole.id() == stopped.id) else {
             return Err(refused(
@@ -219,7 +212,7 @@ impl Plot<'_> {
         if self.args.at_origin {
             sender.ask(GO_ON_AT_ORIGIN)?;
         }
-        let mut rest = self.streamed(&mut host, Form::Strokes, begin + stopped.drawn)?.0;
+        let mut rest = host.streamed(Form::Strokes, begin + stopped.drawn)?.0;
         rest.set_id(stopped.id);
         let Stopped { drawn, all, .. } = stopped;
         self.note(&[format!("{drawn} of {all} strokes are drawn: the rest is sent")]);
@@ -269,16 +262,17 @@ impl Plot<'_> {
         let settings = simulated(&operate::read_settings(&mut sender)?).map_err(|_| busy())?;
         let job = &self.source.job;
         let mut host = InMemory::<u32>::new(Room::for_job(job), settings);
+        host.set_reloops(self.args.reloop);
         if !host.take(job) {
             return Err(busy());
         }
-        let (mut streamed, report) = self.streamed(&mut host, Form::Strokes, self.args.from)?;
+        let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
         let size = streamed.size().strokes;
         let drawn = taken.strokes.and_then(|all| size.checked_sub(all));
         if let Some(drawn) = drawn.filter(|drawn| *drawn > 0) {
             // The rest of a drawing that had stopped has the number of the whole.
             let id = streamed.id();
-            streamed = self.streamed(&mut host, Form::Strokes, self.args.from + drawn)?.0;
+            streamed = host.streamed(Form::Strokes, self.args.from + drawn)?.0;
             streamed.set_id(id);
         }
         if streamed.id() != taken.id || !streamed.skip(taken.targets) {
@@ -339,6 +333,25 @@ pub fn draw(
     let drawn = draw_by(&mut sender, job, 1, progress);
     sender.end();
     drawn
+}
+
+/// Sends a whole job to `plotter`, which computes it. Returns its strokes, of which closed ones
+/// begin at random points, and the report on them.
+///
+/// # Errors
+/// See [`Sender`].
+pub fn relooped<I: Index>(
+    plotter: &mut InMemory<I>,
+    job: &dyn Lines,
+    interrupt: &AtomicBool,
+    progress: &mut dyn Progress,
+) -> Result<(StreamedJob, Option<JobReport>), Error> {
+    let mut sender = Sender::open(plotter, Patience::simulated(), interrupt)?;
+    let sent = sender.stream(job, progress);
+    sender.end();
+    sent?;
+    plotter.set_reloops(true);
+    plotter.streamed(Form::Strokes, 0)
 }
 
 /// Sends a whole job, and draws all of it so many times.

@@ -35,6 +35,9 @@ use std::time::{Duration, Instant};
 /// The number of ticks in a millisecond.
 const MILLISECOND: u64 = TICKS_PER_SECOND as u64 / 1000;
 
+/// The beginning of the line that begins a drawing whose strokes are sent.
+const BEGIN_STREAM: &str = "$stream=";
+
 /// The size of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ModelSize {
@@ -56,6 +59,8 @@ pub struct InMemory<I: Index = u32> {
     plotter: Plotter<'static, I>,
     /// When the plotter's clock began, if that is the clock of the conversation.
     began: Option<Instant>,
+    /// Whether closed strokes begin at random points.
+    reloops: bool,
 }
 
 /// What the plotter drew after a plot command.
@@ -79,7 +84,7 @@ impl<I: Index> InMemory<I> {
             .without_undo()
             .with_early_ink(room.early_ink);
         plotter.greet(&mut board);
-        Self { board, plotter, began: Some(Instant::now()) }
+        Self { board, plotter, began: Some(Instant::now()), reloops: false }
     }
 
     /// Starts a plotter with this memory, and with flash in which it keeps its settings and jobs,
@@ -91,7 +96,7 @@ impl<I: Index> InMemory<I> {
         let pins = board.pins;
         let plotter = penup::plotter::start(&mut board, room.lend(), pins);
         let plotter = plotter.with_early_ink(room.early_ink);
-        Self { board, plotter, began: None }
+        Self { board, plotter, began: None, reloops: false }
     }
 
     /// Cuts the power. Returns the flash, if the plotter has any.
@@ -138,10 +143,31 @@ impl<I: Index> InMemory<I> {
         self.plotter.model().is_plan()
     }
 
+    /// Computes the drawing of the model that was sent.
+    fn compute(
+        &mut self,
+        cancel: &mut dyn Cancel,
+        observer: &mut dyn Observer<I>,
+    ) -> Result<(), Error> {
+        let computed = self.plotter.compute(cancel, observer);
+        computed.map(drop).map_err(|refusal| Error::NotDrawn { refusal })
+    }
+
+    /// Passes the strokes that were computed to `visit`.
+    fn with_strokes<R>(&mut self, visit: impl FnOnce(&mut dyn Path) -> R) -> R {
+        let reloops = self.reloops;
+        with_begins(self.plotter.strokes(), reloops, visit)
+    }
+
+    /// Sets whether closed strokes begin at random points, in [`InMemory::streamed`] and in all
+    /// results of this computer. The plotter's own `$plot` does not know that.
+    pub fn set_reloops(&mut self, reloops: bool) {
+        self.reloops = reloops;
+    }
+
     /// Computes the drawing of the model that was sent, as lines that a plotter draws while they
-    /// come, without its first `from` strokes, and the report on all of it. Closed strokes begin at
-    /// random points if it `reloops`. More work is spent on the order than by a plotter, because a
-    /// computer is faster.
+    /// come, without its first `from` strokes, and the report on all of it. More work is spent on
+    /// the order than by a plotter, because a computer is faster.
     ///
     /// # Errors
     /// The drawing is refused, does not fit the machine, or has no such form.
@@ -149,28 +175,22 @@ impl<I: Index> InMemory<I> {
         &mut self,
         form: Form,
         from: u32,
-        reloops: bool,
     ) -> Result<(StreamedJob, Option<JobReport>), Error> {
         self.plotter.set_thorough(true);
-        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Unobserved);
-        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        self.compute(&mut StopWatch::default(), &mut Unobserved)?;
         let settings = *self.plotter.machine().settings();
-        let steps = self.steps_per_mm();
-        let mut strokes = self.plotter.strokes();
+        let (steps, reloops) = (self.steps_per_mm(), self.reloops);
         let lengths = reloops.then(|| {
-            let strokes = strokes_of(&mut Relooped::of(&mut strokes), steps);
+            let strokes = self.with_strokes(|strokes| strokes_of(strokes, steps));
             Lengths::of(&strokes.into_iter().map(|stroke| stroke.points).collect::<Vec<_>>())
         });
+        let mut strokes = self.plotter.strokes();
         if from > 0 && !strokes.begin_at(from) {
             let reason = format!("it has no more than {from} strokes: nothing is left to draw");
             return Err(Error::NotStreamed { reason });
         }
-        let mut relooped = reloops.then(|| Relooped::of(&mut strokes));
-        let path: &mut dyn Path = match &mut relooped {
-            Some(relooped) => relooped,
-            None => &mut strokes,
-        };
-        let job = StreamedJob::new(&settings, path, form).map_err(|error| match error {
+        let job = with_begins(strokes, reloops, |path| StreamedJob::new(&settings, path, form));
+        let job = job.map_err(|error| match error {
             StreamError::Machine(error) => {
                 Error::NotDrawn { refusal: CommandError::Machine(error) }
             }
@@ -206,8 +226,7 @@ impl<I: Index> InMemory<I> {
     /// # Errors
     /// The plotter refuses the drawing.
     pub fn rehearse(&mut self) -> Result<(), Error> {
-        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
-        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        self.compute(&mut StopWatch::default(), &mut Segments::default())?;
         let settings = *self.plotter.machine().settings();
         motion_plot::measure(settings, &mut self.plotter.strokes())
             .map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
@@ -218,8 +237,7 @@ impl<I: Index> InMemory<I> {
     /// # Errors
     /// The plotter refuses the drawing.
     pub fn tape(&mut self) -> Result<Vec<u8>, Error> {
-        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
-        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        self.compute(&mut StopWatch::default(), &mut Segments::default())?;
         let settings = *self.plotter.machine().settings();
         let tape = crate::tape::record(settings, &mut self.plotter.strokes());
         tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
@@ -230,12 +248,10 @@ impl<I: Index> InMemory<I> {
     /// # Errors
     /// The drawing is refused.
     pub fn motion(&mut self) -> Result<Motion, Error> {
-        let refused = |refusal| Error::NotDrawn { refusal };
-        let computed = self.plotter.compute(&mut StopWatch::default(), &mut Segments::default());
-        computed.map_err(refused)?;
+        self.compute(&mut StopWatch::default(), &mut Segments::default())?;
         let settings = *self.plotter.machine().settings();
-        Motion::record(settings, &mut self.plotter.strokes())
-            .map_err(|error| refused(CommandError::Machine(error)))
+        self.with_strokes(|strokes| Motion::record(settings, strokes))
+            .map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
     }
 
     /// What was drawn after the last plot command.
@@ -246,7 +262,8 @@ impl<I: Index> InMemory<I> {
             self.board.steps.runs()
         } else {
             let steps = self.steps_per_mm();
-            runs(strokes_of(&mut self.plotter.strokes(), steps), 1.0 / steps[0])
+            let strokes = self.with_strokes(|strokes| strokes_of(strokes, steps));
+            runs(strokes, 1.0 / steps[0])
         };
         Drawn { runs, steps, duration_s }
     }
@@ -259,15 +276,14 @@ impl<I: Index> InMemory<I> {
         let Drawn { runs, steps, duration_s } = self.drawn();
         let mut watch = StopWatch::default();
         let mut segments = Segments::default();
-        let computed = self.plotter.compute(&mut watch, &mut segments);
-        computed.map_err(|refusal| Error::NotDrawn { refusal })?;
+        self.compute(&mut watch, &mut segments)?;
         let timings_ms = watch.stop();
         let steps_per_mm = self.steps_per_mm();
-        let (stroke_pens, strokes): (Vec<u8>, Vec<_>) =
-            strokes_of(&mut self.plotter.strokes(), steps_per_mm)
-                .into_iter()
-                .map(|stroke| (stroke.pen, stroke.points))
-                .unzip();
+        let (stroke_pens, strokes): (Vec<u8>, Vec<_>) = self
+            .with_strokes(|strokes| strokes_of(strokes, steps_per_mm))
+            .into_iter()
+            .map(|stroke| (stroke.pen, stroke.points))
+            .unzip();
         let lengths = Lengths::of(&strokes);
         Ok(JobResult {
             segments: segments.ends,
@@ -288,8 +304,10 @@ impl<I: Index> InMemory<I> {
 impl<I: Index> Link for InMemory<I> {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         // The command is between the line's number and its checksum.
-        let plots = |part: &[u8]| part.starts_with(PLOT.as_bytes());
-        if bytes.split(|byte| *byte == b' ').any(plots) {
+        let begins = |part: &[u8]| {
+            [PLOT, BEGIN_STREAM].into_iter().any(|command| part.starts_with(command.as_bytes()))
+        };
+        if bytes.split(|byte| *byte == b' ').any(begins) {
             self.board.steps.begin(self.plotter.machine().settings());
         }
         self.board.receive(bytes);
@@ -326,6 +344,18 @@ impl<I: Index> Link for InMemory<I> {
     fn now(&self) -> Instant {
         let ticks = self.board.now() / MILLISECOND;
         self.began.map_or_else(Instant::now, |began| began + Duration::from_millis(ticks))
+    }
+}
+
+/// Passes `strokes` to `visit`. Closed ones begin at random points if this `reloops`.
+fn with_begins<R>(
+    mut strokes: impl Path,
+    reloops: bool,
+    visit: impl FnOnce(&mut dyn Path) -> R,
+) -> R {
+    match reloops {
+        true => visit(&mut Relooped::of(&mut strokes)),
+        false => visit(&mut strokes),
     }
 }
 

@@ -13,7 +13,7 @@ use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
 use crate::output;
-use crate::plot::{draw, plot};
+use crate::plot::{draw, plot, relooped};
 use crate::png::png;
 use crate::preview::{Drawn, InMemory};
 use crate::progress::{Bar, duration};
@@ -27,6 +27,7 @@ use penup_job::export::{self, Retracing};
 use penup_job::picture::Picture;
 use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;
+use penup_job::streamed::StreamedJob;
 use penup_job::{Job, Settings};
 use penup_readers::page::Page;
 use penup_readers::words::MOSTLY_FLAT;
@@ -119,14 +120,17 @@ fn show<I: Index>(
     interrupt: &AtomicBool,
 ) -> Result<Outcome, Error> {
     let passes = args.passes.multipass;
-    let report = draw(&mut plotter, &source.job, Patience::simulated(), interrupt, &mut bar)?;
+    let (streamed, report) = if args.reloop {
+        let (streamed, report) = relooped(&mut plotter, &source.job, interrupt, &mut bar)?;
+        draw_strokes(&mut plotter, Some(&streamed), interrupt, &mut bar)?;
+        (Some(streamed), report)
+    } else {
+        (None, draw(&mut plotter, &source.job, Patience::simulated(), interrupt, &mut bar)?)
+    };
     let mut drawn = plotter.drawn();
     if passes > 1 {
         // The pictures show the first pass. Each other one begins where one has ended.
-        let mut sender = Sender::open(&mut plotter, Patience::simulated(), interrupt)?;
-        let plotted = sender.plot(&mut bar);
-        sender.end();
-        plotted?;
+        draw_strokes(&mut plotter, streamed.as_ref(), interrupt, &mut bar)?;
         let other = plotter.drawn();
         drawn.steps += u64::from(passes - 1) * other.steps;
         drawn.duration_s += f64::from(passes - 1) * other.duration_s;
@@ -168,6 +172,22 @@ fn show<I: Index>(
     Ok(outcome)
 }
 
+/// Draws these strokes, or else the job that `plotter` has computed, from where the pen is.
+fn draw_strokes<I: Index>(
+    plotter: &mut InMemory<I>,
+    streamed: Option<&StreamedJob>,
+    interrupt: &AtomicBool,
+    bar: &mut Bar,
+) -> Result<(), Error> {
+    let mut sender = Sender::open(plotter, Patience::simulated(), interrupt)?;
+    let drawn = match streamed {
+        Some(streamed) => sender.draw_streamed(streamed, bar),
+        None => sender.plot(bar),
+    };
+    sender.end();
+    drawn
+}
+
 /// The size of the page for `--json`, in mm.
 fn page_mm(Page { width, height }: Page) -> Value {
     json!({ "width": width, "height": height })
@@ -196,7 +216,7 @@ fn write_exports<'a>(
     speed: f64,
 ) -> Result<Vec<&'a Path>, Error> {
     let mut files = Vec::new();
-    let retracing = Retracing { passes: args.passes.multipass, reloops: args.reloop };
+    let retracing = Retracing { passes: args.passes.multipass, reloops: false };
     let lines = export::lines(&picture.runs, retracing);
     if let Some(path) = &args.gcode {
         output::write(path, export::gcode(&lines, speed).as_bytes())?;

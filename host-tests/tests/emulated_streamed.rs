@@ -52,7 +52,7 @@ fn draws_as_previewed(board: &'static BoardRow, form: Form) -> Result<(), Box<dy
     let previewed = inked(preview.drawn().runs);
     let mut host = InMemory::<u32>::new(Room::for_job(&job), Settings::default());
     assert!(host.take(&job));
-    let (streamed, _) = host.streamed(form, 0, false)?;
+    let (streamed, _) = host.streamed(form, 0)?;
     let mut emulated = emulate(board)?;
     let mut strokes = Strokes::default();
     let mut sender = Sender::open(emulated.as_mut(), Patience::default(), &interrupt)?;

@@ -667,6 +667,34 @@ fn closed_lines_begin_at_random_points_if_the_user_wishes() {
     assert!(short < 80.0 && scattered > 200.0, "{short} {scattered}");
     // The rest of the drawing is that of the whole.
     assert_eq!(plot(&["--reloop", "--from", "19"]), scattered);
+    // A preview shows that drawing, with its length and its time, in each of its results.
+    let preview = |options: &[&str]| {
+        let all = [
+            &["preview", "rows.obj", "--json", "r.json", "--gcode", "r.gcode", "--svg", "r.svg"],
+            options,
+        ];
+        let (code, _, error) = plotter.run(folder.path(), &all.concat());
+        assert_eq!(code, Some(0), "{error}");
+        let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("readable");
+        let result: serde_json::Value = serde_json::from_str(&read("r.json")).expect("JSON");
+        let number = |value: &serde_json::Value| value.as_f64().expect("a number");
+        let (own, told) = (number(&result["pen_up_mm"]), number(&result["drawn"]["pen_up_mm"]));
+        assert!((own - told).abs() < 0.1, "{own} {told}");
+        assert_eq!(number(&result["drawn"]["pen_down_mm"]), 2120.0);
+        let begins = |text: &str, word: &str| {
+            let x = |line: &str| line.split_once(word).map(|(_, rest)| rest.to_owned());
+            text.lines().filter_map(x).collect::<Vec<_>>()
+        };
+        let gcode = begins(&read("r.gcode"), "G0 X");
+        (told, gcode, read("r.svg"), number(&result["duration_s"]), number(&result["steps"]))
+    };
+    let (usual, looped) = (preview(&["--effort", "100"]), preview(&["--reloop"]));
+    assert!(usual.0 < 80.0 && looped.0 == scattered, "{usual:?} {looped:?}");
+    assert!(looped.1 != usual.1 && looped.2 != usual.2);
+    assert!(looped.3 > usual.3 && looped.4 > usual.4, "{} {}", looped.3, usual.3);
+    assert_eq!(preview(&["--reloop", "--board", "pico"]), looped);
+    let twice = preview(&["--reloop", "--multipass", "2"]);
+    assert!(twice.3 > 1.9 * looped.3 && twice.3 < 2.1 * looped.3, "{} {}", twice.3, looped.3);
     let refused = ["plot", "rows.obj", "--port", "auto", "--reloop", "--compute", "board"];
     let (code, _, error) = plotter.run(folder.path(), &refused);
     assert_eq!(code, Some(1));

@@ -4,8 +4,7 @@
 //! An [`Arrangement`] holds their values. The steps come in a fixed order: layers are chosen; the
 //! plan is scaled and turned, hatched, laid in the middle of the page, and cropped; then strokes
 //! are joined and simplified; and last the layers are given their pens. Where a closed stroke
-//! begins is nothing to choose here: the plotter begins it where that makes the moves between
-//! strokes short.
+//! begins is nothing to choose here: that belongs to the order of the strokes.
 //!
 //! A file that is no plan is refused if any of the options is given, and so is a value that leaves
 //! nothing to draw.
