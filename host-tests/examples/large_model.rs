@@ -7,19 +7,10 @@
 
 use penup::board_table::PICO;
 use penup_client::emulator::{EmulatedBoard, Machine, Pico, PicoByUsb, image_path};
-use penup_host_tests::emulated_jobs::{Line, assert_same_as_on_the_host};
+use penup_host_tests::emulated_jobs::{Line, STAGES_IN_TILES, assert_same_as_on_the_host};
 use std::error::Error;
 use std::thread::sleep;
 use std::time::{Duration, Instant};
-
-/// Parts of the mangled names of the functions that are timed, and what they do. The machine draws
-/// meanwhile, which counts in.
-const FUNCTIONS: [(&str, &str); 4] = [
-    ("stored7compute7prepare17h", "camera, index and place on the page"),
-    ("stored7compute10find_lines17h", "hidden lines"),
-    ("stored7compute11order_lines17h", "order"),
-    ("11plot_stored17h", "from $plot until the first part is handed over"),
-];
 
 /// The page, the pen and the effort for the order.
 const SETTINGS: [&str; 7] =
@@ -56,7 +47,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
     }
     println!("sent in {} s of this computer", began.elapsed().as_secs());
-    for (number, (name, _)) in (0..).zip(FUNCTIONS) {
+    for (number, (name, _)) in (0..).zip(STAGES_IN_TILES) {
         line.emulator.0.time_function(&image, name, number)?;
     }
     line.emulator.pin_changes()?;
@@ -73,7 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         sleep(Duration::from_millis(500));
     }
     println!("the first part was there after {} s of this computer", began.elapsed().as_secs());
-    let (mut cycles, mut calls) = ([0; FUNCTIONS.len()], [0; FUNCTIONS.len()]);
+    let (mut cycles, mut calls) = ([0; STAGES_IN_TILES.len()], [0; STAGES_IN_TILES.len()]);
     let (mut machine, mut events) = (Machine::default(), Vec::new());
     let mut late = String::new();
     loop {
@@ -104,7 +95,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         sleep(Duration::from_secs(1));
     }
     events.extend(machine.last().map(|event| event.kind));
-    for ((_, what), (cycles, calls)) in FUNCTIONS.iter().zip(cycles.iter().zip(calls)) {
+    for ((_, what), (cycles, calls)) in STAGES_IN_TILES.iter().zip(cycles.iter().zip(calls)) {
         let seconds = *cycles as f64 / 125e6;
         println!("{what}: {calls} calls, {cycles} cycles, {seconds:.1} s at 125 MHz");
     }

@@ -3,24 +3,15 @@
 //! as arguments of this, leave out the others.
 //!
 //! Jobs are sent by USB and given up when they are computed. A function of each stage is timed from
-//! its call to its return, interrupts counted in.
+//! its call to its return, interrupts counted in. Lines are drawn longer than they are, so that the
+//! pen does not begin before the order is known.
 
 use penup_client::emulator::{EmulatedBoard, Pico, PicoByUsb, image_path};
-use penup_host_tests::emulated_jobs::Line;
+use penup_host_tests::emulated_jobs::{Line, STAGES};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 use std::thread::sleep;
 use std::time::Duration;
-
-/// Parts of the mangled names: seeing and hidden lines, hidden lines alone, the pairing of odd
-/// points, the improvement of the tour, all of the order.
-const FUNCTIONS: [&str; 5] = [
-    "5penup4view4clip13project_scene17h",
-    "5penup10visibility14find_stretches17h",
-    "5penup5order11pair_points17h",
-    "5penup5order7improve7improve17h",
-    "Pipeline$LT$I$GT$5order17h",
-];
 
 const SCENES: [(&str, &str); 9] = [
     ("eighteen", "$view=auto"),
@@ -63,7 +54,7 @@ fn measure(scene: &str, eye: &str) -> Result<(String, [u64; 5]), Box<dyn Error>>
     uart.emulator.plug_usb_in()?;
     let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
     line.hear_greeting()?;
-    let lines = job_lines(&format!("{scene}.obj"), &[eye]);
+    let lines = job_lines(&format!("{scene}.obj"), &[eye, "$222=1"]);
     let (plot, model) = lines.split_last().ok_or("an empty scene")?;
     for text in model {
         let answer = line.ask(text)?;
@@ -71,7 +62,7 @@ fn measure(scene: &str, eye: &str) -> Result<(String, [u64; 5]), Box<dyn Error>>
             return Err(format!("{text}: {answer}").into());
         }
     }
-    for (number, name) in (0..).zip(FUNCTIONS) {
+    for (number, name) in (0..).zip(STAGES) {
         line.emulator.0.time_function(&image, name, number)?;
     }
     line.emulator.send(format!("{plot}\n").as_bytes())?;

@@ -12,6 +12,26 @@ use std::time::Duration;
 /// How long a board may compute without output. It may take minutes on a busy computer.
 const PATIENCE: Duration = Duration::from_secs(300);
 
+/// Parts of the mangled names of the functions of the Pico's image that `pico_cycles` times: seeing
+/// and hidden lines, hidden lines alone, the pairing of odd points, the improvement of the tour,
+/// and the order of all strokes.
+pub const STAGES: [&str; 5] = [
+    "5penup4view4clip13project_scene17h",
+    "5penup10visibility14find_stretches17h",
+    "5penup5order11pair_points17h",
+    "5penup5order7improve7improve17h",
+    "5penup5order10order_pens17h",
+];
+
+/// Parts of the mangled names of the functions that `large_model` times, and what they do. The
+/// machine draws meanwhile, which counts in.
+pub const STAGES_IN_TILES: [(&str, &str); 4] = [
+    ("stored7compute7prepare17h", "camera, index and place on the page"),
+    ("stored7compute10find_lines17h", "hidden lines"),
+    ("stored7compute11order_lines17h", "order"),
+    ("11plot_stored17h", "from $plot until the first part is handed over"),
+];
+
 /// Allocates the memory of a board whose row is constant.
 macro_rules! memory_of {
     ($row:ident) => {

@@ -93,6 +93,26 @@ fn the_drawing_is_the_same_as_without() {
     assert_eq!(late.plotter.job().report().odd_points, early.plotter.job().report().odd_points);
 }
 
+/// The order is told as soon as it is known, while the first strokes are still being drawn.
+#[test]
+fn the_measures_are_told_before_the_other_strokes_begin() {
+    let lines = lattice();
+    let mut bench = loaded(&lines, true);
+    bench.board.receive(b"$plot\n$model\n");
+    let mut heard = String::new();
+    while !bench.board.has_read_all() || heard.matches("ok\n").count() < 2 {
+        bench.plotter.poll(&mut bench.board);
+        heard += &bench.heard();
+    }
+    let measures = |heard: &str| -> Vec<String> {
+        heard.lines().filter(|line| line.starts_with("[JOB:")).map(str::to_owned).collect()
+    };
+    let early = measures(&heard);
+    assert!(early.len() == 2 && !early[0].starts_with("[JOB:odd points 0"), "{early:?}");
+    bench.finish();
+    assert_eq!(measures(&bench.say("$model\n")), early);
+}
+
 /// A preview computes the job without drawing it.
 #[test]
 fn a_job_that_is_only_computed_has_the_same_order() {

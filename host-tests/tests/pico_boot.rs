@@ -6,7 +6,7 @@
 use penup_client::emulator::{
     EmulatedBoard, Machine, MachineEventKind, Pico, PicoByUsb, image_path,
 };
-use penup_host_tests::emulated_jobs::Line;
+use penup_host_tests::emulated_jobs::{Line, STAGES, STAGES_IN_TILES};
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
 
@@ -202,5 +202,16 @@ fn a_flash_that_does_not_hold_the_job_is_reported_and_the_job_is_drawn() -> Test
     assert!(message.starts_with("[MSG:$again will not draw this"), "{message}");
     assert_eq!(line.hear()?, "ok");
     assert!(line.status()?.starts_with("<Run"));
+    Ok(())
+}
+
+/// The compiler may inline a function, which then cannot be timed any more.
+#[test]
+fn the_functions_that_are_timed_are_in_the_image() -> TestResult {
+    let mut line = start()?;
+    let in_tiles = STAGES_IN_TILES.map(|(name, _)| name);
+    for name in STAGES.into_iter().chain(in_tiles) {
+        line.emulator.time_function(&image_path("pico"), name, 0)?;
+    }
     Ok(())
 }

@@ -40,6 +40,13 @@ pub(super) struct Pending<I> {
     size: JobSize,
 }
 
+impl<I> Pending<I> {
+    /// The job with its order.
+    pub(super) fn job(&self) -> &Job<I> {
+        &self.job
+    }
+}
+
 /// Lets the pen travel to where it will probably begin, while the lines of the job are found.
 struct Approach<'l, 'b, 'm, B: Board> {
     /// Answers the user.

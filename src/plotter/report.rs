@@ -3,7 +3,7 @@
 use super::grbl::{rate, whole};
 use super::reply::Reply;
 use super::resume::Resumption;
-use super::{Board, Inner};
+use super::{Board, Inner, Job};
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
 use crate::machine::{Alarm, Setting, State, Value};
@@ -97,6 +97,15 @@ impl<I: Index> Inner<'_, I> {
         Reply(board).line(format_args!("[OPT:VZ,{blocks},{RECEIVE_BYTES}]"));
     }
 
+    /// The last job, or the one that is drawn and whose strokes are not all released yet.
+    fn known_job(&self) -> &Job<I> {
+        #[cfg(feature = "early-ink")]
+        if let Some(pending) = &self.pending {
+            return pending.job();
+        }
+        &self.job
+    }
+
     /// Writes the reply to `$model`: the size of the model, its checksums, the result of the last
     /// job's ordering, and the size of the working memory.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
@@ -116,7 +125,7 @@ impl<I: Index> Inner<'_, I> {
         let options = self.options.checksum();
         Reply(board).line(format_args!("[MODEL:checksum {contents:08X}, options {options:08X}]"));
         let order::Report { odd_points, components, pen_down, pen_up, lifts, bound, optimal } =
-            *self.job.report();
+            *self.known_job().report();
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
         // This converts from 1/256 step to 1/256 mm. Lengths are below 2^56.

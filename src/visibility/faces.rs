@@ -65,7 +65,11 @@ impl<'a, I: Index> Faces<'a, I> {
         // The sort itself does not check for cancelling. It takes some 500 instructions for each of
         // 2000 faces.
         yield_counter.spend(500 * order.len())?;
-        heap_sort_by_key(order, |key| *key);
+        if I::BITS > 16 {
+            order.sort_unstable(); // This is faster, and its code is too large for a board.
+        } else {
+            heap_sort_by_key(order, |key| *key);
+        }
         Ok(Self { order, degenerate })
     }
 
