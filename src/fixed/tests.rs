@@ -13,6 +13,19 @@ fn every_length_is_distinguished_from_its_neighbours() {
     }
 }
 
+/// What is beyond counts as zeros, so that no arithmetic overflows.
+#[test]
+fn digits_behind_the_eighteenth_are_left_out() {
+    for (text, same) in [
+        ("1000000000000000007", "100000000000000000e1"),
+        ("-1000000000000000007.9", "-100000000000000000e1"),
+        ("0.1000000000000000007", "0.100000000000000000"),
+        ("9999999999999999999", "999999999999999999e1"),
+    ] {
+        assert_eq!(Decimal::parse(text), Decimal::parse(same), "{text}");
+    }
+}
+
 #[test]
 fn rests_of_periods_are_exact() {
     let mut bits = 0u64;
