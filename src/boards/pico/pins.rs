@@ -1,8 +1,7 @@
 //! Assigns the pins to their functions. The table of the boards has the pins of the machine.
 
-use super::registers::{IO_BANK0, Put as _};
+use super::registers::{Get as _, IO_BANK0, PADS_BANK0, Put as _, SIO};
 use penup::board_table::Pins;
-use rp2040_hal::gpio::{DynBankId, DynFunction, DynPinId, DynPullType, DynSioConfig, new_pin};
 
 /// The numbers of the machine's pins, from the table of the boards.
 const PINS: Pins = super::ROW.pins;
@@ -19,6 +18,19 @@ const _: () = assert!(
 /// The pins on which UART0 sends and receives.
 const UART_PINS: [u8; 2] = [0, 1];
 
+/// The functions of a pin (data sheet, 2.19.2).
+#[derive(Clone, Copy)]
+enum Function {
+    /// The serial line.
+    Uart = 2,
+    /// The servo's pulses.
+    Pwm = 4,
+    /// The program itself.
+    Sio = 5,
+    /// The state machine that makes the steps.
+    Pio0 = 6,
+}
+
 /// Hands the pins over to their peripherals, which must already hold the initial levels. The pins
 /// must be out of reset.
 ///
@@ -26,18 +38,23 @@ const UART_PINS: [u8; 2] = [0, 1];
 /// bus. For this, GPIO 16 must not have function 8.
 pub fn hand_over() {
     let [sends, receives] = UART_PINS;
-    give(sends, DynFunction::Uart, None);
+    give(sends, Function::Uart);
     // If nothing is connected, the pull-up keeps the line at rest, which is high. The default of
     // the pad would pull it low, which is a break.
-    give(receives, DynFunction::Uart, Some(DynPullType::Up));
+    pull_up(receives);
+    give(receives, Function::Uart);
     for number in FIRST_MOTOR_PIN..=PINS.enable {
-        give(number, DynFunction::Pio0, None);
+        give(number, Function::Pio0);
     }
-    give(PINS.pen, DynFunction::Pwm, None);
-    give(PINS.step_z, DynFunction::Sio(DynSioConfig::Output), None);
-    give(PINS.dir_z, DynFunction::Sio(DynSioConfig::Output), None);
+    give(PINS.pen, Function::Pwm);
+    for number in [PINS.step_z, PINS.dir_z] {
+        SIO.gpio_oe_set().put(1 << number);
+        give(number, Function::Sio);
+    }
     for number in [PINS.limit_x, PINS.limit_y, PINS.stop] {
-        give(number, DynFunction::Sio(DynSioConfig::Input), Some(DynPullType::Up));
+        pull_up(number);
+        SIO.gpio_oe_clr().put(1 << number);
+        give(number, Function::Sio);
     }
 }
 
@@ -58,13 +75,27 @@ pub fn invert(steps: u8, enable: bool) {
     }
 }
 
-/// Gives a pin a function, and changes its pull resistors if `pull` says so.
-fn give(number: u8, function: DynFunction, pull: Option<DynPullType>) {
-    // SAFETY: it runs once, at set-up, and nothing else has the pins.
-    let mut pin = unsafe { new_pin(DynPinId { bank: DynBankId::Bank0, num: number }) };
-    if let Some(pull) = pull {
-        pin.set_pull_type(pull);
+/// Pulls a pin up, and no longer down.
+fn pull_up(number: u8) {
+    /// The bits of a pad that pull the pin down and up (data sheet, 2.19.6.3).
+    const PULLS_DOWN: u32 = 1 << 2;
+    const PULLS_UP: u32 = 1 << 3;
+    if let Some(pad) = PADS_BANK0.gpio_iter().nth(number.into()) {
+        pad.put(pad.get() & !PULLS_DOWN | PULLS_UP);
     }
-    // It fails only if the pin lacks the function, and then the machine does not move.
-    let _ = pin.try_set_function(function);
+}
+
+/// Gives a pin a function. Its level can be read, whatever drives it.
+fn give(number: u8, function: Function) {
+    /// The bit of a pad that lets the pin be read.
+    const INPUT: u32 = 1 << 6;
+    /// The bits of the control register that choose the function.
+    const FUNCTION: u32 = 0x1F;
+    if let Some(pad) = PADS_BANK0.gpio_iter().nth(number.into()) {
+        pad.set(INPUT);
+    }
+    if let Some(pin) = IO_BANK0.gpio_iter().nth(number.into()) {
+        let control = pin.gpio_ctrl();
+        control.put(control.get() & !FUNCTION | function as u32);
+    }
 }

@@ -108,17 +108,17 @@ pub const UART0: Uart = Uart(unsafe { Peripheral::at(0x4003_4000) });
 /// The chip's identification. Used by `usb`.
 pub const SYSINFO: Registers<pac::sysinfo::RegisterBlock> =
     unsafe { Registers::at(pac::SYSINFO::PTR) };
-/// The functions of the pins. Used by `usb`, for GPIO 15 only.
+/// The functions of the pins. Used by `pins`, and by `usb` for GPIO 15 only.
 pub const IO_BANK0: Registers<pac::io_bank0::RegisterBlock> =
     unsafe { Registers::at(pac::IO_BANK0::PTR) };
-/// The pads of the pins. Used by `usb`, for GPIO 15 only.
+/// The pads of the pins. Used by `pins`, and by `usb` for GPIO 15 only.
 pub const PADS_BANK0: Registers<pac::pads_bank0::RegisterBlock> =
     unsafe { Registers::at(pac::PADS_BANK0::PTR) };
 /// The PWM unit for the servo. Used by `pen`.
 pub const PWM: Registers<pac::pwm::RegisterBlock> = unsafe { Registers::at(pac::PWM::PTR) };
 /// The timer that counts microseconds. Used by `clock`.
 pub const TIMER: Registers<pac::timer::RegisterBlock> = unsafe { Registers::at(pac::TIMER::PTR) };
-/// The pins' levels and the divider. Used by `contacts`, `z_axis` and `divider`.
+/// The pins' levels and the divider. Used by `pins`, `contacts`, `z_axis` and `divider`.
 pub const SIO: Registers<pac::sio::RegisterBlock> = unsafe { Registers::at(pac::SIO::PTR) };
 /// The power-on state machine, which selects what a reset affects. Used by `emergency`.
 pub const PSM: Registers<pac::psm::RegisterBlock> = unsafe { Registers::at(pac::PSM::PTR) };
