@@ -28,6 +28,10 @@ impl Backlash {
     /// Returns the steps that take up the slack of the drives before a move by `delta` motor steps,
     /// for motors that have `slack` steps of it. From now on these steps count as taken up.
     fn take_up(&mut self, slack: [i32; 2], delta: [i32; 2]) -> [i32; 2] {
+        // Most drives are set to have none.
+        if slack == [0; 2] && self.ahead == [Some(0); 2] {
+            return [0; 2];
+        }
         let mut take = |axis: usize| {
             if delta[axis] == 0 {
                 return 0;
