@@ -28,10 +28,6 @@ impl Backlash {
     /// Returns the steps that take up the slack of the drives before a move by `delta` motor steps,
     /// for motors that have `slack` steps of it. From now on these steps count as taken up.
     fn take_up(&mut self, slack: [i32; 2], delta: [i32; 2]) -> [i32; 2] {
-        // Most drives are set to have none.
-        if slack == [0; 2] && self.ahead == [Some(0); 2] {
-            return [0; 2];
-        }
         let mut take = |axis: usize| {
             if delta[axis] == 0 {
                 return 0;
@@ -88,7 +84,11 @@ impl Machine<'_> {
         let (motors, end) = (segment.motors, self.motors_end());
         let delta = [motors.x - end.x, motors.y - end.y];
         let mut slack = self.slack;
-        let [x, y] = slack.take_up(self.slack_steps(), delta);
+        // Most drives are set to have none, which is then known of both.
+        let has_none = slack.ahead == [Some(0); 2]
+            && !self.settings.is_on(Setting::BacklashX)
+            && !self.settings.is_on(Setting::BacklashY);
+        let [x, y] = if has_none { [0; 2] } else { slack.take_up(self.slack_steps(), delta) };
         #[cfg(feature = "backlash-on-the-way")]
         let (before, from) = (self.slack.ahead, self.runner.motor_steps_end());
         if (x, y) == (0, 0) {
