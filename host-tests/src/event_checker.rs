@@ -5,6 +5,7 @@ mod backlash;
 mod lift;
 mod pins;
 mod speed;
+mod standstill;
 
 pub use backlash::{Backlash, backlash_steps};
 pub use pins::{Drawn, check_pins, check_pins_in_alarms};
@@ -12,6 +13,8 @@ pub use speed::{
     Ratios, acceleration_ratio, acceleration_window, check_speed, greatest_acceleration,
     greatest_jerk, speed_ratios,
 };
+
+pub use standstill::{Standstill, standstill};
 
 use lift::LiftWatch;
 use penup::drawing::PagePoint;

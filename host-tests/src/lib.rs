@@ -7,6 +7,7 @@
     reason = "tests fail by panicking, and this crate contains only parts of tests"
 )]
 
+pub mod counted_board;
 pub mod curve_reference;
 pub mod cut_jobs;
 pub mod damage;

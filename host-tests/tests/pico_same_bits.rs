@@ -35,59 +35,103 @@ fn pulses(changes: impl IntoIterator<Item = (bool, f64)>) -> Vec<f64> {
     changes.into_iter().filter(|change| change.0).map(|change| change.1).collect()
 }
 
+/// Draws a job on the Pico and on the host: how many strokes it has, how many pulses, and by how
+/// many microseconds the Pico was late where it noted one.
+///
+/// # Panics
+/// Every pulse comes as long after the one before; only where the pen has just been raised, the
+/// board may first note in its flash that the stroke is drawn.
+fn draw_in_time(lines: &[String]) -> Result<(usize, usize, f64), Box<dyn Error>> {
+    let mut line = begin(&PICO, lines)?;
+    let (mut steps, mut lowered) = (Vec::new(), 0);
+    loop {
+        let idle = line.status()?.starts_with("<Idle");
+        for change in line.emulator.pin_changes()? {
+            match change.pin {
+                Pin::StepX | Pin::StepY => {
+                    steps.push((change.high, change.at.as_nanos() as f64 / 1000.0));
+                }
+                // The servo follows with its next pulse.
+                Pin::Pen => lowered += usize::from(change.high),
+                _ => {}
+            }
+        }
+        if idle {
+            break;
+        }
+        std::thread::sleep(Duration::from_millis(200));
+    }
+    let at_the_pins = pulses(steps);
+
+    let mut bench = bench_like(&PICO);
+    for text in lines {
+        bench.say(&format!("{text}\n"));
+    }
+    bench.finish();
+    let changes = bench.board.trace().changes();
+    let on_the_host = pulses(changes.iter().filter_map(|stamped| match stamped.change {
+        Change::StepX(high) | Change::StepY(high) => Some((high, stamped.time as f64 / 25.0)),
+        _ => None,
+    }));
+    let orders = changes.iter().filter(|stamped| matches!(stamped.change, Change::Pen(127)));
+    assert_eq!(lowered, orders.count());
+    assert_eq!(at_the_pins.len(), on_the_host.len());
+    let mut noted = 0.0f64;
+    for (number, pair) in on_the_host.windows(2).enumerate() {
+        let host = pair[1] - pair[0];
+        let late = at_the_pins[number + 1] - at_the_pins[number] - host;
+        assert!(late > -1.0, "pulse {number}: {late} us");
+        if late >= 1.0 {
+            assert!(host > 5000.0 && late < 20_000.0, "pulse {number}: {late} us");
+            noted = noted.max(late);
+        }
+    }
+    Ok((lowered, on_the_host.len(), noted))
+}
+
 #[test]
 fn the_pen_moves_while_the_machine_does() -> Result<(), Box<dyn Error>> {
     for jerk in ["$204=0", "$204=30"] {
         let overlap = ["$224=150", "$225=150", jerk, "$page=80x80", "$margin=5"];
-        let lines = job_lines("notched.obj", &overlap);
-        let mut line = begin(&PICO, &lines)?;
-        let (mut steps, mut lowered) = (Vec::new(), 0);
-        loop {
-            let idle = line.status()?.starts_with("<Idle");
-            for change in line.emulator.pin_changes()? {
-                match change.pin {
-                    Pin::StepX | Pin::StepY => {
-                        steps.push((change.high, change.at.as_nanos() as f64 / 1000.0));
-                    }
-                    // The servo follows with its next pulse.
-                    Pin::Pen => lowered += usize::from(change.high),
-                    _ => {}
-                }
-            }
-            if idle {
-                break;
-            }
-            std::thread::sleep(Duration::from_millis(200));
-        }
-        let at_the_pins = pulses(steps);
-
-        let mut bench = bench_like(&PICO);
-        for text in &lines {
-            bench.say(&format!("{text}\n"));
-        }
-        bench.finish();
-        let changes = bench.board.trace().changes();
-        let on_the_host = pulses(changes.iter().filter_map(|stamped| match stamped.change {
-            Change::StepX(high) | Change::StepY(high) => Some((high, stamped.time as f64 / 25.0)),
-            _ => None,
-        }));
-        let orders = changes.iter().filter(|stamped| matches!(stamped.change, Change::Pen(127)));
-        assert_eq!(lowered, orders.count());
-        // Every pulse comes as long after the one before; only where the pen has just been raised,
-        // the board may first note in its flash that the stroke is drawn.
-        assert_eq!(at_the_pins.len(), on_the_host.len());
-        let mut noted = 0.0f64;
-        for (number, pair) in on_the_host.windows(2).enumerate() {
-            let host = pair[1] - pair[0];
-            let late = at_the_pins[number + 1] - at_the_pins[number] - host;
-            assert!(late > -1.0, "{jerk}, pulse {number}: {late} us");
-            if late >= 1.0 {
-                assert!(host > 5000.0 && late < 20_000.0, "{jerk}, pulse {number}: {late} us");
-                noted = noted.max(late);
-            }
-        }
-        println!("{jerk}: {lowered} strokes, noted within {noted} us");
+        let (strokes, _, noted) = draw_in_time(&job_lines("notched.obj", &overlap))?;
+        println!("{jerk}: {strokes} strokes, noted within {noted} us");
     }
+    Ok(())
+}
+
+/// Two curves that turn round in x and y, and a line between two of their ends.
+const LOOPS: [&str; 18] = [
+    "v 0 0 0",
+    "v 12 2 0",
+    "v 2 6 0",
+    "v 14 8 0",
+    "v 4 12 0",
+    "v 16 14 0",
+    "v 20 0 0",
+    "v 30 4 0",
+    "v 22 8 0",
+    "v 18 16 0",
+    "cstype bspline",
+    "deg 2",
+    "curv 0 4 1 2 3 4 5 6",
+    "parm u 0 0 0 1 2 3 4 4 4",
+    "end",
+    "curv 0 2 7 8 9 10",
+    "parm u 0 0 0 1 2 2 2",
+    "end",
+];
+
+#[test]
+fn slack_is_taken_up_while_the_pen_draws_curves() -> Result<(), Box<dyn Error>> {
+    let job = |settings: &[&str]| -> Vec<String> {
+        let lines = LOOPS.iter().chain(&["l 6 10", "$fit=on", "$page=50x40", "$margin=5"]);
+        lines.chain(settings).chain(&["$plot"]).map(|line| (*line).to_owned()).collect()
+    };
+    let (strokes, without, _) = draw_in_time(&job(&[]))?;
+    let (same, with, _) = draw_in_time(&job(&["$235=0.1", "$236=0.1", "$237=0.3"]))?;
+    assert_eq!(strokes, same);
+    println!("{strokes} strokes, {without} pulses, {with} with slack");
+    assert!(with > without + 40, "slack is taken up: {with} {without}");
     Ok(())
 }
 

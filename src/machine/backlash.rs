@@ -84,7 +84,11 @@ impl Machine<'_> {
         let (motors, end) = (segment.motors, self.motors_end());
         let delta = [motors.x - end.x, motors.y - end.y];
         let mut slack = self.slack;
-        let [x, y] = slack.take_up(self.slack_steps(), delta);
+        // Most drives are set to have none, which is then known of both.
+        let has_none = slack.ahead == [Some(0); 2]
+            && !self.settings.is_on(Setting::BacklashX)
+            && !self.settings.is_on(Setting::BacklashY);
+        let [x, y] = if has_none { [0; 2] } else { slack.take_up(self.slack_steps(), delta) };
         #[cfg(feature = "backlash-on-the-way")]
         let (before, from) = (self.slack.ahead, self.runner.motor_steps_end());
         if (x, y) == (0, 0) {

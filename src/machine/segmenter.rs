@@ -106,8 +106,12 @@ impl Machine<'_> {
             let pushed = self.push_motors(&segment, ink, limit);
             debug_assert!(pushed.is_ok());
             if pushed != Ok(false) {
-                let rest = Segmenter { position: end, cut, dot: next_dot, ..segmenter };
-                self.segmenter = (end < length).then_some(rest);
+                match &mut self.segmenter {
+                    Some(rest) if end < length => {
+                        (rest.position, rest.cut, rest.dot) = (end, cut, next_dot);
+                    }
+                    rest => *rest = None,
+                }
             }
         }
     }

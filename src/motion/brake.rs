@@ -439,8 +439,6 @@ pub struct StepBrake {
 const CHANGES: u8 = 3;
 /// It was told that a pulse is none of a step, which is to come.
 const AHEAD: u8 = 1 << 3;
-/// The step whose way is known is taken.
-const TAKE: u8 = 1 << 4;
 /// A length was told.
 const TOLD: u8 = 1 << 5;
 /// It may be too soon for the next step.
@@ -521,10 +519,6 @@ impl StepBrake {
 
     #[inline(never)]
     fn prepare(&mut self, todo: u8, orders: &BrakeOrders) -> bool {
-        if todo & TAKE != 0 {
-            self.todo = todo & !TAKE;
-            return self.take(orders);
-        }
         if todo & SKIP != 0 {
             self.todo = todo & !(if todo & AHEAD != 0 { AHEAD } else { SKIP });
             return false;
@@ -536,8 +530,8 @@ impl StepBrake {
             return false;
         }
         self.way = self.length.step();
-        self.todo = todo.saturating_sub(1) | TAKE;
-        true
+        self.todo = todo.saturating_sub(1);
+        self.take(orders)
     }
 }
 

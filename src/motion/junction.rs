@@ -16,13 +16,15 @@ impl Heading {
         // One division for both parts: 2^63 over a length from 2^31 on.
         let length = length.to_bits().max(1);
         let zeros = length.leading_zeros();
+        let scale = u64::from(1u32 << zeros);
         let inverse = (1u64 << 63).checked_div((length << zeros).into()).unwrap_or(0);
         let part = |steps: i32, step: u32| {
             // Units of 2^-32 mm; the length's are 2^-18 mm. A part is no longer than the whole but
             // for rounding, below 2^46, so that 32 bits hold it in units of the length as it is
             // shifted.
             let part = u64::from(steps.unsigned_abs()) * u64::from(step);
-            let part = ((part << zeros) >> 14).min(u32::MAX.into());
+            // A product is a shift, and one instruction where a shift of 64 bits is a call.
+            let part = ((part * scale) >> 14).min(u32::MAX.into());
             let heading = (part * inverse) >> 33;
             // 2^30 but for rounding.
             let heading = heading.min(1 << 30) as i32;

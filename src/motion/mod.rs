@@ -20,8 +20,8 @@
 //!
 //! Measured on a Cortex-M3, built for size, everything between target and queue included: 38
 //! instructions for each event of a line at 100,000 moves a second, and 61 to 148 with a limit on
-//! jerk; for chords of five moves at 5,000 a second 485, and 489 to 507. `cargo xtask bench
-//! --motion` counts them.
+//! jerk; for chords of five moves at 5,000 a second 451, and 483 to 499. The step interrupt is not
+//! counted in that. `cargo xtask bench --motion` counts both.
 //!
 //! Not done here: limits of travel, the pen's heights, states. That is `machine`.
 

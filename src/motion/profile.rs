@@ -105,6 +105,17 @@ impl Profile {
         exit_allowed: PathLength,
     ) -> Self {
         let (start, reach) = (entry.stopping_distance, length);
+        // Most chords are run at the greatest speed from end to end.
+        if start == top.stopping_distance && start > 0 && exit_allowed >= start {
+            let phase = Phase::new(limits, top.speed, top.speed, length);
+            return Self {
+                phase,
+                flat: PathLength::ZERO,
+                down: PathLength::ZERO,
+                peak: top,
+                exit: top,
+            };
+        }
         let slowest = start.saturating_sub(reach);
         let fastest = start.saturating_add(reach);
         let exit = exit_allowed.min(fastest).max(slowest);

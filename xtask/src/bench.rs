@@ -56,7 +56,10 @@ pub fn count_motion() -> Result<()> {
     for line in counts.lines() {
         say!("| {} |", line.replace('|', " | "))?;
     }
-    Ok(())
+    say!("")?;
+    say!("| job | step interrupts |")?;
+    say!("|---|---|")?;
+    run_in_emulators(&BOARDS[..1], "interrupt_counts")
 }
 
 /// Builds a benchmark image, runs it in QEMU, and returns its output.

@@ -4,9 +4,10 @@
 use crate::fixtures::{
     dotted, ink, is_ready, job, never_cancel, polargraph, raised, run_job, to, with, with_backlash,
 };
+use penup::boards::host::Stamped;
 use penup::machine::{Alarm, Setting, SettingError, Settings, State, Target, TargetList, Value};
 use penup::motion::LimitsError;
-use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::event_checker::{self, Drawn, Standstill};
 use penup_host_tests::pin_machine;
 use proptest::prelude::*;
 use std::sync::LazyLock;
@@ -19,15 +20,19 @@ fn overlapping(mut settings: Settings, down: f64, up: f64) -> Settings {
     settings
 }
 
-/// Draws a path to its end.
-fn draw(settings: Settings, targets: &[Target]) -> Drawn {
-    let trace = pin_machine::run(settings, &mut TargetList::new(targets), 25_000, &mut |turn| {
+/// The changes of the pins that draw a path to its end.
+fn trace(settings: Settings, targets: &[Target]) -> Vec<Stamped> {
+    pin_machine::run(settings, &mut TargetList::new(targets), 25_000, &mut |turn| {
         if turn.now == 0 {
             turn.machine.start(&mut TargetList::new(targets)).expect("valid");
         }
         !is_ready(turn.machine)
-    });
-    event_checker::check_pins(&trace, &settings)
+    })
+}
+
+/// Draws a path to its end.
+fn draw(settings: Settings, targets: &[Target]) -> Drawn {
+    event_checker::check_pins(&trace(settings, targets), &settings)
 }
 
 /// Text-like strokes: some 3 mm long, 2 to 6 mm apart, in rows.
@@ -44,19 +49,23 @@ fn text() -> Vec<Target> {
     targets
 }
 
+/// Strokes whose travels are each longer than the pen takes: 4.5 mm.
+fn long_travels() -> Vec<Target> {
+    (0..8)
+        .flat_map(|stroke| {
+            let x = 1600 + 2400 * (stroke % 4);
+            [to(x, 800 + 1200 * stroke), ink(x + 300, 900 + 1200 * stroke)]
+        })
+        .collect()
+}
+
 fn milliseconds(drawn: &Drawn) -> f64 {
     drawn.last_step as f64 / 25_000.0
 }
 
 #[test]
 fn long_travels_leave_20_ms_at_rest_and_a_text_is_faster() {
-    // Each travel is longer than the pen takes: 4.5 mm.
-    let targets: Vec<_> = (0..8)
-        .flat_map(|stroke| {
-            let x = 1600 + 2400 * (stroke % 4);
-            [to(x, 800 + 1200 * stroke), ink(x + 300, 900 + 1200 * stroke)]
-        })
-        .collect();
+    let targets = long_travels();
     for (jerk, most) in [(0.0, 10.0), (20.0, 35.0), (100.0, 30.0)] {
         let plain = with(&[(Setting::Jerk, jerk)]);
         let settings = overlapping(plain, 150.0, 150.0);
@@ -84,6 +93,70 @@ fn long_travels_leave_20_ms_at_rest_and_a_text_is_faster() {
         after.stood.iter().sum::<f64>()
     );
     assert!(milliseconds(&after) < 0.81 * milliseconds(&before));
+}
+
+/// For how many milliseconds the machine of the default settings is within half a diagonal step of
+/// where it rests, before or behind it, with a limit on jerk in m/s³.
+fn half_step(jerk: f64) -> f64 {
+    let way = 0.01 * std::f64::consts::SQRT_2 / 2.0;
+    // Braking is reckoned with 16/18 of the jerk.
+    let seconds = if jerk == 0.0 {
+        (2.0 * way / 800.0).sqrt()
+    } else {
+        (6.0 * way / (jerk * 1000.0 * 16.0 / 18.0)).cbrt()
+    };
+    seconds * 1000.0
+}
+
+#[test]
+fn a_pen_stands_still_on_the_paper_while_the_machine_brakes_and_starts_half_a_step() {
+    for (name, targets) in [("long travels", long_travels()), ("text", text())] {
+        for jerk in [0.0, 20.0, 100.0] {
+            let strokes = |early: f64, contact: f64| {
+                let settings = overlapping(with(&[(Setting::Jerk, jerk)]), early, early);
+                event_checker::standstill(&trace(settings, &targets), &settings, contact)
+            };
+            let greatest = |strokes: &[Standstill], of: fn(&Standstill) -> f64| {
+                strokes.iter().map(of).fold(0.0, f64::max)
+            };
+            for contact in [0.0, 0.1] {
+                for early in [0.0, 150.0] {
+                    let strokes = strokes(early, contact);
+                    println!(
+                        "{name}, {jerk} m/s3, on the paper for {contact} of its way, overlap \
+                         {early} ms: begin {:.1}, corners {:.1}, end {:.1}, all {:.1} ms, at most \
+                         {:.0} steps of travels",
+                        greatest(&strokes, |stroke| stroke.begin),
+                        greatest(&strokes, |stroke| stroke.corners),
+                        greatest(&strokes, |stroke| stroke.end),
+                        greatest(&strokes, Standstill::sum),
+                        greatest(&strokes, |stroke| stroke.dragged as f64),
+                    );
+                }
+            }
+            // A pen that is on the paper when it has arrived stands there for no longer than half a
+            // step takes, twice in a corner, and draws nothing of the travels.
+            let (even, half) = (strokes(150.0, 0.0), half_step(jerk));
+            assert_eq!(
+                even.len(),
+                targets.iter().filter(|target| target.ink.is_none()).count()
+                    - usize::from(name == "text")
+            );
+            for stroke in &even {
+                let Standstill { begin, corners, end, dragged } = *stroke;
+                assert!(begin < half + 0.3 && end < half + 0.3, "{name} {jerk}: {stroke:?}");
+                assert!(corners < 2.0 * half + 0.5 && dragged == 0, "{name} {jerk}: {stroke:?}");
+            }
+            if jerk != 20.0 {
+                assert!(greatest(&even, Standstill::sum) < 15.0, "{name} {jerk}");
+            }
+            // One that is on it for a tenth of its way stands for that tenth, too, where it is not
+            // told early enough.
+            let tenth = greatest(&strokes(150.0, 0.1), Standstill::sum);
+            let both = if jerk == 0.0 { 15.0 } else { 30.0 };
+            assert!(tenth < 4.0 * half + 0.5 + both, "{name} {jerk}: {tenth}");
+        }
+    }
 }
 
 #[test]

@@ -204,10 +204,10 @@ impl Stepper {
     /// The worst case of each handler, in instructions counted in QEMU from its first instruction
     /// to its last in a build for size, is: 58 for an event of a move (59 for the pen, 76 where a
     /// motor lifts it); 51 for the end of its pulses (28 while the queue holds the stopping
-    /// distance); 59 for one part of the brake's work (47 at each step where the queue does not
+    /// distance); 71 for one part of the brake's work (47 at each step where the queue does not
     /// hold the stopping distance). So a step takes 86, and at most some 160 where few steps wait.
-    /// A change of the length of the steps takes one more event and three parts of the brake's
-    /// work. `host-tests/tests/qemu_interrupt.rs` checks these figures.
+    /// A change of the length of the steps takes one more event and four parts of the brake's work.
+    /// `host-tests/tests/qemu_interrupt.rs` checks these figures.
     #[inline(always)]
     fn step(&mut self) {
         let now = clock::count_down();
