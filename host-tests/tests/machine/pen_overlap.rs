@@ -5,10 +5,15 @@ use crate::fixtures::{
     dotted, ink, is_ready, job, never_cancel, polargraph, raised, run_job, to, with, with_backlash,
 };
 use penup::boards::host::Stamped;
+use penup::drawing::{LineType, PagePoint};
+use penup::fixed::Millimetres;
 use penup::machine::{Alarm, Setting, SettingError, Settings, State, Target, TargetList, Value};
-use penup::motion::LimitsError;
+use penup::motion::{
+    Block, Limits, LimitsError, MotionSettings, Move, PathLength, PenOverlap, PenPositions,
+    Progress, Runner,
+};
 use penup_host_tests::event_checker::{self, Drawn, Standstill};
-use penup_host_tests::pin_machine;
+use penup_host_tests::pin_machine::{self, Recorder};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -222,6 +227,64 @@ fn a_travel_that_becomes_slow_does_not_lower_the_pen_too_early() {
             assert_eq!(drawn.inked, undisturbed.inked, "{instant}");
         }
     }
+}
+
+/// The travel is then too short for the pen, which is waited for behind it.
+#[test]
+fn a_travel_that_becomes_faster_does_not_stand_on_the_way() {
+    let per_mm = |count: u32| Millimetres::from_num(count);
+    let limits = Limits::new(&MotionSettings {
+        steps_per_mm: [per_mm(100); 2],
+        motor_steps_per_mm: per_mm(100),
+        draw_mm_per_min: per_mm(3000),
+        travel_mm_per_min: per_mm(6000),
+        acceleration_mm_per_s2: per_mm(200),
+        jerk_m_per_s3: Millimetres::ZERO,
+        junction_deviation_mm: Millimetres::from_num(0.127),
+        centripetal: true,
+        pulse_ticks: 50,
+        direction_setup_ticks: 25,
+        queue_steps: u32::MAX,
+    });
+    let pen = PenPositions {
+        up_height: 0,
+        down_height: 100,
+        up_ticks: 10_000_000,
+        down_ticks: 4_000_000,
+        ramp_ticks: 0,
+        dot_length: PathLength::ZERO,
+        lift: None,
+        overlap: PenOverlap { down_ticks: 3_000_000, up_ticks: 10_000_000 },
+    };
+    let mut blocks = [Block::EMPTY; 8];
+    let mut runner = Runner::new(limits.expect("valid"), pen, &mut blocks);
+    for (x, ink) in [(1000, true), (1600, false), (3000, true)] {
+        let (motors, from) = (PagePoint { x, y: 0 }, runner.end());
+        let length = runner.limits().length(x - from.x, 0).expect("short");
+        let way = (x - from.x, 0);
+        let (offsets, page, whole, is_gap) = ([0; 2], motors, length, false);
+        let piece = Move { motors, offsets, page, way, whole, length, is_gap };
+        runner.push(&piece, ink.then_some(LineType::Full), PathLength::MAX).expect("room");
+    }
+    let mut events = Recorder(Vec::new());
+    runner.set_override(100, 20);
+    while runner.position().x < 1100 {
+        assert_eq!(runner.produce(&mut events), Ok(Progress::More));
+    }
+    runner.set_override(100, 100);
+    while runner.produce(&mut events) == Ok(Progress::More) {}
+    let (mut gaps, mut gap) = (Vec::new(), 0.0);
+    for event in &events.0 {
+        gap += f64::from(event.ticks());
+        if event.is_step() {
+            gaps.push(std::mem::take(&mut gap));
+        }
+    }
+    assert_eq!(gaps.len(), 3000);
+    for (at, pair) in gaps[1090..1590].windows(2).enumerate() {
+        assert!(pair[1] < 2.0 * pair[0], "{pair:?} ticks at step {}", 1090 + at);
+    }
+    assert!(gaps[1600] > 1_300_000.0, "the pen is waited for: {:?}", &gaps[1597..1602]);
 }
 
 #[test]
