@@ -65,8 +65,8 @@ impl<'a, I: Index> Faces<'a, I> {
         // The sort itself does not check for cancelling. It takes some 500 instructions for each of
         // 2000 faces.
         yield_counter.spend(500 * order.len())?;
-        if I::BITS > 16 {
-            order.sort_unstable(); // This is faster, and its code is too large for a board.
+        if cfg!(feature = "threads") {
+            order.sort_unstable(); // This is faster; its code is too large for a board or the page.
         } else {
             heap_sort_by_key(order, |key| *key);
         }
