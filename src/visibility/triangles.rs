@@ -57,7 +57,7 @@ struct Needs {
 impl Needs {
     /// Counts the faces of a scene that no fan covers.
     fn of<I: Index>(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> Self {
-        outlines.elements().filter(|(_, corners)| needs_ears(corners, vertices)).fold(
+        outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
             Self::default(),
             |needs, (_, corners)| Self {
                 faces: needs.faces + 1,
@@ -96,7 +96,8 @@ impl<'a, I: Index> Ears<'a, I> {
         let mut meantime = scratch.reborrow();
         let remaining: &mut [I] = meantime.take(needs.most_corners)?;
         let mut used = 0;
-        let concave = outlines.elements().filter(|(_, corners)| needs_ears(corners, vertices));
+        let concave =
+            outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
         for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
             *entry = Entry([first, used].map_each(I::new));
             for (slot, corner) in remaining.iter_mut().zip(corners) {
@@ -201,11 +202,6 @@ pub fn cut_of<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> Cut {
         .windows(2)
         .all(|side| plane.turn(at(&corners[0]), at(&side[0]), at(&side[1])) >= 0);
     if is_fan { Cut::Fan } else { Cut::Ears }
-}
-
-/// Whether no fan covers a face. A fan covers every triangle.
-fn needs_ears<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> bool {
-    corners.len() > 3 && cut_of(corners, vertices) == Cut::Ears
 }
 
 /// Cuts one ear after the other off a polygon and returns the number of triangles.
