@@ -267,8 +267,8 @@ pub struct PlotArgs {
     )]
     pub from: u32,
     /// Begin closed lines at random points, so that the marks of the pen do not stand in a row;
-    /// this computer then computes the drawing. Else they begin where the moves between lines become
-    /// short
+    /// this computer then computes the drawing. Else they begin where the moves between lines
+    /// become short
     #[arg(long, help_heading = "Plotter")]
     pub reloop: bool,
     /// Go on with this drawing where a loss of power or a reset has stopped it while this computer

@@ -22,9 +22,9 @@ impl Settings {
         self.values.iter().find(|(own, _)| *own == name).map(|(_, value)| value.as_str())
     }
 
-    /// Says that a plan with these least and greatest coordinates, in mm, is too large for the page,
-    /// but fits it if the page is turned, which the plotter does not know. `None` if the plan fits,
-    /// is scaled, or is too large for the turned page, too.
+    /// Says that a plan with these least and greatest coordinates, in mm, is too large for the
+    /// page, but fits it if the page is turned, which the plotter does not know. `None` if the plan
+    /// fits, is scaled, or is too large for the turned page, too.
     pub fn fits_turned(&self, [low, high]: [[f64; 2]; 2]) -> Option<String> {
         let margin: f64 = self.value("margin")?.parse().ok()?;
         let [width, height] = [0, 1].map(|axis| high[axis] - low[axis] + 2.0 * margin);

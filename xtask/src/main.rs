@@ -205,8 +205,8 @@ enum Task {
         /// How many changes of those modules that decide what is drawn, always the same ones.
         #[arg(default_value_t = 500)]
         count: u32,
-        /// A portion of them only, such as 2/5, the second of five; or `further`: some more changes,
-        /// which are not among them.
+        /// A portion of them only, such as 2/5, the second of five; or `further`: some more
+        /// changes, which are not among them.
         #[arg(long)]
         part: Option<mutants::Part>,
     },
