@@ -24,11 +24,11 @@ pub struct PanicCall {
 /// Whether a function of this name is called only to panic.
 fn panics(name: &str) -> bool {
     let is_core = name.starts_with("core::") || name.starts_with("heapless::");
+    let function = name.rsplit("::").next().unwrap_or_default();
     is_core
         && (name.contains("::panicking::")
-            || ["_fail", "_failed", "_fail_rt", "fail"].iter().any(|end| {
-                name.rsplit("::").next().is_some_and(|function| function.ends_with(end))
-            }))
+            || function.starts_with("panic_")
+            || ["_fail", "_failed", "_fail_rt", "fail"].iter().any(|end| function.ends_with(end)))
 }
 
 /// Finds the calls of panic functions in an ELF file for a Cortex-M, in the order of the files. The
@@ -126,7 +126,10 @@ fn functions(file: &object::File<'_>) -> Result<Functions, Box<dyn Error>> {
     let mut functions = Functions::new();
     for symbol in file.symbols().filter(|symbol| symbol.kind() == SymbolKind::Text) {
         let start = symbol.address() & !1;
-        let name = format!("{:#}", rustc_demangle::demangle(symbol.name()?));
+        // The linker's jumps to functions that are far away count as the functions.
+        let name = symbol.name()?;
+        let name = name.split_once("Thunk_").map_or(name, |(_, target)| target);
+        let name = format!("{:#}", rustc_demangle::demangle(name));
         // Functions with the same instructions are stored once, under several names.
         let entry = functions.entry(start).or_insert_with(|| (name.clone(), start + symbol.size()));
         if panics(&name) {

@@ -174,10 +174,9 @@ impl Steps {
         let packed = pack(step);
         let first = (self.written % WORDS) as usize;
         let (around, behind) = LENGTHS.split_at(first);
-        let before_end = behind.len().min(count as usize);
-        let lengths = [&behind[..before_end], &around[..count as usize - before_end]];
-        for part in lengths {
-            for slot in part {
+        let count_around = (count as usize).saturating_sub(behind.len());
+        for (part, count) in [(behind, count as usize), (around, count_around)] {
+            for slot in part.iter().take(count) {
                 slot.store(packed, Ordering::Relaxed);
             }
         }

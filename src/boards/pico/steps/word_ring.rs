@@ -40,8 +40,8 @@ pub fn slot(word: u32) -> &'static AtomicU32 {
 
 /// Up to `count` consecutive slots from `word` on, cut off at the end of the ring.
 pub fn row(word: u32, count: u32) -> &'static [AtomicU32] {
-    let start = word % WORDS;
-    &RING.0[start as usize..(start + count).min(WORDS) as usize]
+    let (_, row) = RING.0.split_at((word % WORDS) as usize);
+    row.get(..count as usize).unwrap_or(row)
 }
 
 /// Returns the address of the slot for word number `word`, where the DMA channel is to read.
