@@ -30,7 +30,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Duration;
 
-pub use pico::{FlashOperation, Pico, PicoByUsb, UartError};
+pub use pico::{FlashOperation, InterruptTimes, Pico, PicoByUsb, UartError};
 pub use stack::Stack;
 
 use crate::table::{self, BoardRow};

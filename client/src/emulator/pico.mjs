@@ -26,7 +26,8 @@
 // an address, with the stack used up (1) or as it is (0), 37 the host opens the USB port (1) or
 // closes it (0) at a rate (the cycle), 38 the host resets the bus so many times (the value) at
 // random (a seed in the cycle's place), 48 the next setting of the clock's alarm is late by so many
-// milliseconds. Out: 0 a byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the
+// milliseconds, 49 from now on the longest handlers and masks of interrupts are measured (1), or
+// told (0). Out: 0 a byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the
 // log, 4 the chip was reset (0 by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte
 // of USB, 6 a timed function has returned (its number, the cycles in the cycle's place), 7 so many
 // bytes of the stack have not been used since the chip began (in the cycle's place), 32 the boot
@@ -35,7 +36,9 @@
 // later (in the cycle's place) the first byte of the answer (0) or all of it (1) had left, 36 so
 // often the records in flash were read, 37 a recorded operation of the flash, an erasure (1) or a
 // page (0), began at that cycle, 38 from which place it goes on (the upper 32 bits) and how many
-// bytes it changes (the lower 16), 39 so many operations were recorded.
+// bytes it changes (the lower 16), 39 so many operations were recorded, 40 the longest cycles of an
+// exception's handler (its number), 41 and for which an interrupt was masked (its number, 255 for
+// all by PRIMASK, or 254 for all while the flash was changed), 42 all of these have been told.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -49,6 +52,7 @@ import { pathToFileURL } from 'node:url';
 import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
 import { attachFlashChip } from './pico/flash_chip.mjs';
 import { FlashRecord } from './pico/flash_record.mjs';
+import { InterruptTimes } from './pico/interrupt_times.mjs';
 import { delayAlarm } from './pico/late_alarm.mjs';
 import { mendCore, refuseMisaligned } from './pico/mended_core.mjs';
 import { Marks, quickCore } from './pico/quick_core.mjs';
@@ -106,6 +110,10 @@ const OPERATION_CHANGES = 38;
 const OPERATIONS = 39;
 const ASK_IN_ERASURES = 18;
 const GO_ON = -1;
+const TIME_INTERRUPTS = 49;
+const HANDLER_TOOK = 40;
+const MASK_TOOK = 41;
+const INTERRUPTS_END = 42;
 const DELAY_ALARM = 48;
 /** Nanoseconds by which the next settings of the clock's alarm are late. */
 const alarmDelays = [];
@@ -343,6 +351,7 @@ function start(flash, kind) {
   schedule();
   usb.attach(chip);
   attachFlashChip(chip);
+  interruptTimes?.attach(core);
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
     // Or its alarm would come again at once, for ever.
@@ -611,7 +620,10 @@ process.stdin.on('data', (data) => {
     }
     else if (rest[at] === STAYS_LOW) wear(entry.cycle, entry.value, false);
     else if (rest[at] === STAYS_HIGH) wear(entry.cycle, entry.value, true);
-    else if (rest[at] === USB_RESETS) {
+    else if (rest[at] === TIME_INTERRUPTS) {
+      if (entry.value) timeInterrupts();
+      else tellInterruptTimes();
+    } else if (rest[at] === USB_RESETS) {
       resetSeeds.push(entry.cycle);
       events.push({ what: USB_RESETS, value: entry.value, cycle: 0 });
     } else if (rest[at] === JUMP) {
@@ -639,6 +651,22 @@ function setInput(number, high) {
 /** A pin takes the level to which it is driven, once it can. */
 function setLevel(number) {
   chip.gpio[number].setInputValue((inputs.get(number) ?? true) && contacts.hasRisen(number, now()));
+}
+
+/** How often the core has waited for the flash. */
+let flashWaits = 0;
+/** The longest handlers and masks of interrupts, once they are measured. */
+let interruptTimes = null;
+
+function timeInterrupts() {
+  interruptTimes = new InterruptTimes(now, () => flashWaits);
+  interruptTimes.attach(core);
+}
+
+function tellInterruptTimes() {
+  for (const [number, cycles] of interruptTimes.handlers) report(HANDLER_TOOK, number, cycles);
+  for (const [number, cycles] of interruptTimes.masks) report(MASK_TOOK, number, cycles);
+  report(INTERRUPTS_END, 0, 0);
 }
 
 /** In a handler, or where it has masked them all, nothing is done to the main loop. */
@@ -744,6 +772,7 @@ function pass(nanos) {
 function waitForFlash() {
   const end = now() + flashNanos / NANOS;
   flashNanos = 0;
+  flashWaits++;
   for (let cycle = now(); cycle < end; cycle = now()) {
     const alarm = clock.nextAlarm ? cyclesBefore + clock.nextAlarm.nanos / NANOS : Infinity;
     pass(Math.max(Math.min(alarm, Math.ceil(pioDue), end) - cycle, 0) * NANOS);

@@ -2,11 +2,13 @@
 //! protocol between both.
 
 mod flash;
+mod interrupt_times;
 mod process;
 mod record;
 mod servo;
 
 pub use flash::FlashOperation;
+pub use interrupt_times::InterruptTimes;
 use process::{
     PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
 };

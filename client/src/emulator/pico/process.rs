@@ -2,9 +2,11 @@
 
 use super::BOARD;
 use super::flash::FlashOperation;
+use super::interrupt_times::InterruptTimes;
 use super::record::{
-    ANSWERED, BOOTSEL, GARBLED, LOG, OPERATION_BEGAN, OPERATION_CHANGES, OPERATIONS, PIN,
-    RECORD_BYTES, RESET, RETURNED, Record, SERIAL, UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
+    ANSWERED, BOOTSEL, GARBLED, HANDLER_TOOK, INTERRUPTS_END, LOG, MASK_TOOK, OPERATION_BEGAN,
+    OPERATION_CHANGES, OPERATIONS, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL,
+    UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
 };
 use super::servo::Servo;
 use crate::emulator::EmulatorError;
@@ -29,6 +31,7 @@ const MODULES: &[(&str, &str)] = &[
     ("./pico/core_cycles.mjs", include_str!("core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
     ("./pico/flash_record.mjs", include_str!("flash_record.mjs")),
+    ("./pico/interrupt_times.mjs", include_str!("interrupt_times.mjs")),
     ("./pico/late_alarm.mjs", include_str!("late_alarm.mjs")),
     ("./pico/mended_core.mjs", include_str!("mended_core.mjs")),
     ("./pico/quick_core.mjs", include_str!("quick_core.mjs")),
@@ -45,8 +48,18 @@ const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
 const SAID_LINES: usize = 20;
 
 /// Messages whose `cycle` is something other than the present cycle.
-const NO_TIMES: [u8; 7] =
-    [RETURNED, UNUSED_STACK, ANSWERED, WERE_READ, OPERATION_BEGAN, OPERATION_CHANGES, OPERATIONS];
+const NO_TIMES: [u8; 10] = [
+    RETURNED,
+    UNUSED_STACK,
+    ANSWERED,
+    WERE_READ,
+    OPERATION_BEGAN,
+    OPERATION_CHANGES,
+    OPERATIONS,
+    HANDLER_TOOK,
+    MASK_TOOK,
+    INTERRUPTS_END,
+];
 
 /// What the reader threads have learnt from the emulator.
 #[derive(Default)]
@@ -71,6 +84,10 @@ pub(super) struct State {
     pub(super) operations: Vec<FlashOperation>,
     /// How many were recorded, when all have come.
     pub(super) operation_count: Option<u64>,
+    /// The longest handlers and masks of interrupts, as they come.
+    pub(super) interrupt_times: InterruptTimes,
+    /// Whether all of them have come.
+    pub(super) knows_interrupt_times: bool,
     /// Whether the boot ROM shows its drive and waits for an image.
     pub(super) shows_drive: bool,
     /// The serial number that the USB host has read.
@@ -244,6 +261,13 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                     }
                 }
                 OPERATIONS => state.operation_count = Some(record.cycle),
+                HANDLER_TOOK => {
+                    state.interrupt_times.handlers.insert(record.value, at(record.cycle));
+                }
+                MASK_TOOK => {
+                    state.interrupt_times.masks.insert(record.value, at(record.cycle));
+                }
+                INTERRUPTS_END => state.knows_interrupt_times = true,
                 ANSWERED => state.waits[usize::from(record.value & 1)].push(at(record.cycle)),
                 BOOTSEL => state.shows_drive = true,
                 USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
