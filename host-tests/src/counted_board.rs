@@ -15,6 +15,10 @@ use std::time::{Duration, Instant};
 
 type TestResult = Result<(), Box<dyn Error>>;
 
+/// Of the tick of the clock.
+pub const CLOCK: u32 = 15;
+/// Of received bytes, and of room for bytes to send.
+pub const SERIAL: u32 = 21;
 /// Of an event.
 pub const EVENT: u32 = 37;
 /// Of the end of its pulses.

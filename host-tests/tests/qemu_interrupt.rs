@@ -1,8 +1,10 @@
-//! Tests that the step interrupt of the LM3S6965 takes no more instructions than documented
-//! (`src/boards/lm3s6965/steps.rs`).
+//! Tests that the handlers of the LM3S6965 take no more instructions than documented
+//! (`src/boards/lm3s6965/steps.rs`, docs/reliability.md).
 #![cfg(feature = "emulator")]
 
-use penup_host_tests::counted_board::{Counted, END_OF_PULSES, EVENT, PIECE_OF_BRAKE};
+use penup_host_tests::counted_board::{
+    CLOCK, Counted, END_OF_PULSES, EVENT, PIECE_OF_BRAKE, SERIAL,
+};
 use penup_host_tests::emulated_jobs::PEN_ON_A_MOTOR;
 use std::error::Error;
 
@@ -23,6 +25,17 @@ fn no_call_takes_more(settings: &[&str], event: usize) -> TestResult {
     }
     board.order(0x18, "Grbl")?;
     let counts = board.end()?;
+    for (number, calls) in &counts {
+        let worst = calls.last_key_value().map(|(worst, _)| *worst);
+        // The serial line's handler empties a queue of 16 bytes.
+        let most = match *number {
+            EVENT | END_OF_PULSES | PIECE_OF_BRAKE => continue,
+            SERIAL => 2000,
+            CLOCK => 10,
+            _ => return Err(format!("handler {number} is not known").into()),
+        };
+        assert!(worst.is_some_and(|worst| (5..=most).contains(&worst)), "{number}: {calls:?}");
+    }
     for (number, most) in [(EVENT, event), (END_OF_PULSES, 51), (PIECE_OF_BRAKE, 71)] {
         let calls = counts.get(&number).ok_or("a handler was not called")?;
         assert!(calls.values().sum::<usize>() > 700, "{number}: {calls:?}");

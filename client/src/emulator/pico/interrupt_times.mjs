@@ -8,7 +8,7 @@ const ALL_FOR_FLASH = 254;
 const INTERRUPTS = 32;
 
 export class InterruptTimes {
-  /** `now` returns the present cycle, and `flashWaits` how often the core has waited for the flash. */
+  /** `now` returns the cycle, and `flashWaits` how often the core has waited for the flash. */
   constructor(now, flashWaits) {
     this.now = now;
     this.flashWaits = flashWaits;
