@@ -74,7 +74,7 @@ fn resume_job(input: &[u8]) {
 /// Goes on with a sound job in a flash in which some bytes differ: four of the input say where, and
 /// one says what.
 fn resume_image(input: &[u8]) {
-    let mut flash = stopped_job().clone();
+    let mut flash = CutFlash { is_damaged: true, ..stopped_job().clone() };
     for patch in input.chunks_exact(5).take(64) {
         let [a, b, c, d, value] = <[u8; 5]>::try_from(patch).expect("its length");
         let at = u32::from_le_bytes([a, b, c, d]) as usize % flash.bytes.len();
