@@ -442,9 +442,16 @@ impl Link for DamagedLine {
 
     fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
         // A doubled byte needs a place.
-        let mut heard = vec![0; buffer.len() / 2];
-        let count = self.board.emulator().receive(&mut heard, patience)?;
-        let bytes = self.damage(&heard[..count]);
+        let most = buffer.len() / 2;
+        let heard = if self.heard.is_empty() {
+            let mut heard = vec![0; most];
+            let count = self.board.emulator().receive(&mut heard, patience)?;
+            heard.truncate(count);
+            heard
+        } else {
+            self.heard.drain(..most.min(self.heard.len())).collect()
+        };
+        let bytes = self.damage(&heard);
         buffer[..bytes.len()].copy_from_slice(&bytes);
         Ok(bytes.len())
     }
