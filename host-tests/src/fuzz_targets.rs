@@ -14,6 +14,7 @@ mod scene;
 mod sender;
 mod session;
 mod stored;
+mod usb;
 
 pub use drawing::fuzz as drawing;
 pub use edits::fuzz as edits;
@@ -24,12 +25,13 @@ pub use scene::fuzz as scene;
 pub use sender::fuzz as sender;
 pub use session::fuzz as session;
 pub use stored::fuzz as stored;
+pub use usb::fuzz as usb;
 
 /// A target: its name, which is that of its corpus, and the function that takes the input.
 pub type Target = (&'static str, fn(&[u8]));
 
 /// All targets.
-pub const TARGETS: [Target; 9] = [
+pub const TARGETS: [Target; 10] = [
     ("session", session),
     ("gcode", gcode),
     ("edits", edits),
@@ -39,4 +41,5 @@ pub const TARGETS: [Target; 9] = [
     ("sender", sender),
     ("scene", scene),
     ("drawing", drawing),
+    ("usb", usb),
 ];

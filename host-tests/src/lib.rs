@@ -50,3 +50,6 @@ pub mod fuzz_targets;
 pub mod gear_train;
 pub mod spiral;
 pub mod step_edges;
+pub mod usb_bus;
+pub mod usb_host;
+pub mod usb_port;

@@ -1,0 +1,546 @@
+//! A USB host that checks what the port of the Pico promises, whatever packets it sends.
+//!
+//! It keeps its own data toggles, as a real host does, and drops a packet that has the wrong one.
+//! It acts as USB 2.0 wants, or breaks transfers off, or sends what no host sends; then it checks
+//! only what the device still owes it. Three things are left out, because the crates do not keep
+//! them:
+//!
+//! - `usb-device` neither takes nor refuses a request with more than 128 bytes of data from the
+//!   host. Nothing is promised of such a transfer. If its data come, they are never read, and the
+//!   controller interrupts until the next SETUP packet. The same holds for data that no request
+//!   has announced.
+//! - `rp2040-hal` takes back the answer to a broken-off request when it sees the next SETUP packet.
+//!   A host that asks before gets the old answer, and may lose the data that it sends. Nothing is
+//!   promised of such a transfer.
+//! - Neither begins anew with DATA0 when the host configures the device again or lifts a halt (USB
+//!   2.0, sections 9.1.1.5 and 9.4.5). So behind each such request one packet may be lost each way,
+//!   just where the toggles differ, but no more, and none is repeated.
+
+use crate::usb_bus::{Answer, Handshake};
+use crate::usb_port::{MANUFACTURER, PACKET, PRODUCT, Port, VENDOR_AND_PRODUCT};
+use usb_device::UsbDirection;
+use usb_device::endpoint::EndpointAddress;
+
+/// The number of endpoints in each direction.
+const ENDPOINTS: usize = 16;
+/// The endpoint from which the host takes the port's bytes.
+pub const FROM_PORT: usize = 2;
+/// The endpoint to which the host sends bytes for the port.
+pub const TO_PORT: usize = 1;
+/// The most data of a request that the device takes.
+const MOST_DATA: usize = 128;
+/// The port reads packets while this many bytes wait at most.
+const ROOM_UP_TO: usize = 446;
+/// How often the device is served until its interrupts end, or it answers.
+const MOST_TURNS: u32 = 16;
+
+/// Sets the line coding. The data follow: 115200 bits a second, one stop bit, no parity, 8 bits.
+const SET_LINE_CODING: [u8; 8] = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
+/// The data of [`SET_LINE_CODING`].
+const LINE_CODING: [u8; 7] = [0x00, 0xC2, 0x01, 0x00, 0, 0, 8];
+
+/// How a control transfer has ended.
+#[derive(Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// The device has confirmed it, with these data, if the host has asked for data.
+    Done(Vec<u8>),
+    /// The device has refused it.
+    Refused,
+    /// The device does not answer.
+    Unanswered,
+}
+
+/// The control transfer that is under way.
+struct Transfer {
+    request: [u8; 8],
+    /// The bytes of data that have come or gone.
+    moved: usize,
+    /// Whether the device owes no further packet.
+    is_over: bool,
+    /// Whether all packets since the request are such that the device owes what USB 2.0 says.
+    is_sound: bool,
+}
+
+impl Transfer {
+    /// The state in which there is none.
+    const NONE: Self = Self { request: [0; 8], moved: 0, is_over: true, is_sound: false };
+
+    /// Whether the host asks for data.
+    fn is_in(&self) -> bool {
+        self.request[0] & 0x80 != 0
+    }
+
+    /// The greatest number of bytes of data, or the exact one if the host sends them.
+    fn length(&self) -> usize {
+        usize::from(u16::from_le_bytes([self.request[6], self.request[7]]))
+    }
+}
+
+/// The host, with the device at the other end of its cable.
+pub struct Host<'p> {
+    /// The device.
+    pub port: Port<'p>,
+    /// Whether the device waits while the host does one thing after the other.
+    pub is_hasty: bool,
+    is_suspended: bool,
+    transfer: Transfer,
+    /// For each endpoint, whether its next packet to the host and from it is DATA1.
+    is_data_1: [[bool; 2]; ENDPOINTS],
+    /// For each endpoint, whether its next packet to the host and from it may be lost.
+    may_lose: [[bool; 2]; ENDPOINTS],
+    /// The bytes for the port that the device has accepted since the last reset of the bus.
+    accepted: Vec<u8>,
+    /// The number of packets that the port has sent, and the host taken, since then.
+    taken: usize,
+    /// The next byte of a pattern in which each place differs from those around it.
+    next: u8,
+}
+
+/// The names of the two directions in the tables of [`Host`].
+const IN: usize = 0;
+/// See [`IN`].
+const OUT: usize = 1;
+
+impl<'p> Host<'p> {
+    /// Plugs the device in. The bus has not been reset yet.
+    pub fn new(port: Port<'p>) -> Self {
+        Self {
+            port,
+            is_hasty: false,
+            is_suspended: false,
+            transfer: Transfer::NONE,
+            is_data_1: [[false; 2]; ENDPOINTS],
+            may_lose: [[false; 2]; ENDPOINTS],
+            accepted: Vec::new(),
+            taken: 0,
+            next: 0,
+        }
+    }
+
+    /// The next bytes of the pattern.
+    pub fn pattern(&mut self, count: usize) -> Vec<u8> {
+        let mut pattern = Vec::with_capacity(count);
+        for _ in 0..count {
+            pattern.push(self.next);
+            self.next = self.next.wrapping_add(1) % 251;
+        }
+        pattern
+    }
+
+    /// Lets the device work until its interrupts end.
+    pub fn settle(&mut self) {
+        for _ in 0..MOST_TURNS {
+            self.port.serve();
+            if !self.port.bus().has_interrupt() {
+                return;
+            }
+        }
+        let is_owed = self.transfer.is_sound || !self.port.bus().is_held_up();
+        assert!(!is_owed, "the controller interrupts for ever");
+    }
+
+    /// Lets the device work, unless the host is hasty.
+    pub fn pause(&mut self) {
+        if !self.is_hasty {
+            self.settle();
+        }
+    }
+
+    /// Resets the bus, and waits as long as a host does. What the controller holds is lost, but
+    /// nothing else.
+    pub fn reset(&mut self) {
+        self.is_suspended = false;
+        self.port.bus().reset_bus();
+        self.transfer = Transfer::NONE;
+        self.settle();
+        assert!(!self.port.is_up() && !self.port.is_open(), "a reset has left the port open");
+        let lost = self.accepted.len() - self.arrived();
+        assert!(lost <= PACKET, "{lost} bytes were lost by a reset");
+        self.accepted = self.port.waiting();
+        self.port.received.clear();
+        self.port.sent.clear();
+        self.taken = 0;
+        self.is_data_1 = [[false; 2]; ENDPOINTS];
+        self.may_lose = [[false; 2]; ENDPOINTS];
+    }
+
+    /// Suspends the bus. It resumes it before the next packet, if not before.
+    pub fn suspend(&mut self) {
+        self.is_suspended = true;
+        self.port.bus().suspend_bus();
+    }
+
+    /// Resumes the bus.
+    pub fn resume(&mut self) {
+        if self.is_suspended {
+            self.is_suspended = false;
+            self.port.bus().resume_bus();
+        }
+    }
+
+    /// Checks that what the port has received is what it was sent, and returns the number of those
+    /// bytes.
+    fn arrived(&self) -> usize {
+        let waiting = self.port.waiting();
+        let (read, count) = (&self.port.received, self.port.received.len());
+        let is_same =
+            self.accepted.starts_with(read) && self.accepted[count..].starts_with(&waiting);
+        assert!(is_same, "the port has received other bytes than it was sent");
+        count + waiting.len()
+    }
+
+    /// Sends a SETUP packet.
+    pub fn set_up(&mut self, request: [u8; 8]) {
+        self.resume();
+        self.port.bus().set_up(request);
+        self.transfer = Transfer { request, moved: 0, is_over: false, is_sound: true };
+        self.transfer.is_sound = self.transfer.is_in() || self.transfer.length() <= MOST_DATA;
+        self.is_data_1[0] = [true; 2];
+    }
+
+    /// Asks endpoint 0 for a packet: for data, or for the confirmation of a request. Returns its
+    /// bytes, if the host takes them for new ones.
+    pub fn ask_control(&mut self) -> Result<Vec<u8>, Answer> {
+        self.resume();
+        let (bytes, is_data_1, is_current) = match self.port.bus().ask(0) {
+            Answer::Packet { bytes, is_data_1, is_current } => (bytes, is_data_1, is_current),
+            Answer::Stall => {
+                self.transfer.is_over = true;
+                return Err(Answer::Stall);
+            }
+            answer => {
+                self.check_patience(self.transfer.is_in());
+                return Err(answer);
+            }
+        };
+        let length = self.transfer.length();
+        let transfer = &mut self.transfer;
+        transfer.is_sound &= is_current;
+        let is_new = is_data_1 == self.is_data_1[0][IN];
+        if transfer.is_sound {
+            assert!(is_new, "a packet of a control transfer has the wrong data toggle");
+            assert!(
+                transfer.is_in() || transfer.moved == length,
+                "a request is confirmed before its data have come"
+            );
+            let room = if transfer.is_in() { length - transfer.moved } else { 0 };
+            assert!(bytes.len() <= room, "{} bytes, but only {room} are due", bytes.len());
+        }
+        if !is_new {
+            return Ok(Vec::new());
+        }
+        self.is_data_1[0][IN] = !is_data_1;
+        if !transfer.is_in() {
+            let was_over = std::mem::replace(&mut transfer.is_over, true);
+            if !was_over && transfer.moved >= length {
+                self.follow_confirmed();
+            }
+        } else {
+            transfer.moved += bytes.len();
+            transfer.is_over |= bytes.len() < PACKET || transfer.moved >= length;
+        }
+        Ok(bytes)
+    }
+
+    /// Sends endpoint 0 a packet: data of a request, or the confirmation of an answer.
+    pub fn give_control(&mut self, packet: &[u8]) -> Handshake {
+        self.resume();
+        let bus = self.port.bus();
+        let had_setup = bus.has_setup();
+        let is_data_1 = self.transfer.is_in() || self.is_data_1[0][OUT];
+        let handshake = bus.give(0, is_data_1, packet);
+        let left = self.transfer.length().saturating_sub(self.transfer.moved);
+        let is_due = if self.transfer.is_in() {
+            packet.is_empty()
+        } else {
+            left > 0 && packet.len() == left.min(PACKET)
+        };
+        match handshake {
+            Handshake::Ack | Handshake::Dropped => {
+                self.is_data_1[0][OUT] = !is_data_1;
+                self.transfer.is_sound &= is_due && !had_setup;
+                let is_wrong = self.transfer.is_sound && handshake == Handshake::Dropped;
+                assert!(!is_wrong, "the device expects another data toggle");
+                if self.transfer.is_in() {
+                    self.transfer.is_over = true;
+                } else {
+                    self.transfer.moved += packet.len();
+                }
+            }
+            Handshake::Stall => self.transfer.is_over = true,
+            Handshake::Nak | Handshake::Nothing => {
+                self.check_patience(is_due && !self.transfer.is_in());
+            }
+        }
+        handshake
+    }
+
+    /// Checks that a device that does not answer at endpoint 0 has still something to do, or owes
+    /// nothing.
+    fn check_patience(&self, is_owed: bool) {
+        let transfer = &self.transfer;
+        let is_owed = is_owed || transfer.moved == transfer.length();
+        let is_late = transfer.is_sound && !transfer.is_over && !self.port.bus().has_interrupt();
+        assert!(!(is_owed && is_late), "the device does not go on with {:x?}", transfer.request);
+    }
+
+    /// Begins anew with DATA0 where a confirmed request wants it, and notes where the device does
+    /// not.
+    fn follow_confirmed(&mut self) {
+        let of_endpoint = usize::from(self.transfer.request[4] & 0x8F);
+        let all = (1..ENDPOINTS).flat_map(|index| [index, index | 0x80]);
+        let anew: Vec<usize> = match self.transfer.request {
+            [0x00, 9, ..] | [0x01, 11, ..] => all.collect(),
+            [0x02, 1, 0, 0, ..] => all.filter(|address| *address == of_endpoint).collect(),
+            _ => return,
+        };
+        for address in anew {
+            let (index, is_in) = (address & 0xF, address & 0x80 != 0);
+            let direction = if is_in { UsbDirection::In } else { UsbDirection::Out };
+            let endpoint = EndpointAddress::from_parts(index, direction);
+            let side = if is_in { IN } else { OUT };
+            self.is_data_1[index][side] = false;
+            self.may_lose[index][side] = self.port.bus().is_data_1_next(endpoint);
+        }
+    }
+
+    /// Asks another endpoint than the first for a packet. Only the port has any.
+    pub fn ask(&mut self, endpoint: usize) -> Result<Vec<u8>, Answer> {
+        self.resume();
+        let (bytes, is_data_1) = match self.port.bus().ask(endpoint) {
+            Answer::Packet { bytes, is_data_1, .. } => (bytes, is_data_1),
+            answer => return Err(answer),
+        };
+        assert_eq!(endpoint, FROM_PORT, "a packet of an endpoint that sends nothing");
+        assert_eq!(self.port.sent.get(self.taken), Some(&bytes), "another packet than was sent");
+        if is_data_1 == self.is_data_1[endpoint][IN] {
+            self.is_data_1[endpoint][IN] = !is_data_1;
+            self.taken += 1;
+            assert_eq!(self.taken, self.port.sent.len(), "a packet is missing");
+            return Ok(bytes);
+        }
+        assert!(self.may_lose[endpoint][IN], "a packet from the port has the wrong data toggle");
+        self.may_lose[endpoint][IN] = false;
+        self.port.sent.pop();
+        Ok(Vec::new())
+    }
+
+    /// Sends the port a packet.
+    pub fn give(&mut self, packet: &[u8]) -> Handshake {
+        self.resume();
+        let is_data_1 = self.is_data_1[TO_PORT][OUT];
+        let handshake = self.port.bus().give(TO_PORT, is_data_1, packet);
+        match handshake {
+            Handshake::Ack => {
+                self.accepted.extend_from_slice(packet);
+                self.is_data_1[TO_PORT][OUT] = !is_data_1;
+            }
+            Handshake::Dropped => {
+                assert!(
+                    self.may_lose[TO_PORT][OUT],
+                    "the port drops a packet that it acknowledges"
+                );
+                self.may_lose[TO_PORT][OUT] = false;
+                self.is_data_1[TO_PORT][OUT] = !is_data_1;
+            }
+            Handshake::Nak => {
+                let has_room = self.port.waiting().len() <= ROOM_UP_TO;
+                let is_idle = !self.port.bus().has_interrupt();
+                assert!(!(has_room && is_idle), "the port has room, but takes nothing");
+            }
+            Handshake::Stall | Handshake::Nothing => {}
+        }
+        handshake
+    }
+
+    /// Makes a whole control transfer, as a host should. `data` follow the request, or are what the
+    /// host asks for.
+    pub fn transfer(&mut self, request: [u8; 8], data: &[u8]) -> Outcome {
+        self.set_up(request);
+        self.pause();
+        let mut answer = Vec::new();
+        if self.transfer.is_in() {
+            loop {
+                match self.ask_patiently() {
+                    Ok(packet) => {
+                        answer.extend_from_slice(&packet);
+                        if packet.len() < PACKET || answer.len() >= self.transfer.length() {
+                            break;
+                        }
+                    }
+                    Err(Answer::Stall) => return Outcome::Refused,
+                    Err(_) => return Outcome::Unanswered,
+                }
+            }
+        }
+        let packets =
+            if self.transfer.is_in() { vec![&data[..0]] } else { data.chunks(PACKET).collect() };
+        for packet in packets {
+            match self.give_patiently(packet) {
+                Handshake::Ack | Handshake::Dropped => {}
+                Handshake::Stall => return Outcome::Refused,
+                Handshake::Nak | Handshake::Nothing => return Outcome::Unanswered,
+            }
+        }
+        if !self.transfer.is_in() {
+            match self.ask_patiently() {
+                Ok(_) => {}
+                Err(Answer::Stall) => return Outcome::Refused,
+                Err(_) => return Outcome::Unanswered,
+            }
+        }
+        Outcome::Done(answer)
+    }
+
+    /// Asks endpoint 0 until it answers.
+    fn ask_patiently(&mut self) -> Result<Vec<u8>, Answer> {
+        for _ in 0..MOST_TURNS {
+            let answer = self.ask_control();
+            if answer != Err(Answer::Nak) {
+                self.pause();
+                return answer;
+            }
+            self.port.serve();
+        }
+        Err(Answer::Nak)
+    }
+
+    /// Sends endpoint 0 a packet until it answers.
+    fn give_patiently(&mut self, packet: &[u8]) -> Handshake {
+        for _ in 0..MOST_TURNS {
+            let handshake = self.give_control(packet);
+            if handshake != Handshake::Nak {
+                self.pause();
+                return handshake;
+            }
+            self.port.serve();
+        }
+        Handshake::Nak
+    }
+
+    /// Takes all that the port has to send, and checks that all bytes have arrived on both sides.
+    pub fn drain(&mut self) {
+        self.port.is_line_full = false;
+        self.settle();
+        assert_eq!(self.arrived(), self.accepted.len(), "bytes for the port are missing");
+        loop {
+            match self.ask(FROM_PORT) {
+                Ok(_) => self.settle(),
+                Err(Answer::Nak) => break,
+                Err(_) => return,
+            }
+        }
+        assert!(!self.port.has_to_send(), "the port keeps bytes back");
+        assert_eq!(self.taken, self.port.sent.len(), "bytes from the port are missing");
+    }
+
+    /// Finds the device as real hosts do, and checks that it is complete.
+    pub fn enumerate(&mut self, address: u8, number: &str) {
+        self.reset();
+        assert_eq!(self.port.bus().address(), 0);
+        let first = self.answer(DEVICE, 0, 64);
+        // Windows and Linux reset the bus once more.
+        self.reset();
+        assert_eq!(self.transfer([0, 5, address, 0, 0, 0, 0, 0], &[]), Outcome::Done(Vec::new()));
+        // The host waits here for 2 ms at least.
+        self.settle();
+        assert_eq!(self.port.bus().address(), address);
+
+        let device = self.answer(DEVICE, 0, 18);
+        assert_eq!(first, device);
+        let [vendor, product] = VENDOR_AND_PRODUCT.map(u16::to_le_bytes);
+        assert_eq!(device[..8], [18, 1, 0x10, 0x02, 2, 0, 0, 64]);
+        assert_eq!(device[8..12], [vendor, product].concat());
+        assert_eq!(device[14..], [1, 2, 3, 1]);
+        let capabilities = self.answer(CAPABILITIES, 0, 5);
+        let length = capabilities[2];
+        assert_eq!(self.answer(CAPABILITIES, 0, length).len(), usize::from(length));
+        let start = self.answer(CONFIGURATION, 0, 9);
+        let configuration = self.answer(CONFIGURATION, 0, start[2]);
+        assert_eq!(configuration[..9], start);
+        check_configuration(&configuration);
+        assert_eq!(self.answer(STRING, 0, 255), [4, STRING, 0x09, 0x04]);
+        for (index, text) in [(1, MANUFACTURER), (2, PRODUCT), (3, number)] {
+            let mut expected = vec![2 + 2 * text.len() as u8, STRING];
+            expected.extend(text.encode_utf16().flat_map(u16::to_le_bytes));
+            assert_eq!(self.answer(STRING, index, 255), expected);
+        }
+
+        assert_eq!(self.transfer([0, 9, 1, 0, 0, 0, 0, 0], &[]), Outcome::Done(Vec::new()));
+        self.settle();
+        assert!(self.port.is_up() && !self.port.is_open());
+        assert_eq!(self.transfer(SET_LINE_CODING, &LINE_CODING), Outcome::Done(Vec::new()));
+        let coding = self.transfer([0xA1, 0x21, 0, 0, 0, 0, 7, 0], &[]);
+        assert_eq!(coding, Outcome::Done(LINE_CODING.to_vec()));
+        let open = self.transfer([0x21, 0x22, 3, 0, 0, 0, 0, 0], &[]);
+        assert_eq!(open, Outcome::Done(Vec::new()));
+        self.settle();
+        assert!(self.port.is_open());
+        self.exchange();
+    }
+
+    /// Sends a line to the port and another one back.
+    fn exchange(&mut self) {
+        self.drain();
+        self.port.received.clear();
+        self.accepted.clear();
+        let line = self.pattern(100);
+        for packet in line.chunks(PACKET) {
+            assert_eq!(self.give(packet), Handshake::Ack);
+            self.settle();
+        }
+        assert_eq!(self.port.received, line, "the port has not received the line");
+        let reply = self.pattern(2 * PACKET);
+        self.port.write(&reply);
+        self.settle();
+        // A host waits for further packets until one is not full.
+        let (mut heard, mut is_over) = (Vec::new(), true);
+        while !is_over || heard.len() < reply.len() {
+            let packet = self.ask(FROM_PORT).expect("the rest of the reply");
+            is_over = packet.len() < PACKET;
+            heard.extend(packet);
+            self.settle();
+        }
+        assert_eq!(heard, reply, "the host has not received the reply");
+    }
+
+    /// Asks for a descriptor, which the device must have.
+    fn answer(&mut self, kind: u8, index: u8, length: u8) -> Vec<u8> {
+        let language = if kind == STRING && index > 0 { [0x09, 0x04] } else { [0, 0] };
+        let request = [0x80, 6, index, kind, language[0], language[1], length, 0];
+        match self.transfer(request, &[]) {
+            Outcome::Done(answer) => answer,
+            outcome => panic!("descriptor {kind} {index}: {outcome:?}"),
+        }
+    }
+}
+
+/// Kinds of descriptors.
+const DEVICE: u8 = 1;
+/// See [`DEVICE`].
+const CONFIGURATION: u8 = 2;
+/// See [`DEVICE`].
+const STRING: u8 = 3;
+/// See [`DEVICE`].
+const CAPABILITIES: u8 = 15;
+
+/// Checks that a configuration is whole, and that of a serial port.
+fn check_configuration(configuration: &[u8]) {
+    assert_eq!(usize::from(configuration[2]), configuration.len());
+    assert_eq!(configuration[3..6], [0, 2, 1], "two interfaces in configuration 1");
+    let (mut rest, mut parts) = (configuration, Vec::new());
+    while let [length, kind, ..] = *rest {
+        let (part, behind) = rest.split_at(length.into());
+        rest = behind;
+        match kind {
+            4 => parts.push([part[2], part[4], part[5], part[6]].to_vec()),
+            5 => parts.push(part[2..6].to_vec()),
+            _ => {}
+        }
+    }
+    assert!(rest.is_empty());
+    // The interface of control with its endpoint, and that of data with those of the port.
+    let expected =
+        [[0, 1, 2, 2], [0x81, 3, 8, 0], [1, 2, 10, 0], [0x82, 2, 64, 0], [0x01, 2, 64, 0]];
+    assert_eq!(parts, expected);
+}
