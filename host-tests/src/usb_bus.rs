@@ -1,4 +1,4 @@
-//! The RP2040's USB controller as a device, with the driver of rp2040-hal 0.12, made of plain memory.
+//! The RP2040's USB controller as a device, with the driver of `rp2040-hal` 0.12, in plain memory.
 //!
 //! The trait's methods do what that driver does, register by register; the other methods are the
 //! host's end of the cable (data sheet of the RP2040, section 4.1.2.6). A packet of the device

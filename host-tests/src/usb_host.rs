@@ -39,6 +39,11 @@ const SET_LINE_CODING: [u8; 8] = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
 /// The data of [`SET_LINE_CODING`].
 const LINE_CODING: [u8; 7] = [0x00, 0xC2, 0x01, 0x00, 0, 0, 8];
 
+/// The beginnings of requests that every device answers: for its descriptor, for that of its
+/// configuration, and for its state.
+const ALWAYS_ANSWERED: [&[u8]; 3] =
+    [&[0x80, 6, 0, 1, 0, 0], &[0x80, 6, 0, 2, 0, 0], &[0x80, 0, 0, 0, 0, 0]];
+
 /// How a control transfer has ended.
 #[derive(Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -80,7 +85,7 @@ impl Transfer {
 pub struct Host<'p> {
     /// The device.
     pub port: Port<'p>,
-    /// Whether the device waits while the host does one thing after the other.
+    /// Whether the host does one thing after the other without waiting for the device.
     pub is_hasty: bool,
     is_suspended: bool,
     transfer: Transfer,
@@ -202,9 +207,13 @@ impl<'p> Host<'p> {
     /// bytes, if the host takes them for new ones.
     pub fn ask_control(&mut self) -> Result<Vec<u8>, Answer> {
         self.resume();
+        let had_setup = self.port.bus().has_setup();
         let (bytes, is_data_1, is_current) = match self.port.bus().ask(0) {
             Answer::Packet { bytes, is_data_1, is_current } => (bytes, is_data_1, is_current),
             Answer::Stall => {
+                let is_owed = self.transfer.is_sound && !self.transfer.is_over;
+                let is_known = ALWAYS_ANSWERED.contains(&&self.transfer.request[..6]);
+                assert!(!(is_owed && is_known), "{:x?} is refused", self.transfer.request);
                 self.transfer.is_over = true;
                 return Err(Answer::Stall);
             }
@@ -215,6 +224,7 @@ impl<'p> Host<'p> {
         };
         let length = self.transfer.length();
         let transfer = &mut self.transfer;
+        assert!(is_current || had_setup, "an old answer is kept behind a SETUP packet");
         transfer.is_sound &= is_current;
         let is_new = is_data_1 == self.is_data_1[0][IN];
         if transfer.is_sound {
