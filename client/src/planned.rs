@@ -172,9 +172,9 @@ pub struct Steps {
     at: u64,
     /// The ticks of all events, which wrap.
     ticks: u32,
-    /// The sums of all steps of x and y, and of those that took up slack.
+    /// The sums of all steps of x and y, and of those that took up backlash.
     sums: [i32; 2],
-    slack: [i32; 2],
+    backlash: [i32; 2],
     /// The levels of the pins apart from the pulses, once they are known, and the pen's height.
     levels: Option<u8>,
     height: Option<u8>,
@@ -207,7 +207,7 @@ impl Steps {
             at: 0,
             ticks: 0,
             sums: [0; 2],
-            slack: [0; 2],
+            backlash: [0; 2],
             levels: None,
             height: None,
             middle: 127,
@@ -253,7 +253,7 @@ impl Steps {
 
     /// Tells the machine what was carried out.
     fn report(&mut self) {
-        self.pins.report_slack((self.slack[0], self.slack[1]));
+        self.pins.report_backlash((self.backlash[0], self.backlash[1]));
         let drained = !self.pins.halt_is_due();
         self.pins.report((self.sums[0], self.sums[1]), self.ticks, drained);
     }
@@ -299,7 +299,8 @@ impl Steps {
             }
             EventKind::Levels(levels) => {
                 let (x, y) = event.pulses();
-                self.slack = [self.slack[0].wrapping_add(x), self.slack[1].wrapping_add(y)];
+                self.backlash =
+                    [self.backlash[0].wrapping_add(x), self.backlash[1].wrapping_add(y)];
                 let pulses = (x, y) != (0, 0);
                 let others = levels & LEVELS;
                 let changes = self.levels.replace(others) != Some(others);

@@ -1,12 +1,12 @@
 //! Serves an emulated board at a pseudo-terminal, so that any program that uses a serial port can
 //! use it, and judges what the pins ink. `cargo xtask senders` runs it.
 //!
-//! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is
-//! the name of the terminal, which comes when the board has greeted: a program that opens the
-//! terminal meets a board that runs, however slowly it has started. The greeting can be read there.
-//! Then each line of the input is answered by one line: `forget` forgets the ink so far; `judge
-//! SLACK FILE` compares the ink since then with the lines of FILE, each of which is a polyline of
-//! points `x,y` in steps, and answers `same` or what differs; `heard` prints what the board has
+//! The argument is `lm3s6965`, `pico` (its UART) or `pico-usb`. The first line of the output is the
+//! name of the terminal, which comes when the board has greeted: a program that opens the terminal
+//! meets a board that runs, however slowly it has started. The greeting can be read there. Then
+//! each line of the input is answered by one line: `forget` forgets the ink so far; `judge
+//! TOLERANCE FILE` compares the ink since then with the lines of FILE, each of which is a polyline
+//! of points `x,y` in steps, and answers `same` or what differs; `heard` prints what the board has
 //! been sent since the last call, escaped. It ends with its input.
 
 use std::error::Error;
@@ -117,9 +117,9 @@ fn main() -> Result<(), Box<dyn Error>> {
                 println!("forgotten");
             }
             ("judge", rest) => {
-                let (slack, file) = rest.split_once(' ').ok_or("judge SLACK FILE")?;
+                let (tolerance, file) = rest.split_once(' ').ok_or("judge TOLERANCE FILE")?;
                 let points: Vec<_> = ink.points().iter().map(|at| at.map(f64::from)).collect();
-                let found = difference(&points, &figure(file)?, slack.parse()?);
+                let found = difference(&points, &figure(file)?, tolerance.parse()?);
                 println!("{}", found.unwrap_or_else(|| "same".to_owned()));
             }
             ("heard", _) => println!("{}", std::mem::take(&mut sent).escape_ascii()),

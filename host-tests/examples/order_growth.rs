@@ -1,22 +1,23 @@
-//! What the effort of `order` buys as drawings grow: `order_growth EFFORT SEEDS [KIND] COUNT...` for
-//! COUNT strokes of four kinds of drawings or of one, each the mean of SEEDS drawings. EFFORT is a
-//! number, `auto` (as a board has it), or `computer` (as a computer that computes for a plotter has
-//! it).
+//! What the effort of `order` buys as drawings grow: `order_growth EFFORT SEEDS [KIND] COUNT...`
+//! for COUNT strokes of four kinds of drawings or of one, each the mean of SEEDS drawings. EFFORT
+//! is a number, `auto` (as a board has it), or `computer` (as a computer that computes for a
+//! plotter has it).
 //!
 //! It prints the seconds here, the units of work, the pen-up length in steps of 1/80 mm, and the
 //! seconds that the pen travels at 100 mm/s and 800 mm/s².
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
-use penup::order::{Effort, Method, Options, Pace};
+use penup::order::{Effort, Method, Options, TimeModel};
 use penup_host_tests::order_drawings::{KINDS, Kind};
 use std::time::Instant;
 
 /// The effort with this name, or of so many units for each move.
 fn effort_of(word: &str) -> Option<Effort> {
-    let auto = |units_per_second| Effort::Auto(Pace { units_per_second, ..Pace::default() });
+    let auto =
+        |units_per_second| Effort::Auto(TimeModel { units_per_second, ..TimeModel::default() });
     match word {
-        "auto" => Some(auto(Pace::BOARD)),
-        "computer" => Some(auto(Pace::COMPUTER)),
+        "auto" => Some(auto(TimeModel::BOARD)),
+        "computer" => Some(auto(TimeModel::COMPUTER)),
         _ => word.parse().ok().map(Effort::Units),
     }
 }

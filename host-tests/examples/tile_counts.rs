@@ -119,10 +119,10 @@ fn main() {
             corners: Cell::default(),
             vertices: Cell::default(),
         };
-        let sight = source.model.sight(precision);
+        let parameters = source.model.parameters(precision);
         let begin = Instant::now();
         let mut found = Found::default();
-        let mut tiles = Tiles::new(&source, sight, options, &mut scratch, &mut NeverCancel)
+        let mut tiles = Tiles::new(&source, parameters, options, &mut scratch, &mut NeverCancel)
             .unwrap()
             .expect("something is seen");
         let (mut count, mut most) = (0, 0);

@@ -142,24 +142,24 @@ pub fn missing(ink: &[[f64; 2]], figure: &[Segment]) -> f64 {
 }
 
 /// What differs between the ink and the figure; `None` if each lies within a step of the other, or
-/// `slack` steps more.
-pub fn difference(ink: &[[f64; 2]], figure: &[Segment], slack: f64) -> Option<String> {
+/// `tolerance` steps more.
+pub fn difference(ink: &[[f64; 2]], figure: &[Segment], tolerance: f64) -> Option<String> {
     if ink.is_empty() || figure.is_empty() {
         let text = format!("{} points of ink, {} lines", ink.len(), figure.len());
         return (ink.len() + figure.len() > 0).then_some(text);
     }
     let (beside, missing) = (farthest(ink, figure), missing(ink, figure));
     // A point of the figure lies at most half a diagonal from the nearest step.
-    (beside > 1.0 + slack || missing > 1.5 + slack)
+    (beside > 1.0 + tolerance || missing > 1.5 + tolerance)
         .then(|| format!("ink {beside:.2} steps beside, {missing:.2} missing"))
 }
 
-/// Checks that the ink and the figure lie within a step of each other, or `slack` steps more.
+/// Checks that the ink and the figure lie within a step of each other, or `tolerance` steps more.
 ///
 /// # Panics
 /// Panics if they do not.
-pub fn assert_same_ink(name: &str, ink: &[[f64; 2]], figure: &[Segment], slack: f64) {
-    if let Some(difference) = difference(ink, figure, slack) {
+pub fn assert_same_ink(name: &str, ink: &[[f64; 2]], figure: &[Segment], tolerance: f64) {
+    if let Some(difference) = difference(ink, figure, tolerance) {
         panic!("{name}: {difference}");
     }
 }

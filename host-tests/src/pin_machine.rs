@@ -106,8 +106,8 @@ pub fn run_with(
         let now = steps.trace().now();
         queue.sync_consumed();
         let (x, y) = state.steps();
-        let (pins, slack) = (PagePoint { x, y }, state.slack());
-        let motors = PagePoint { x: x + slack.0, y: y + slack.1 };
+        let (pins, backlash) = (PagePoint { x, y }, state.backlash());
+        let motors = PagePoint { x: x + backlash.0, y: y + backlash.1 };
         let this = Turn { machine: &mut machine, now, pins, motors };
         if !turn(this, &mut queue) {
             return steps.trace().changes();

@@ -2,7 +2,7 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
-use penup::order::{Effort, Options, Pace};
+use penup::order::{Effort, Options, TimeModel};
 use penup_client::workspace;
 use penup_host_tests::order_drawings::{KINDS, Strokes, random, two_columns};
 use penup_host_tests::order_reference::Sheet;
@@ -30,7 +30,7 @@ impl Cost {
 
     /// The time of computing on a board and of travel, in seconds.
     fn total(self) -> f64 {
-        self.units as f64 / f64::from(Pace::BOARD) + self.travel
+        self.units as f64 / f64::from(TimeModel::BOARD) + self.travel
     }
 }
 
@@ -45,7 +45,7 @@ fn it_stops_neither_at_once_nor_late() {
             let drawing = make(count, 1);
             let costs = [Effort::Units(0), Effort::default(), FIXED];
             let [none, auto, fixed] = costs.map(|effort| Cost::of(&drawing, effort));
-            let second = f64::from(Pace::BOARD);
+            let second = f64::from(TimeModel::BOARD);
             let saved = (fixed.units as f64 - auto.units as f64) / second;
             let lost = auto.travel - fixed.travel;
             table += &format!("{count} {name}: {lost:.2} s lost, {saved:.2} s of work saved\n");
@@ -75,9 +75,10 @@ fn what_a_further_second_saves_is_less_than_a_second() {
             if auto.units == none.units {
                 continue;
             }
-            let pace = Pace { units_per_second: Pace::BOARD * 4, ..Pace::default() };
-            let longer = Cost::of(&drawing, Effort::Auto(pace));
-            let seconds = (longer.units as f64 - auto.units as f64) / f64::from(Pace::BOARD);
+            let time_model =
+                TimeModel { units_per_second: TimeModel::BOARD * 4, ..TimeModel::default() };
+            let longer = Cost::of(&drawing, Effort::Auto(time_model));
+            let seconds = (longer.units as f64 - auto.units as f64) / f64::from(TimeModel::BOARD);
             let saved = auto.travel - longer.travel;
             assert!(saved <= seconds, "{name} {seed}: {saved:.2} s saved in {seconds:.2} s");
         }
@@ -88,8 +89,9 @@ fn what_a_further_second_saves_is_less_than_a_second() {
 fn a_slow_machine_is_worth_more_work() {
     let (_, random) = KINDS[0];
     let drawing = random(500, 7);
-    let slow = Pace { speed: 800, acceleration: 3200, ..Pace::default() };
-    let [usual, slow] = [Pace::default(), slow].map(|pace| Cost::of(&drawing, Effort::Auto(pace)));
+    let slow = TimeModel { speed: 800, acceleration: 3200, ..TimeModel::default() };
+    let [usual, slow] =
+        [TimeModel::default(), slow].map(|time_model| Cost::of(&drawing, Effort::Auto(time_model)));
     assert!(slow.units > usual.units && slow.travel <= usual.travel, "{slow:?} {usual:?}");
 }
 
@@ -97,17 +99,17 @@ fn a_slow_machine_is_worth_more_work() {
 fn the_longest_second_and_the_slowest_machine_end() {
     let (_, random) = KINDS[0];
     let drawing = random(60, 3);
-    let paces = [
-        Pace { speed: 0, acceleration: 0, units_per_second: 0 },
-        Pace { speed: 1, acceleration: 1, units_per_second: 1 },
-        Pace { speed: 1 << 22, acceleration: 1 << 27, units_per_second: 1 },
-        Pace { speed: 1 << 22, acceleration: 1 << 27, units_per_second: u32::MAX },
-        Pace { speed: 0, acceleration: 0, units_per_second: u32::MAX },
+    let time_models = [
+        TimeModel { speed: 0, acceleration: 0, units_per_second: 0 },
+        TimeModel { speed: 1, acceleration: 1, units_per_second: 1 },
+        TimeModel { speed: 1 << 22, acceleration: 1 << 27, units_per_second: 1 },
+        TimeModel { speed: 1 << 22, acceleration: 1 << 27, units_per_second: u32::MAX },
+        TimeModel { speed: 0, acceleration: 0, units_per_second: u32::MAX },
     ];
     let none = Cost::of(&drawing, Effort::Units(0));
-    for pace in paces {
-        let cost = Cost::of(&drawing, Effort::Auto(pace));
-        assert!(cost.travel < none.travel, "{pace:?}: {cost:?}, without effort {none:?}");
+    for time_model in time_models {
+        let cost = Cost::of(&drawing, Effort::Auto(time_model));
+        assert!(cost.travel < none.travel, "{time_model:?}: {cost:?}, without effort {none:?}");
     }
 }
 
@@ -148,9 +150,13 @@ fn a_computer_comes_near_to_lkh() {
         ("1000 random strokes", random(1000, 1), 0.02),
     ];
     for (name, drawing, tolerance) in drawings {
-        let pace = Pace { units_per_second: Pace::COMPUTER, ..Pace::default() };
-        let options =
-            Options { effort: Effort::Auto(pace), lift_cost: 2 * 80 * 256, ..Options::default() };
+        let time_model =
+            TimeModel { units_per_second: TimeModel::COMPUTER, ..TimeModel::default() };
+        let options = Options {
+            effort: Effort::Auto(time_model),
+            lift_cost: 2 * 80 * 256,
+            ..Options::default()
+        };
         let begin = Instant::now();
         let (_, report, units) = drawing.order(options).expect("an order");
         let milliseconds = begin.elapsed().as_millis();

@@ -122,7 +122,7 @@ const LOOPS: [&str; 18] = [
 ];
 
 #[test]
-fn slack_is_taken_up_while_the_pen_draws_curves() -> Result<(), Box<dyn Error>> {
+fn backlash_is_taken_up_while_the_pen_draws_curves() -> Result<(), Box<dyn Error>> {
     let job = |settings: &[&str]| -> Vec<String> {
         let lines = LOOPS.iter().chain(&["l 6 10", "$fit=on", "$page=50x40", "$margin=5"]);
         lines.chain(settings).chain(&["$plot"]).map(|line| (*line).to_owned()).collect()
@@ -130,8 +130,8 @@ fn slack_is_taken_up_while_the_pen_draws_curves() -> Result<(), Box<dyn Error>> 
     let (strokes, without, _) = draw_in_time(&job(&[]))?;
     let (same, with, _) = draw_in_time(&job(&["$235=0.1", "$236=0.1", "$237=0.3"]))?;
     assert_eq!(strokes, same);
-    println!("{strokes} strokes, {without} pulses, {with} with slack");
-    assert!(with > without + 40, "slack is taken up: {with} {without}");
+    println!("{strokes} strokes, {without} pulses, {with} with backlash");
+    assert!(with > without + 40, "backlash is taken up: {with} {without}");
     Ok(())
 }
 

@@ -53,6 +53,6 @@ fn a_move_takes_no_more_instructions_than_the_source_says() -> TestResult {
 }
 
 #[test]
-fn steps_of_the_pen_and_of_slack_take_no_more_instructions_than_the_source_says() -> TestResult {
+fn steps_of_the_pen_and_of_backlash_take_no_more_instructions_than_the_source_says() -> TestResult {
     no_call_takes_more(&[&PEN_ON_A_MOTOR[..], &["$235=0.2", "$236=0.2"]].concat(), 76)
 }

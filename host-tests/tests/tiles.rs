@@ -7,7 +7,7 @@ use penup::geometry::{Precision, Projection, Vertex};
 use penup::index::Index;
 use penup::model::{Corner, Elements, Model, PenName, PenWriter, Pens, Position, no_undo};
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
-use penup::tiles::{self, ModelSource, Projected, Sight, Tiles};
+use penup::tiles::{self, ModelSource, Projected, Tiles, ViewParameters};
 use penup::view::{Camera, Lens, Pose, View, project_scene};
 use penup::visibility::{
     Crease, EdgeParameter, Options, Scene, SinkFull, Stretch, StretchSink, Unrounded,
@@ -55,16 +55,18 @@ impl Found {
 /// The stretches found in tiles, and how many tiles there were.
 fn in_tiles<S: ModelSource>(
     source: &S,
-    sight: Sight,
+    parameters: ViewParameters,
     options: Options,
     bytes: usize,
     with_numbers: bool,
 ) -> Result<(Vec<Plain>, usize), VisibilityError> {
     let mut words = vec![0u64; bytes / 8];
     let mut scratch = Scratch::new(&mut words);
-    let mut found = Found { near: sight.near, with_numbers, ..Found::default() };
+    let mut found = Found { near: parameters.near, with_numbers, ..Found::default() };
     let mut count = 0;
-    if let Some(mut tiles) = Tiles::new(source, sight, options, &mut scratch, &mut NeverCancel)? {
+    if let Some(mut tiles) =
+        Tiles::new(source, parameters, options, &mut scratch, &mut NeverCancel)?
+    {
         while tiles.follow_next::<u32>(scratch.reborrow(), &mut NeverCancel, &mut found)? {
             count += 1;
         }
@@ -75,13 +77,13 @@ fn in_tiles<S: ModelSource>(
 /// The same in the least memory, within a fifth, that is enough.
 fn in_least_memory<S: ModelSource>(
     source: &S,
-    sight: Sight,
+    parameters: ViewParameters,
     options: Options,
     with_numbers: bool,
 ) -> (Vec<Plain>, usize) {
     let mut bytes = 256;
     loop {
-        match in_tiles(source, sight, options, bytes, with_numbers) {
+        match in_tiles(source, parameters, options, bytes, with_numbers) {
             Err(VisibilityError::Scratch(_)) => bytes += bytes / 5,
             found => return found.unwrap(),
         }
@@ -143,14 +145,14 @@ fn check_scene(seed: u64) -> usize {
     let mut known = Found { with_numbers: true, ..Found::default() };
     find_stretches(&whole, options, Scratch::new(&mut words), &mut NeverCancel, &mut known)
         .unwrap();
-    let sight = Sight {
+    let parameters = ViewParameters {
         projection: scene.projection,
         near: None,
         precision: Precision::default(),
         error_bound: 1,
     };
     let source = &Given { scene: &scene, pens };
-    let (found, tiles) = in_least_memory(source, sight, options, true);
+    let (found, tiles) = in_least_memory(source, parameters, options, true);
     assert!(known.sorted() == found, "seed {seed}, {options:?}");
     tiles
 }
@@ -252,7 +254,7 @@ fn check_model(seed: u64) -> usize {
         }
         let known = known.sorted();
         let source = &Projected::new(model, &view);
-        let (found, tiles) = in_least_memory(source, source.sight(precision), options, false);
+        let (found, tiles) = in_least_memory(source, source.parameters(precision), options, false);
         assert!(known == found, "seed {seed}, {options:?}");
         count = tiles;
     });
@@ -338,7 +340,7 @@ fn torus() -> RandomScene {
 }
 
 /// How the torus is seen.
-const SIGHT: Sight = Sight {
+const SIGHT: ViewParameters = ViewParameters {
     projection: Projection::Perspective,
     near: None,
     precision: Precision { written: 0, unit: 0 },

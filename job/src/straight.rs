@@ -39,20 +39,20 @@ impl Straightener {
     /// Adds the next point.
     pub fn push(&mut self, point: PagePoint) {
         self.ahead.push(point);
-        self.look();
+        self.test_points();
     }
 
     /// Returns the points that stay, once there are no more.
     pub fn end(mut self) -> Vec<PagePoint> {
         while !self.ahead.is_empty() {
             self.keep();
-            self.look();
+            self.test_points();
         }
         self.kept
     }
 
     /// Looks at the points that were not seen yet, and keeps those at which a line must end.
-    fn look(&mut self) {
+    fn test_points(&mut self) {
         while let (Some(&point), Some(start)) = (self.ahead.get(self.seen), self.kept.last()) {
             let place = [point[0] - start[0], point[1] - start[1]];
             if self.reach.goes_on(place, self.seen, self.tolerance) {

@@ -58,13 +58,13 @@ impl Wishes {
                 _ => {}
             }
         }
-        self.look(page, lines, &mut settings)?;
+        self.set_eye(page, lines, &mut settings)?;
         Ok(settings)
     }
 
     /// Chooses the eye if the user gives a direction, or says what is up: the plotter's own choice
     /// is made for models with z up.
-    fn look(
+    fn set_eye(
         &self,
         page: &FilePage,
         lines: &dyn Lines,
@@ -98,8 +98,8 @@ impl Wishes {
             (None, None) if is_oblique(projection) => ([0.0, -1.0, 0.0], UPRIGHT),
             (None, None) => (THREE_QUARTER, UPRIGHT),
         };
-        let stands = up.unwrap_or(UPRIGHT);
-        let turned = [direction, own_up].map(|vector| turned_upright(vector, stands));
+        let upward = up.unwrap_or(UPRIGHT);
+        let turned = [direction, own_up].map(|vector| turned_upright(vector, upward));
         let [Some(direction), Some(own_up)] = turned else { return Ok(()) };
         let size = (0..3).map(|axis| extent[1][axis] - extent[0][axis]).fold(0.0, f64::max);
         let mut set = |name: &'static str, value: String| {

@@ -21,7 +21,7 @@ use crate::lines::Origin;
 use crate::region::{Region, Regions};
 use curves::{Affine, Curve, Spline};
 use dashes::dashed;
-use document::{Document, Entity, Refusal, document, number, pairs};
+use document::{Document, Entity, LineError, document, number, pairs};
 use space::Plane;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
@@ -78,7 +78,7 @@ struct Drawing<'d, 'a> {
 
 /// Where entities are drawn.
 #[derive(Debug, Clone, Copy)]
-struct Place<'a> {
+struct Placement<'a> {
     to_page: Affine,
     /// What layer and line type those have that take them from the block in which they are.
     layer: &'a str,
@@ -92,7 +92,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
         self.skipped.entry(what.to_owned()).or_insert((0, line)).0 += 1;
     }
 
-    fn all(&mut self, entities: &'d [Entity<'a>], place: Place<'a>) -> Result<(), Refusal> {
+    fn all(
+        &mut self,
+        entities: &'d [Entity<'a>],
+        placement: Placement<'a>,
+    ) -> Result<(), LineError> {
         let mut at = 0;
         while let Some(entity) = entities.get(at) {
             at += 1;
@@ -104,7 +108,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 }
             }
             let layer = match entity.layer() {
-                "0" => place.layer,
+                "0" => placement.layer,
                 own => own,
             };
             let is_hidden_text = entity.kind == "ATTRIB" && entity.flags()? & 1 != 0;
@@ -116,7 +120,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 self.skip("invisible entities", entity.line);
             } else {
                 let vertices = entities.get(first..at).unwrap_or_default();
-                self.entity(entity, vertices, Place { layer, ..place })?;
+                self.entity(entity, vertices, Placement { layer, ..placement })?;
             }
         }
         Ok(())
@@ -126,8 +130,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
         &mut self,
         entity: &'d Entity<'a>,
         vertices: &[Entity<'a>],
-        place: Place<'a>,
-    ) -> Result<(), Refusal> {
+        placement: Placement<'a>,
+    ) -> Result<(), LineError> {
         let up = [entity.number(210, 0.0)?, entity.number(220, 0.0)?, entity.number(230, 1.0)?];
         let plane = Plane::of(up);
         // The points of these are those of the world, whatever is up.
@@ -142,10 +146,10 @@ impl<'d, 'a> Drawing<'d, 'a> {
             _ => entity.number(30, 0.0)?,
         };
         let to_page = match is_planar {
-            true => place.to_page.after(plane.seen(height)),
-            false => place.to_page,
+            true => placement.to_page.after(plane.seen(height)),
+            false => placement.to_page,
         };
-        let place = Place { to_page, ..place };
+        let placement = Placement { to_page, ..placement };
         let curve = match entity.kind {
             "LINE" => Curve::polyline(&[entity.point(10)?, entity.point(11)?]),
             "LWPOLYLINE" => bulged(&light(entity)?, entity.flags()? & 1 == 1),
@@ -198,7 +202,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
             "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {
                 Some(sides) => {
                     for side in sides {
-                        self.draw(entity, place, &Curve::polyline(&side))?;
+                        self.draw(entity, placement, &Curve::polyline(&side))?;
                     }
                     return Ok(());
                 }
@@ -207,9 +211,9 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     return Ok(());
                 }
             },
-            "TEXT" | "ATTRIB" => return self.write(entity, place, text::line(entity)?),
-            "MTEXT" => return self.write(entity, place, text::paragraph(entity, plane)?),
-            "INSERT" => return self.insert(entity, place),
+            "TEXT" | "ATTRIB" => return self.write(entity, placement, text::line(entity)?),
+            "MTEXT" => return self.write(entity, placement, text::paragraph(entity, plane)?),
+            "INSERT" => return self.insert(entity, placement),
             // A table is shown by a block, turned so that its x has the direction of the table.
             "ACAD_TABLE" if self.block(entity).is_some() => {
                 let Some((base, entities)) = self.block(entity) else { return Ok(()) };
@@ -219,13 +223,13 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     if length > 0.0 { [right / length, up / length] } else { [1.0, 0.0] };
                 let turned = Affine([cosine, sine, -sine, cosine, x, y]);
                 let moved = Affine([1.0, 0.0, 0.0, 1.0, -base[0], -base[1]]);
-                let to_page = place.to_page.after(turned).after(moved);
-                return self.nested(entity, entities, Place { to_page, ..place });
+                let to_page = placement.to_page.after(turned).after(moved);
+                return self.nested(entity, entities, Placement { to_page, ..placement });
             }
-            // What shows a dimension is a block of its own, at its place.
+            // What shows a dimension is a block of its own, where it is.
             "DIMENSION" if self.block(entity).is_some() => {
                 let Some((_, entities)) = self.block(entity) else { return Ok(()) };
-                return self.nested(entity, entities, place);
+                return self.nested(entity, entities, placement);
             }
             "VERTEX" | "SEQEND" => return Ok(()),
             kind => {
@@ -233,19 +237,19 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 return Ok(());
             }
         };
-        self.draw(entity, place, &curve)
+        self.draw(entity, placement, &curve)
     }
 
     /// Draws a curve of an entity, with its line type.
     fn draw(
         &mut self,
         entity: &'d Entity<'a>,
-        place: Place<'a>,
+        placement: Placement<'a>,
         curve: &Curve,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), LineError> {
         let most = MOST_POINTS - self.points;
-        let points = curve.flattened(place.to_page, most).ok_or_else(|| too_many(entity))?;
-        let line_type = self.document.line_type(entity, place.layer, place.line_type);
+        let points = curve.flattened(placement.to_page, most).ok_or_else(|| too_many(entity))?;
+        let line_type = self.document.line_type(entity, placement.layer, placement.line_type);
         let lengths = self.document.dashes(entity, line_type)?;
         let lengths: Vec<f64> = lengths.into_iter().map(|length| length * self.unit).collect();
         let pieces = match lengths.is_empty() {
@@ -258,16 +262,16 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 }
             },
         };
-        pieces.into_iter().try_for_each(|points| self.ink(entity, place, points))
+        pieces.into_iter().try_for_each(|points| self.ink(entity, placement, points))
     }
 
     /// Draws the letters of an entity; `None` if they cannot be drawn.
     fn write(
         &mut self,
         entity: &'d Entity<'a>,
-        place: Place<'a>,
+        placement: Placement<'a>,
         writing: Option<Writing>,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), LineError> {
         let Some(Writing { strokes, unknown }) = writing else {
             self.skip(entity.kind, entity.line);
             return Ok(());
@@ -275,8 +279,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
         self.texts += usize::from(!strokes.is_empty());
         self.unknown_letters += unknown;
         strokes.into_iter().try_for_each(|points| {
-            let points = points.into_iter().map(|point| place.to_page.apply(point));
-            self.ink(entity, place, points.collect())
+            let points = points.into_iter().map(|point| placement.to_page.apply(point));
+            self.ink(entity, placement, points.collect())
         })
     }
 
@@ -284,9 +288,9 @@ impl<'d, 'a> Drawing<'d, 'a> {
     fn ink(
         &mut self,
         entity: &'d Entity<'a>,
-        place: Place<'a>,
+        placement: Placement<'a>,
         points: Vec<Point>,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), LineError> {
         let pieces = match points.as_slice() {
             _ if self.within.0.is_empty() => vec![points],
             [dot] if self.within.contain(*dot) => vec![points],
@@ -298,13 +302,17 @@ impl<'d, 'a> Drawing<'d, 'a> {
             if self.points > MOST_POINTS {
                 return Err(too_many(entity));
             }
-            self.strokes.push((entity.line, entity.kind, place.layer, points));
+            self.strokes.push((entity.line, entity.kind, placement.layer, points));
         }
         Ok(())
     }
 
     /// Draws a block where it is inserted, in rows and columns if it is.
-    fn insert(&mut self, entity: &'d Entity<'a>, place: Place<'a>) -> Result<(), Refusal> {
+    fn insert(
+        &mut self,
+        entity: &'d Entity<'a>,
+        placement: Placement<'a>,
+    ) -> Result<(), LineError> {
         let Some((base, entities)) = self.block(entity) else {
             self.skip("INSERT of an unknown block", entity.line);
             return Ok(());
@@ -324,7 +332,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
             for column in 0..counts[0].max(1.0) as u32 {
                 let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
                 let moved = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
-                let to_page = place.to_page.after(turned).after(moved).after(scaled);
+                let to_page = placement.to_page.after(turned).after(moved).after(scaled);
                 let outline = self.document.clip(entity);
                 if let Some(outline) = outline {
                     let outline = outline.iter().map(|point| to_page.apply(*point)).collect();
@@ -332,7 +340,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     region.add(vec![outline], true, Vec::new());
                     self.within.0.push(Arc::new(region));
                 }
-                self.nested(entity, entities, Place { to_page, ..place })?;
+                self.nested(entity, entities, Placement { to_page, ..placement })?;
                 if outline.is_some() {
                     self.within.0.pop();
                 }
@@ -351,28 +359,28 @@ impl<'d, 'a> Drawing<'d, 'a> {
         &mut self,
         entity: &Entity<'a>,
         entities: &'d [Entity<'a>],
-        place: Place<'a>,
-    ) -> Result<(), Refusal> {
-        if place.depth >= MOST_NESTED {
+        placement: Placement<'a>,
+    ) -> Result<(), LineError> {
+        if placement.depth >= MOST_NESTED {
             return Err((entity.line, "the blocks are nested too deeply".to_owned()));
         }
         self.points += 1;
         if self.points >= MOST_POINTS {
             return Err((entity.line, "the blocks are inserted too often".to_owned()));
         }
-        let line_type = self.document.line_type(entity, place.layer, place.line_type);
-        self.all(entities, Place { line_type, depth: place.depth + 1, ..place })
+        let line_type = self.document.line_type(entity, placement.layer, placement.line_type);
+        self.all(entities, Placement { line_type, depth: placement.depth + 1, ..placement })
     }
 }
 
 /// The refusal of a file at the entity that makes it too large.
-fn too_many(entity: &Entity<'_>) -> Refusal {
+fn too_many(entity: &Entity<'_>) -> LineError {
     (entity.line, "the file has too many points to be drawn".to_owned())
 }
 
 /// The sides of a face that are visible, or the closed outline of a filled triangle or
 /// quadrilateral, whose corners stand crosswise; `None` if it is not level.
-fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Vec<Point>>>, Refusal> {
+fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Vec<Point>>>, LineError> {
     let is_face = entity.kind == "3DFACE";
     let order: [i32; 4] = if is_face { [10, 11, 12, 13] } else { [10, 11, 13, 12] };
     let last = if entity.text(13).is_some() { 13 } else { 12 };
@@ -401,7 +409,7 @@ fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Vec<Point>>>, Refusal> {
 }
 
 /// The corners of a polyline of the new form, each with the bulge of the side that follows.
-fn light(entity: &Entity<'_>) -> Result<Vec<(Point, f64)>, Refusal> {
+fn light(entity: &Entity<'_>) -> Result<Vec<(Point, f64)>, LineError> {
     let mut corners: Vec<(Point, f64)> = Vec::new();
     for pair in &entity.pairs {
         match (pair.code, corners.last_mut()) {
@@ -461,7 +469,7 @@ impl Format for Dxf {
             // Files of before 2007 are written in the letters of a country; only names have them.
             Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
         };
-        let in_line = |(number, reason): Refusal| {
+        let in_line = |(number, reason): LineError| {
             let line = text.lines().nth(number - 1).unwrap_or_default();
             let shown = line.chars().take(Origin::MOST_SHOWN + 1).collect();
             let origin = Origin { file: file.clone(), line: number, text: shown };
@@ -492,8 +500,8 @@ impl Format for Dxf {
             work: MOST_WORK,
         };
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
-        let place = Place { to_page, layer: "0", line_type: "", depth: 0 };
-        drawing.all(&document.entities, place).map_err(in_line)?;
+        let placement = Placement { to_page, layer: "0", line_type: "", depth: 0 };
+        drawing.all(&document.entities, placement).map_err(in_line)?;
         let mut layers: Vec<&str> = Vec::new();
         for (_, _, layer, _) in &drawing.strokes {
             if !layers.contains(layer) {

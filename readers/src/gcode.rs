@@ -81,7 +81,7 @@ struct Interpreter {
 }
 
 /// The reason why a line is refused.
-type Refusal = String;
+type RefusalText = String;
 
 impl Interpreter {
     fn new() -> Self {
@@ -106,7 +106,7 @@ impl Interpreter {
     }
 
     /// Carries out a line. Returns whether the program goes on after it.
-    fn line(&mut self, text: &str, number: usize) -> Result<bool, Refusal> {
+    fn line(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
         let text = without_comments(text);
         let text = text.trim();
         // A block delete, a mark of the beginning or end, or a setting of the machine.
@@ -168,7 +168,7 @@ impl Interpreter {
         &mut self,
         value: &impl Fn(char) -> Option<f64>,
         number: usize,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), RefusalText> {
         let (unit, is_relative, origin) = (self.unit, self.is_relative, self.origin);
         let target = |letter, axis: usize, now: f64| match value(letter) {
             None => now,
@@ -211,7 +211,7 @@ impl Interpreter {
         to: [f64; 2],
         value: &impl Fn(char) -> Option<f64>,
         points: &mut Vec<[f64; 2]>,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), RefusalText> {
         let from = self.at;
         let clockwise = self.motion == 2;
         let centre = if let Some(radius) = value('R') {
@@ -276,7 +276,7 @@ fn without_comments(text: &str) -> String {
 }
 
 /// The words of a line: letters in capitals and their numbers.
-fn words(text: &str) -> Result<Vec<(char, f64)>, Refusal> {
+fn words(text: &str) -> Result<Vec<(char, f64)>, RefusalText> {
     let letters: Vec<char> = text.chars().filter(|letter| !letter.is_whitespace()).collect();
     let mut words = Vec::new();
     let mut rest = letters.as_slice();

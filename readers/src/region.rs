@@ -14,7 +14,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 
 /// How far outside of a region a line may lie without being cut, in mm: less than is written.
-const SLACK: f64 = 1e-4;
+const TOLERANCE: f64 = 1e-4;
 
 /// The length in mm below which what is left of a line is left out: it would be a dot.
 const SHORTEST: f64 = 0.002;
@@ -105,7 +105,7 @@ impl Region {
         light >= HALF
     }
 
-    /// Whether a line through `point` is inside, to whose left `left` leads by [`SLACK`].
+    /// Whether a line through `point` is inside, to whose left `left` leads by [`TOLERANCE`].
     fn contains_line(&self, point: Point, left: Point) -> bool {
         self.contains(point) || beside(point, left).iter().any(|point| self.contains(*point))
     }
@@ -146,8 +146,8 @@ impl Part {
         let (shade, rows) = (Shade::CLEAR, Vec::new());
         let places = || sides.iter().flatten().map(|point| point[0]);
         let width = [
-            places().fold(f64::INFINITY, f64::min) - SLACK,
-            places().fold(f64::NEG_INFINITY, f64::max) + SLACK,
+            places().fold(f64::INFINITY, f64::min) - TOLERANCE,
+            places().fold(f64::NEG_INFINITY, f64::max) + TOLERANCE,
         ];
         let mut part = Self { outlines, is_even_odd, within, shade, sides, rows, low, row, width };
         let mut rows = vec![Vec::new(); count];
@@ -206,7 +206,7 @@ impl Part {
         }
         let way = minus(to, from);
         let square = dot(way, way);
-        let (low, high) = (from[1].min(to[1]) - SLACK, from[1].max(to[1]) + SLACK);
+        let (low, high) = (from[1].min(to[1]) - TOLERANCE, from[1].max(to[1]) + TOLERANCE);
         for row in self.rows.get(self.rows_between(low, high, self.rows.len()))? {
             *budget = budget.checked_sub(1 + row.len() / TESTS)?;
             for &[begin, end] in row.iter().filter_map(|number| self.sides.get(*number as usize)) {
@@ -216,7 +216,7 @@ impl Part {
                 // Where they lie in one line, the ends of the side divide it.
                 for corner in [begin, end] {
                     let to_corner = minus(corner, from);
-                    if cross(way, to_corner).abs() <= SLACK * square.sqrt() {
+                    if cross(way, to_corner).abs() <= TOLERANCE * square.sqrt() {
                         at.push(dot(to_corner, way) / square);
                     }
                 }
@@ -297,7 +297,7 @@ impl Regions {
 
 /// The pieces of a polyline for which `keeps` is true. It is asked for the middle of each piece
 /// between two crossings with the regions, and is given what leads to the left of the line by
-/// [`SLACK`].
+/// [`TOLERANCE`].
 fn pieces(
     points: &[Point],
     regions: &[Arc<Region>],
@@ -313,7 +313,7 @@ fn pieces(
         if length == 0.0 {
             continue;
         }
-        let left = [-way[1] / length * SLACK, way[0] / length * SLACK];
+        let left = [-way[1] / length * TOLERANCE, way[0] / length * TOLERANCE];
         at.clear();
         for region in regions {
             region.crossings([from, to], &mut at, budget).ok_or(TooMuch)?;
@@ -378,8 +378,8 @@ fn beside(point: Point, left: Point) -> [Point; 2] {
 /// What is the same for two lines through a point in the same direction or its opposite.
 fn cell(point: Point, left: Point) -> [i64; 4] {
     let sign = if (left[0], left[1]) < (0.0, 0.0) { -1.0 } else { 1.0 };
-    let direction = left.map(|part| (sign * part / SLACK * 1e3).round() as i64);
-    let place = point.map(|part| (part / SLACK).round() as i64);
+    let direction = left.map(|part| (sign * part / TOLERANCE * 1e3).round() as i64);
+    let place = point.map(|part| (part / TOLERANCE).round() as i64);
     [place[0], place[1], direction[0], direction[1]]
 }
 

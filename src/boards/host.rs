@@ -17,8 +17,8 @@ use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQu
 use crate::model::{Corner, Position};
 use crate::motion::{Block, EventQueue};
 use crate::plotter::{
-    Board, EMPTY_LOOKAHEAD, HpGlMemory, Kept, Layout, MemorySlices, NotStored, Record, Replies,
-    Stored,
+    Board, EMPTY_LOOKAHEAD, FlashRecords, HpGlMemory, Layout, MemorySlices, NotStored, Record,
+    Replies, Stored,
 };
 use crate::protocol::{LineReader, RealTime, Sorter};
 use crate::storage::Noted;
@@ -313,7 +313,7 @@ pub struct HostBoard<'q> {
     /// The number of ticks that sending a byte takes; 0 if no baud rate is set.
     byte_ticks: u64,
     /// The records in flash, if the board has flash.
-    kept: Option<Kept<CutFlash>>,
+    kept: Option<FlashRecords<CutFlash>>,
     /// How long it takes to write to the flash while a job is drawn, in ticks.
     write_ticks: u64,
     /// What is received while the plotter computes and steps run, and when, in ticks.
@@ -369,7 +369,7 @@ impl<'q> HostBoard<'q> {
     /// Gives the board flash, which it does not have otherwise. It keeps its records there, as
     /// [`LAYOUT`] says.
     pub fn set_flash(&mut self, flash: CutFlash) {
-        self.kept = Some(Kept::new(flash, LAYOUT));
+        self.kept = Some(FlashRecords::new(flash, LAYOUT));
     }
 
     /// The flash of the board, if it has one.

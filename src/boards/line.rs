@@ -71,10 +71,10 @@ impl Shared {
 }
 
 /// Records what a real-time byte requests. It is called in the handler of a port, with the
-/// receiving ends of all ports in `inlets`. No handler that could interrupt it does the same.
-pub fn ask(requests: RealTime, inlets: &mut [ReceiveMerge]) {
+/// receiving ends of all ports in `merges`. No handler that could interrupt it does the same.
+pub fn ask(requests: RealTime, merges: &mut [ReceiveMerge]) {
     if requests.has(RealTime::ABORT) {
-        for receive_merge in inlets {
+        for receive_merge in merges {
             receive_merge.count_at_abort.store(receive_merge.receiver.abort(), Ordering::Release);
         }
     }

@@ -25,7 +25,7 @@ impl Machine<'_> {
         }
         self.released_at = self.runner.ticks();
         // As after sleep: the motors had no current.
-        self.forget_slack();
+        self.forget_backlash();
         if self.settings.is_on(Setting::Tool) {
             self.runner.forget_lift();
         }

@@ -183,7 +183,7 @@ impl Machine<'_> {
         if !is_allowed || !self.is_stopped() {
             return Err(self.refusal());
         }
-        self.forget_slack();
+        self.forget_backlash();
         self.begin_phase(Homing::begin(Axis::X, switches.x));
         Ok(())
     }
@@ -291,12 +291,17 @@ impl Machine<'_> {
     /// See [`PushError`]. On an error nothing is appended.
     fn push_motor(&mut self, motors: PagePoint) -> Result<(), PushError> {
         let (end, page) = (self.motors_end(), self.runner.page_end());
-        let way = (motors.x - end.x, motors.y - end.y);
-        let page = PagePoint { x: page.x + way.0, y: page.y + way.1 };
-        let length = self.runner.limits().length(way.0, way.1).ok_or(PushError::TooLong)?;
+        let displacement = (motors.x - end.x, motors.y - end.y);
+        let page = PagePoint { x: page.x + displacement.0, y: page.y + displacement.1 };
+        let length = self
+            .runner
+            .limits()
+            .length(displacement.0, displacement.1)
+            .ok_or(PushError::TooLong)?;
         let (offsets, is_gap) = ([0; 2], false);
-        let belt = Move { motors, offsets, page, way, whole: length, length, is_gap };
-        // The first call may only take up the slack; then the move itself follows.
+        let belt =
+            Move { motors, offsets, page, displacement, whole_length: length, length, is_gap };
+        // The first call may only take up the backlash; then the move itself follows.
         if !self.push_motors(&belt, None, PathLength::MAX)? {
             self.push_motors(&belt, None, PathLength::MAX)?;
         }

@@ -113,13 +113,13 @@ impl Machine<'_> {
     /// stands with the pen raised then.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
-    fn stands_for_late_path(&mut self, path: &dyn Path, progress: RunnerProgress) -> bool {
+    fn stops_for_late_path(&mut self, path: &dyn Path, progress: RunnerProgress) -> bool {
         let Some(late) = path.late().filter(|_| self.activity.reads_path()) else { return false };
         // After a hold the machine stands for that.
         if progress != RunnerProgress::Done {
             return false;
         }
-        self.activity.set_source(Source::Late(late));
+        self.activity.set_source(Source::PendingTarget(late));
         if late.within_stroke {
             self.interrupt_stroke();
         }
@@ -130,14 +130,14 @@ impl Machine<'_> {
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(always)] // It is called in every turn of the main loop.
     fn waits_for_path(&mut self, path: &mut dyn Path) -> bool {
-        let Activity::Run(Source::Late(late)) = self.activity else { return false };
+        let Activity::Run(Source::PendingTarget(late)) = self.activity else { return false };
         self.waits_for_late(path, late)
     }
 
     /// Goes on if the next targets have come. Returns whether they have not.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
-    fn waits_for_late(&mut self, path: &mut dyn Path, late: super::Late) -> bool {
+    fn waits_for_late(&mut self, path: &mut dyn Path, late: super::PendingTarget) -> bool {
         if path.late().is_some() {
             return true;
         }
@@ -172,9 +172,9 @@ impl Machine<'_> {
     /// pins. Call it often.
     pub fn fill(&mut self, path: &mut dyn Path, queue: &mut dyn EventQueue) {
         self.runner.follow_lift(self.pins.ticks());
-        #[cfg(feature = "backlash-on-the-way")]
-        if self.spreads_slack() {
-            self.follow_slack();
+        #[cfg(feature = "spread-backlash")]
+        if self.spreads_backlash() {
+            self.pass_begun_reversals();
         }
         if let Activity::Alarm(alarm) = self.activity {
             return self.raise_pen(alarm, queue);
@@ -201,8 +201,8 @@ impl Machine<'_> {
             if self.rests_in_stroke(queue) {
                 return;
             }
-            #[cfg(feature = "backlash-on-the-way")]
-            if self.runner.waits_for_turns() {
+            #[cfg(feature = "spread-backlash")]
+            if self.runner.waits_for_reversals() {
                 return;
             }
             let ahead = self.runner.ticks().wrapping_sub(self.pins.ticks());
@@ -213,7 +213,7 @@ impl Machine<'_> {
                 Ok(RunnerProgress::More) => {}
                 Ok(progress) => {
                     #[cfg(any(feature = "stream", feature = "early-ink"))]
-                    if self.stands_for_late_path(path, progress) {
+                    if self.stops_for_late_path(path, progress) {
                         return;
                     }
                     self.after_stop(progress);
@@ -334,8 +334,8 @@ impl Machine<'_> {
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn end_targets(&mut self, source: Source) {
         self.activity.set_source(source);
-        #[cfg(feature = "backlash-on-the-way")]
-        self.push_slack_due();
+        #[cfg(feature = "spread-backlash")]
+        self.push_backlash_due();
         self.runner.end_path();
     }
 

@@ -11,8 +11,8 @@
 //! beyond the limits. A refused command changes nothing.
 
 mod backlash;
-#[cfg(feature = "backlash-on-the-way")]
-mod backlash_on_the_way;
+#[cfg(feature = "spread-backlash")]
+mod spread_backlash;
 mod estimate;
 #[cfg(feature = "driver-pins")]
 mod drivers;
@@ -40,7 +40,7 @@ pub use homing::{Axis, Contacts, Switches};
 pub use job::Measured;
 pub use kinematics::{Anchors, CutPositions, Kinematics, SegmentEnd};
 #[cfg(any(feature = "stream", feature = "early-ink"))]
-pub use path::Late;
+pub use path::PendingTarget;
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue, Tick};
 #[cfg(feature = "early-ink")]
@@ -88,11 +88,11 @@ pub struct Machine<'m> {
     segmenter: Option<Segmenter>,
     /// The speed of the line that is being read, if lines have one speed.
     steady: Steady,
-    /// How much of its slack each motor has taken up.
-    slack: Backlash,
+    /// How much of its backlash each motor has taken up.
+    backlash: Backlash,
     /// What of it was taken up while the pen drew on.
-    #[cfg(feature = "backlash-on-the-way")]
-    on_the_way: backlash_on_the_way::SlackOnTheWay,
+    #[cfg(feature = "spread-backlash")]
+    spread_backlash: spread_backlash::SpreadBacklash,
     /// The contacts that were pressed when they were last observed.
     contacts: Contacts,
     /// The speed override, in percent of the speeds in the settings.
@@ -119,7 +119,7 @@ impl<'m> Machine<'m> {
     /// it starts in the alarm [`Alarm::NotHomed`].
     ///
     /// `blocks` is the memory of the look-ahead, at 48 bytes per block, or 52 with the
-    /// feature `backlash-on-the-way`. It needs at least one
+    /// feature `spread-backlash`. It needs at least one
     /// block; 100 or more work well. `ahead_ticks` is how far the queue is planned ahead of the
     /// pins. The machine plans further ahead if it could otherwise not stop in time when the main
     /// loop is late. A feed hold takes effect after that delay. With `u32::MAX` only the size of
@@ -152,9 +152,9 @@ impl<'m> Machine<'m> {
             rest: StrokeRest::default(),
             segmenter: None,
             steady: Steady::default(),
-            slack: Backlash::default(),
-            #[cfg(feature = "backlash-on-the-way")]
-            on_the_way: Default::default(),
+            backlash: Backlash::default(),
+            #[cfg(feature = "spread-backlash")]
+            spread_backlash: Default::default(),
             contacts: Contacts::default(),
             percent: 100,
             rapid_percent: 100,
@@ -209,24 +209,25 @@ impl<'m> Machine<'m> {
     /// Puts settings in force, while nothing moves.
     fn replace(&mut self, settings: Settings) {
         let (page, before) = (self.position(), self.settings.kinematics());
-        let slack = self.slack_steps();
+        let backlash = self.backlash_steps();
         // While a path waits, only heights of the pen change.
-        #[cfg(feature = "backlash-on-the-way")]
-        let spreads_slack = (self.spreads_slack() || settings.is_on(Setting::BacklashDistance))
+        #[cfg(feature = "spread-backlash")]
+        let spreads_backlash = (self.spreads_backlash()
+            || settings.is_on(Setting::BacklashDistance))
             && !matches!(self.activity, Activity::Hold { .. });
-        #[cfg(feature = "backlash-on-the-way")]
-        if spreads_slack {
+        #[cfg(feature = "spread-backlash")]
+        if spreads_backlash {
             self.set_motors(self.motors_now(), page);
         }
         self.settings = settings;
-        self.resize_slack(slack);
+        self.resize_backlash(backlash);
         if self.settings.kinematics() != before {
             // The pen stays where it is, but the motors' coordinates for that position change.
             self.set_position(page);
         }
-        #[cfg(feature = "backlash-on-the-way")]
-        if spreads_slack {
-            self.follow_slack_anew();
+        #[cfg(feature = "spread-backlash")]
+        if spreads_backlash {
+            self.restart_spread_backlash();
         }
         self.take_settings();
         self.configure_pulser();
@@ -278,18 +279,18 @@ impl<'m> Machine<'m> {
     /// Declares where the machine is, whatever position it had: at `motors` in steps of the motors,
     /// which is `page` on the page.
     fn set_motors(&mut self, motors: PagePoint, page: PagePoint) {
-        #[cfg(feature = "backlash-on-the-way")]
-        self.settle_slack_at_pins();
+        #[cfg(feature = "spread-backlash")]
+        self.settle_backlash_at_pins();
         let (x, y) = self.pins.steps();
         self.origin = PagePoint { x: motors.x.wrapping_sub(x), y: motors.y.wrapping_sub(y) };
         self.segmenter = None;
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         self.forget_shift();
-        let slack = self.find_slack();
+        let backlash = self.correct_backlash();
         self.runner.set_lift(self.pins.z());
-        self.runner.set_position(motors, slack, page, self.pins.ticks());
-        #[cfg(feature = "backlash-on-the-way")]
-        self.follow_slack_anew();
+        self.runner.set_position(motors, backlash, page, self.pins.ticks());
+        #[cfg(feature = "spread-backlash")]
+        self.restart_spread_backlash();
     }
 
     /// Slows down along the path and raises the pen. A jog is ended instead. In other states
@@ -407,9 +408,9 @@ impl<'m> Machine<'m> {
     /// a motor still raises the pen, and while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
         match self.activity {
-            // The motors had no current, so the slack and the height of the pen are unknown.
+            // The motors had no current, so the backlash and the height of the pen are unknown.
             Activity::Sleep { .. } => {
-                self.forget_slack();
+                self.forget_backlash();
                 self.runner.forget_lift();
             }
             Activity::Alarm(alarm)
@@ -435,7 +436,7 @@ impl<'m> Machine<'m> {
         if !matches!(self.activity, Activity::Idle) || !self.is_stopped() {
             return Err(self.refusal());
         }
-        self.forget_slack();
+        self.forget_backlash();
         self.set_position(PagePoint::default());
         Ok(())
     }

@@ -16,7 +16,7 @@ pub struct Target {
 /// A path whose next target has not come yet.
 #[cfg(any(feature = "stream", feature = "early-ink"))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Late {
+pub struct PendingTarget {
     /// Whether the pen was down before.
     pub within_stroke: bool,
 }
@@ -35,7 +35,7 @@ pub trait Path {
     /// Whether the next target has not come yet, so that the machine waits for it with the pen
     /// raised. It is asked when there is no next target.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
-    fn late(&self) -> Option<Late> {
+    fn late(&self) -> Option<PendingTarget> {
         None
     }
     /// The number of the pen, from 0, for the target that was returned last. Where the number

@@ -63,13 +63,13 @@ impl Machine<'_> {
         while let Some(segmenter) = self.segmenter
             && !self.runner.is_full()
         {
-            #[cfg(feature = "backlash-on-the-way")]
-            if self.push_on_the_way(&segmenter) {
+            #[cfg(feature = "spread-backlash")]
+            if self.push_spread_backlash(&segmenter) {
                 continue;
             }
             let Segmenter { from, to, length, position, mut cut, dot, mut ink, limit } = segmenter;
             let mut next_dot = dot;
-            let way = (to.x - from.x, to.y - from.y);
+            let displacement = (to.x - from.x, to.y - from.y);
             let kinematics = self.settings.kinematics();
             let (mut end, mut is_gap) = (length.to_bits(), false);
             if let Some(cuts) = kinematics.cuts(from, to) {
@@ -100,8 +100,15 @@ impl Machine<'_> {
             let begin = self.motors_end();
             let SegmentEnd { motors, page, offsets } =
                 kinematics.segment_end([from, to], positions, length.to_bits(), begin);
-            let segment =
-                Move { motors, offsets, page, way, whole: length, length: end - position, is_gap };
+            let segment = Move {
+                motors,
+                offsets,
+                page,
+                displacement,
+                whole_length: length,
+                length: end - position,
+                is_gap,
+            };
             // There is room, and the segment is no longer than the move, whose length was accepted.
             let pushed = self.push_motors(&segment, ink, limit);
             debug_assert!(pushed.is_ok());

@@ -118,7 +118,7 @@ pub(super) enum Source {
     },
     /// From a path whose next targets have not come yet. The machine stands with the pen raised.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
-    Late(super::Late),
+    PendingTarget(super::PendingTarget),
     /// The moves come from a path that was read to its end.
     PathEnd,
     /// The moves are sent one by one.

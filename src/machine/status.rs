@@ -88,16 +88,16 @@ impl Machine<'_> {
         let (x, y) = self.pins.steps();
         let motors =
             PagePoint { x: self.origin.x.wrapping_add(x), y: self.origin.y.wrapping_add(y) };
-        #[cfg(feature = "backlash-on-the-way")]
-        let motors = self.without_slack(motors);
+        #[cfg(feature = "spread-backlash")]
+        let motors = self.without_spread_backlash(motors);
         motors
     }
 
     /// Returns the positions of both motors where the events planned so far end, in steps.
     pub(super) fn planned_motors(&self) -> PagePoint {
         let motors = self.runner.position();
-        #[cfg(feature = "backlash-on-the-way")]
-        let motors = self.planned_without_slack(motors);
+        #[cfg(feature = "spread-backlash")]
+        let motors = self.planned_without_spread_backlash(motors);
         motors
     }
 

@@ -82,13 +82,13 @@ impl Machine<'_> {
     pub fn stroke_to_note(&self) -> Option<u32> {
         let open = self.log.open?;
         let over = self.strokes_over(open);
-        let stands = self.runner.is_pen_up_at(self.pins.ticks());
+        let is_raised = self.runner.is_pen_up_at(self.pins.ticks());
         // Strokes shorter than a step of the motors are none for the motion planner, so the end of
         // the path counts.
         let is_end = open.is_whole && self.is_stopped();
         let strokes =
             if is_end { self.progress.size().strokes } else { over.wrapping_sub(open.begin) };
-        (is_end || (stands && over != open.noted)).then_some(strokes)
+        (is_end || (is_raised && over != open.noted)).then_some(strokes)
     }
 
     /// What [`Machine::stroke_to_note`] said has been noted.

@@ -286,7 +286,7 @@ fn jobs_take_as_long_as_they_did_with_all_settings() {
 }
 
 #[test]
-fn the_planned_position_leaves_out_the_slack_that_is_taken_up_on_the_way() {
+fn the_planned_position_leaves_out_the_backlash_that_is_taken_up_on_the_way() {
     let mut settings = settings([70.0, 600.0, 0.0, 0.05]);
     for setting in [Setting::BacklashX, Setting::BacklashY, Setting::BacklashDistance] {
         settings.set(setting, Value::from_num(0.4)).expect("a valid setting");

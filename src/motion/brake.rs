@@ -1,27 +1,30 @@
-//! No step leaves faster than the machine can stop within the steps that wait.
+//! The brake: a rule by which no step leaves faster than the machine can stop within the steps that
+//! wait.
 //!
-//! Should the planner be late, the queue runs dry at speed. So the step interrupt keeps each
-//! interval above √(ℓ²/2as): s is what the steps that wait come to along the path, ℓ the length of
-//! one of them. A queue that holds the stopping distance is not slowed at all; one that runs dry is
-//! a ramp down to rest, on the path. When more comes, s grows by a step's length a step, which is a
-//! ramp up. The squared speed is then the lesser of two functions of the place, the plan's and this
-//! one, and neither changes faster than the acceleration allows. (It does not keep the jerk: it is
-//! for what should not happen.)
+//! If the planner is late, the queue runs empty while the machine moves. Therefore the step
+//! interrupt keeps each interval above √(ℓ²/2as), where s is the length of the waiting steps along
+//! the path, and ℓ is the length of one of them. A queue that contains the stopping distance is not
+//! slowed at all, and one that runs empty becomes a ramp down to rest, on the path. When more steps
+//! come, s grows by a step's length with each step, which is a ramp up. The squared speed is then
+//! the lesser of two functions of the position: that of the plan and this one. Neither changes
+//! faster than the acceleration allows. (The brake does not limit the jerk, because it is meant for
+//! an exception.)
 //!
 //! Lengths are counted in units of 2a·4^k ticks², with k such that the longest step is just below
-//! 2^16 of them: then the interval is 2^k·ℓ/√s ticks, one product of 32 bits and a shift.
+//! 2^16 units. Then the interval is 2^k·ℓ/√s ticks, which takes a product of 32 bits and a shift.
 
 use super::limits::hypotenuse;
 use super::{Limits, StepEvent};
 use core::sync::atomic::{AtomicU32, Ordering};
 
-/// The root's interval is between two of these.
+/// The number of bits of an index into [`INVERSE_ROOTS`]. Between two entries the function is
+/// interpolated.
 const INDEX_BITS: u32 = 6;
 const ENTRIES: usize = (1 << INDEX_BITS) + 1;
-/// 2^15/√x, x from 1 to 4, at every 16th; the numbers below 1 are not used.
+/// 2^15/√x for x from 1 to 4, in steps of 1/16. The entries below 1 are not used.
 ///
-/// Nothing writes it. It is atomic on the Pico because the linker then places it in RAM, where the
-/// step interrupt has to have everything that it reads: its flash may keep it waiting.
+/// Nothing writes to the table. On the Pico it is atomic, because the linker then places it in RAM.
+/// There the step interrupt needs everything that it reads, because it must not wait for the flash.
 static INVERSE_ROOTS: [Entry; ENTRIES] = {
     let mut table = [const { entry(0) }; ENTRIES];
     let mut index = ENTRIES / 4;
@@ -61,11 +64,12 @@ fn inverse_root(index: usize) -> u32 {
     u32::from(INVERSE_ROOTS[index])
 }
 
-/// How many of the upper bits are 0, one less if they are odd in number.
+/// Returns the number of leading zeros of `number`, rounded down to an even number.
 #[inline(always)]
 fn pairs_of_leading_zeros(number: u32) -> u32 {
-    // A Cortex-M0+ has no instruction for it, and the compiler's function lies in the flash that
-    // the step interrupt must not wait for. The others have one, which is shorter.
+    // A Cortex-M0+ has no instruction for this, and the compiler's function lies in flash, for
+    // which the step interrupt must not wait. The other cores have an instruction, which is
+    // shorter.
     if cfg!(any(feature = "pico", test)) {
         let (mut number, mut zeros) = (number, 0);
         for bits in [16, 8, 4, 2] {
@@ -80,22 +84,23 @@ fn pairs_of_leading_zeros(number: u32) -> u32 {
     }
 }
 
-/// Lengths below this many units count as this many: 0 would never move.
+/// Shorter lengths count as this many units. With a length of 0 the machine would never move.
 const LEAST_LENGTH: u32 = 64;
 const GREATEST_LENGTH: u32 = (1 << 16) - 1;
 const MAX_EXPONENT: u32 = 16;
 const RECIPROCAL_BITS: u32 = 36;
 
-/// The least ticks from one step to the next, both `length` units long, if the machine can be
-/// brought to rest within `reach` units from the middle between them.
+/// Returns the least ticks between two steps, both `length` units long, such that from the middle
+/// between them the machine can come to rest within `reach` units.
 ///
-/// `length` is at least [`LEAST_LENGTH`] and below 2^16, `exponent` at most [`MAX_EXPONENT`].
+/// `length` is at least [`LEAST_LENGTH`] and below 2^16, and `exponent` is at most
+/// [`MAX_EXPONENT`].
 #[inline(always)]
 fn least_interval(length: u32, reach: u32, exponent: u32) -> u32 {
-    // The machine stands half a step behind the last pulse.
+    // The machine comes to rest half a step after the last pulse.
     let reach = reach.max(length / 2);
     let zeros = pairs_of_leading_zeros(reach);
-    // 1 to 4 in units of 2^-30.
+    // This is 1 to 4 in units of 2^-30.
     let scaled = reach << zeros;
     let index = (scaled >> (u32::BITS - INDEX_BITS)) as usize;
     let (here, next) = (inverse_root(index), inverse_root(index + 1));
@@ -104,37 +109,40 @@ fn least_interval(length: u32, reach: u32, exponent: u32) -> u32 {
     (length * inverse_root) >> (30 - zeros / 2 - exponent)
 }
 
-/// The unit of lengths, and from where on nothing is slowed. By default there is none.
+/// The unit in which lengths are counted, and the length from which on nothing is slowed. By
+/// default there is no brake.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BrakeRule {
+    /// The number k of the unit of length, which is 2a·4^k ticks².
     exponent: u32,
-    /// Units in 2^-32 mm, in units of 2^-36.
+    /// The number of units in 2^-32 mm, as a multiple of 2^-36.
     reciprocal: u64,
+    /// The number of units within which any speed can be shed; 0 without a brake.
     top: u32,
 }
 
 impl BrakeRule {
-    /// A step of so many 2^-32 mm, in units: even.
+    /// Converts the length of a step from 2^-32 mm to units. The result is even.
     pub fn step_length(self, length: u64) -> u32 {
         let units = length.saturating_mul(self.reciprocal) >> RECIPROCAL_BITS;
         (units as u32).clamp(LEAST_LENGTH, GREATEST_LENGTH) & !1
     }
 }
 
-/// Up to so many steps a second, the planner keeps the queue full beside its other work.
+/// Up to this number of steps a second, the planner keeps the queue full beside its other work.
 const BUSY_RATE: u64 = 160_000;
 
-/// For each so many steps a second above that rate, the queue may lack a step without slowing the
-/// machine: it may be filled 2.5 ms later.
+/// For each of this many steps a second above [`BUSY_RATE`], the queue may lack one step without
+/// slowing the machine. So it may be filled 2.5 ms later.
 const LATE_RATE: u64 = 400;
 
-/// The LM3S6965 does not make so many.
+/// Whether the board can exceed [`BUSY_RATE`]; the LM3S6965 cannot.
 const MAY_BE_BUSY: bool = cfg!(not(feature = "lm3s6965"));
 
 impl Limits {
-    /// The least braking, as an acceleration per slice, that sheds the greatest speed within the
-    /// steps of a `queue` that a busy planner keeps full. The speeds are such that the machine
-    /// stops within 13/16 of all.
+    /// Returns the least deceleration, per slice, that sheds the greatest speed within the steps of
+    /// a `queue` that a busy planner keeps full. The settings guarantee that the machine stops
+    /// within 13/16 of a full queue.
     fn least_braking(&self, queue: u32) -> u64 {
         let rate = self.step_rate(self.draw_speed.max(self.travel_speed));
         let late = rate.saturating_sub(BUSY_RATE) / LATE_RATE;
@@ -145,22 +153,23 @@ impl Limits {
         speed.checked_div(held).unwrap_or(0)
     }
 
-    /// The rule for a `queue` of steps that are at most `longer` times as long as a diagonal one.
+    /// Returns the rule for a `queue` of steps that are at most `longer` times as long as a
+    /// diagonal one.
     ///
-    /// It brakes as hard as the machine accelerates, and by 1/32 harder, so that it never slows a
-    /// plan that is in time. Only above `BUSY_RATE` it may brake harder still, up to four times
-    /// as hard.
+    /// The brake decelerates by 1/32 more than the machine accelerates, so that it never slows a
+    /// plan that is in time. Only above [`BUSY_RATE`] it may decelerate more, up to four times as
+    /// much.
     pub fn brake(&self, longer: u64, queue: u32) -> BrakeRule {
         let acceleration = u64::from(self.acceleration.to_bits());
         let harder = if MAY_BE_BUSY { self.least_braking(queue) } else { 0 };
         let braking = (acceleration + acceleration / 32).max(harder).clamp(1, u64::from(u32::MAX));
         let [x, y] = self.step_length.map(|step| u64::from(step.to_bits()));
         let longest_step = longer * hypotenuse(x, y);
-        // The unit is 2^(2k-23) times the acceleration per slice.
+        // The unit of length is 2^(2k-23) times the acceleration per slice.
         let too_long = |&k: &u32| (longest_step << 7) >> (2 * k) >= braking;
         let exponent = (0..MAX_EXPONENT).find(|k| !too_long(k)).unwrap_or(MAX_EXPONENT);
         let reciprocal = (1u64 << 59).checked_div(braking << (2 * exponent)).unwrap_or(1);
-        // Below 2^46 units of 2^-32 mm: 16 m.
+        // This is below 2^46 units of 2^-32 mm, which are 16 m.
         let top = u64::from(self.top.to_bits()) * acceleration;
         let stop = top.checked_div(braking).unwrap_or(0) << 14;
         let top = (u128::from(stop) * u128::from(reciprocal)) >> RECIPROCAL_BITS;
@@ -168,20 +177,22 @@ impl Limits {
     }
 }
 
-/// What the main loop tells the interrupt that takes the steps.
+/// What the main loop and the step interrupt share about the brake.
 #[derive(Debug, Default)]
 pub struct BrakeOrders {
-    /// Units of all steps that were put into the queue; wraps.
+    /// The length of all steps that were put into the queue, in units; wraps.
     queued: AtomicU32,
-    /// Units of all steps that were taken from it, or thrown away; wraps. Of the interrupt.
+    /// The length of all steps that were taken from the queue or discarded, in units; wraps. The
+    /// interrupt writes it.
     taken: AtomicU32,
+    /// [`BrakeRule::exponent`].
     exponent: AtomicU32,
-    /// Units in which any speed can be shed; 0 as long as there is no rule.
+    /// [`BrakeRule::top`]: the units within which any speed can be shed; 0 without a rule.
     top: AtomicU32,
 }
 
 impl BrakeOrders {
-    /// No rule: nothing is slowed.
+    /// Without a rule, so that nothing is slowed.
     pub const fn new() -> Self {
         Self {
             queued: AtomicU32::new(0),
@@ -191,7 +202,7 @@ impl BrakeOrders {
         }
     }
 
-    /// Only while no step waits.
+    /// Sets the rule. No step may wait.
     pub fn set_rule(&self, rule: BrakeRule) {
         self.exponent.store(rule.exponent, Ordering::Relaxed);
         self.top.store(rule.top, Ordering::Relaxed);
@@ -203,39 +214,40 @@ impl BrakeOrders {
         self.top.load(Ordering::Relaxed) != 0
     }
 
-    /// Steps of so many units were put into the queue.
+    /// Counts steps of `units` in all that were put into the queue.
     #[inline]
     pub fn add(&self, units: u32) {
         let queued = self.queued.load(Ordering::Relaxed);
         self.queued.store(queued.wrapping_add(units), Ordering::Relaxed);
     }
 
-    /// Units of all steps that were put into the queue; wraps.
+    /// The length of all steps that were put into the queue, in units; wraps.
     #[inline]
     pub fn queued(&self) -> u32 {
         self.queued.load(Ordering::Relaxed)
     }
 
-    /// So many are in it now.
+    /// Sets the length of all steps that were put into the queue, in units.
     #[inline]
     pub fn set_queued(&self, units: u32) {
         self.queued.store(units, Ordering::Relaxed);
     }
 
-    /// All that waited was thrown away. For the main loop, while the interrupt takes nothing.
+    /// Records that all waiting steps were discarded. Only the main loop calls it, while the
+    /// interrupt takes nothing.
     pub fn forget(&self) {
         self.queued.store(self.taken.load(Ordering::Relaxed), Ordering::Relaxed);
     }
 
-    /// Steps of so many units were taken. For the interrupt.
+    /// Counts steps of `units` in all that were taken. Only the interrupt calls it.
     #[inline(always)]
     pub(super) fn take(&self, units: u32) {
         let taken = self.taken.load(Ordering::Relaxed);
         self.taken.store(taken.wrapping_add(units), Ordering::Relaxed);
     }
 
-    /// Units of the steps that wait. Negative for a moment, between a step's way into the queue and
-    /// its entry in the sum.
+    /// The length of the steps that wait, in units. It is negative for a moment, when a step is
+    /// already in the queue but not yet in the sum.
     #[inline(always)]
     pub(super) fn waiting(&self) -> i32 {
         let queued = self.queued.load(Ordering::Relaxed);
@@ -243,41 +255,43 @@ impl BrakeOrders {
     }
 }
 
-/// A step of the queue, in units, all even.
+/// The distances around a step of the queue, in units. Both are even.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct StepWay {
-    /// From the middle before it to the middle behind it: what it adds to the queue.
+pub struct StepDistances {
+    /// From the middle before the step to the middle after it, which is what the step contributes
+    /// to the length of the queue.
     pub around: u32,
-    /// From its pulse to the next.
+    /// From the pulse of the step to the next pulse.
     pub behind: u32,
 }
 
-/// How long the steps of a queue are, in units.
+/// The lengths of the next steps of a queue, in units.
 #[derive(Debug, Default)]
 pub struct StepLength {
-    /// From the last step to the next.
+    /// The distance from the last step to the next one.
     before: u32,
-    /// From the next step to the one behind it.
+    /// The distance from the next step to the one after it.
     behind: u32,
-    /// From there on.
+    /// The distance between all later steps.
     later: u32,
 }
 
 impl StepLength {
-    /// As before anything was told.
+    /// No length is known yet.
     pub const fn new() -> Self {
         Self { before: 0, behind: 0, later: 0 }
     }
 
-    /// The steps from the next one on are so long, or from the one behind it on: from the last step
-    /// of the old length to the first of the new one it is half of both. The first of all lengths
-    /// is that of the step before, too.
+    /// Sets the length of the steps from the next one on, or from the one after it on
+    /// (`after_next`). The distance between the last step of the old length and the first of the
+    /// new one is the mean of both. The first length that is ever set is also that of the step
+    /// before.
     #[inline]
     pub fn set(&mut self, units: u32, after_next: bool) {
         self.set_from(units, self.start(after_next));
     }
 
-    /// Where a new length begins.
+    /// Returns from where on a new length applies.
     pub(crate) fn start(&self, after_next: bool) -> LengthStart {
         match (self.later, after_next) {
             (0, _) => LengthStart::Anew,
@@ -286,6 +300,7 @@ impl StepLength {
         }
     }
 
+    /// Sets the length of the steps from `start` on.
     pub(crate) fn set_from(&mut self, units: u32, start: LengthStart) {
         self.behind = units;
         match start {
@@ -296,54 +311,57 @@ impl StepLength {
         self.later = units;
     }
 
-    /// Of the steps told of last; 0 if none were.
+    /// The length that was set last; 0 if none was.
     #[inline]
     pub fn last(&self) -> u32 {
         self.later
     }
 
-    /// The way of each step to come, if it is the same.
-    pub fn steady(&self) -> Option<StepWay> {
+    /// The distances of each step to come, if they are all the same.
+    pub fn steady(&self) -> Option<StepDistances> {
         let StepLength { before, behind, later } = *self;
-        (before == behind && behind == later).then_some(StepWay { around: later, behind: later })
+        (before == behind && behind == later)
+            .then_some(StepDistances { around: later, behind: later })
     }
 
-    /// The next step.
+    /// Returns the distances of the next step, and moves on to the one after it.
     #[inline(always)]
-    pub fn step(&mut self) -> StepWay {
+    pub fn step(&mut self) -> StepDistances {
         let before = core::mem::replace(&mut self.before, self.behind);
         self.behind = self.later;
-        StepWay { around: (before + self.before) / 2, behind: self.before }
+        StepDistances { around: (before + self.before) / 2, behind: self.before }
     }
 }
 
-/// From where on steps have another length.
+/// The first step to which a new length applies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum LengthStart {
-    /// From the next one.
+    /// The next step.
     Next,
-    /// From the one behind it.
+    /// The step after the next one.
     AfterNext,
-    /// From the next one, and nothing is known of those before.
+    /// The next step, and no length was known before.
     Anew,
 }
 
-/// Where the queue's other end is. Of the interrupt.
+/// The state of the brake in the step interrupt: how far the machine is from where it could have
+/// been at rest.
 #[derive(Debug, Default)]
 pub struct Brake {
-    /// Units in which the machine could stop from the speed that it may have.
+    /// The units within which the machine can stop from the speed that it may have.
     reach: u32,
 }
 
 impl Brake {
-    /// As at rest.
+    /// The machine is at rest.
     pub const fn new() -> Self {
         Self { reach: 0 }
     }
 
-    /// A step was taken. The least ticks from it to the next; 0 if any are enough.
+    /// Counts a step that was taken. Returns the least ticks from it to the next one; 0 if it need
+    /// not be slowed.
     #[inline(always)]
-    pub fn step(&mut self, step: StepWay, orders: &BrakeOrders) -> u32 {
+    pub fn step(&mut self, step: StepDistances, orders: &BrakeOrders) -> u32 {
         orders.take(step.around);
         if self.move_on(step, orders.waiting(), orders) {
             return 0;
@@ -351,28 +369,30 @@ impl Brake {
         self.least_ticks(step, orders)
     }
 
-    /// Past a step that has been counted. Whether the machine can stop from any speed.
+    /// Moves past a step that has been counted. Returns whether the machine can stop from any
+    /// speed.
     #[inline(always)]
-    fn move_on(&mut self, step: StepWay, waiting: i32, orders: &BrakeOrders) -> bool {
+    fn move_on(&mut self, step: StepDistances, waiting: i32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
-        // From rest it takes a step to the middle behind the first pulse.
+        // From rest, the first pulse leads to the middle after it.
         let reach = if self.reach == 0 { step.behind } else { self.reach + step.around };
         self.reach = reach.min(waiting.max(0).cast_unsigned()).min(top);
         self.reach == top
     }
 
     #[inline(always)]
-    fn least_ticks(&self, step: StepWay, orders: &BrakeOrders) -> u32 {
+    fn least_ticks(&self, step: StepDistances, orders: &BrakeOrders) -> u32 {
         least_interval(step.behind, self.reach, orders.exponent.load(Ordering::Relaxed))
     }
 
-    /// Takes some steps at once, `around` units in all, if they can go as planned: `longest` is the
-    /// longest way behind one, `shortest` are the least ticks to the next.
+    /// Takes several steps at once, `around` units in all, if none of them has to be slowed.
+    /// `longest` is the greatest distance from one of them to the next, and `shortest` the fewest
+    /// ticks. Returns whether they were taken.
     #[inline(always)] // Where the interrupt that asks for it lies.
     pub fn pass(&mut self, around: u32, longest: u32, shortest: u32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
         let left = orders.waiting().max(0).cast_unsigned().saturating_sub(around);
-        // In between it is further.
+        // Between these two states the reach is greater.
         let least = self.reach.min(left);
         let exponent = orders.exponent.load(Ordering::Relaxed);
         let is_calm = around == 0
@@ -385,9 +405,9 @@ impl Brake {
         is_calm
     }
 
-    /// Takes some steps at once, `around` units in all, and none with fewer ticks to the next than
-    /// it says. `None` and nothing taken near rest, where speed changes more from step to step:
-    /// within 64 steps of the `longest` way.
+    /// Takes several steps at once, `around` units in all, and returns the least ticks from any of
+    /// them to the next. Near rest, within 64 times the `longest` distance, the speed changes too
+    /// much from step to step; there it returns `None` and takes nothing.
     #[inline(always)] // Where the interrupt that asks for it lies.
     pub fn pass_evenly(&mut self, around: u32, longest: u32, orders: &BrakeOrders) -> Option<u32> {
         let top = orders.top.load(Ordering::Relaxed);
@@ -401,8 +421,9 @@ impl Brake {
         Some(least_interval(longest, least, orders.exponent.load(Ordering::Relaxed)))
     }
 
-    /// Takes all steps at once that come before `queued` was the sum, if enough waits behind them.
-    #[inline(always)] // As above.
+    /// Takes all steps at once that were put into the queue up to the sum `queued`, if enough steps
+    /// wait after them. Returns whether it took them.
+    #[inline(always)] // Where the interrupt that asks for it lies.
     pub fn pass_far(&mut self, queued: u32, orders: &BrakeOrders) -> bool {
         let top = orders.top.load(Ordering::Relaxed);
         let is_far = self.reach == top && orders.queued().wrapping_sub(queued) >= top;
@@ -412,65 +433,66 @@ impl Brake {
         is_far
     }
 
-    /// All steps were thrown away.
+    /// Records that all waiting steps were discarded.
     pub fn skip_all(&mut self, orders: &BrakeOrders) {
         orders.forget();
         self.reach = 0;
     }
 }
 
-/// The brake of an interrupt that comes at each step and has no time to look closely at each: the
-/// little that always has to be done is [`StepBrake::step`], and the rest comes in pieces.
+/// The brake of an interrupt that comes with each step and has little time for it. What every step
+/// needs is done by [`StepBrake::step`], and the rest is done in pieces by [`StepBrake::work`].
 #[derive(Debug, Default)]
 pub struct StepBrake {
-    /// With no more units waiting than these, a step must be looked at.
+    /// A step must be examined if no more than this many units wait.
     calm_above: i32,
-    /// What has to be done: see below; 0 for nothing.
+    /// The work that has to be done, as the bits below; 0 for none.
     todo: u8,
-    /// Of the present step, and of each to come unless something is to be done.
-    way: StepWay,
+    /// The distances of the current step, and of all steps to come if no work has to be done.
+    distances: StepDistances,
     brake: Brake,
     length: StepLength,
-    /// The word that tells another length.
+    /// The last word that told a length.
     told: u32,
 }
 
-/// Steps to come until all have the same way.
+/// The number of steps after a change of length until all steps have the same distances. The lowest
+/// bits of the work count them down.
 const CHANGES: u8 = 3;
-/// It was told that a pulse is none of a step, which is to come.
+/// A word has told that a pulse is no step along the path, and this pulse is still to come.
 const AHEAD: u8 = 1 << 3;
-/// A length was told.
+/// A word has told a new length.
 const TOLD: u8 = 1 << 5;
-/// It may be too soon for the next step.
+/// The next step may have to be delayed.
 const LOOK: u8 = 1 << 6;
-/// The next pulse is none of a step.
+/// The next pulse is no step along the path.
 const SKIP: u8 = 1 << 7;
 
 impl StepBrake {
-    /// As at rest, nothing told.
+    /// The machine is at rest, and no length is known.
     pub const fn new() -> Self {
         Self {
             calm_above: i32::MAX,
             todo: 0,
-            way: StepWay { around: 0, behind: 0 },
+            distances: StepDistances { around: 0, behind: 0 },
             brake: Brake::new(),
             length: StepLength::new(),
             told: 0,
         }
     }
 
-    /// The machine rests. The next step will be looked at.
+    /// Records that the machine is at rest, so that the next step is examined.
     pub fn rest(&mut self) {
         self.calm_above = i32::MAX;
     }
 
-    /// All steps were thrown away, and the machine stands.
+    /// Records that all waiting steps were discarded and the machine is at rest.
     pub fn stop(&mut self) {
         self.brake.reach = 0;
         self.rest();
     }
 
-    /// Takes a word that is no event. [`StepBrake::work`] must be called before the next event.
+    /// Takes a word that is no event. Before the next event, [`StepBrake::work`] must be called.
     #[inline(always)]
     pub(crate) fn tell(&mut self, word: StepEvent) {
         if word.skips_next() {
@@ -481,7 +503,8 @@ impl StepBrake {
         }
     }
 
-    /// The pulse of a step is over. Whether [`StepBrake::work`] must be called, soon.
+    /// Called at the end of the pulse of a step. Returns whether [`StepBrake::work`] must be called
+    /// soon.
     #[inline(always)]
     pub fn step(&mut self, orders: &BrakeOrders) -> bool {
         self.todo != 0 || self.take(orders)
@@ -489,15 +512,15 @@ impl StepBrake {
 
     #[inline(always)]
     fn take(&mut self, orders: &BrakeOrders) -> bool {
-        orders.take(self.way.around);
+        orders.take(self.distances.around);
         let waiting = orders.waiting();
         if waiting > self.calm_above {
             return false;
         }
-        let is_calm = self.brake.move_on(self.way, waiting, orders);
+        let is_calm = self.brake.move_on(self.distances, waiting, orders);
         self.calm_above = i32::MAX;
         if is_calm {
-            // Without a rule nothing waits, and nothing is looked at again.
+            // Without a rule, no units wait and no step is examined again.
             self.calm_above = orders.top.load(Ordering::Relaxed).cast_signed() - 1;
         } else {
             self.todo |= LOOK;
@@ -505,14 +528,14 @@ impl StepBrake {
         !is_calm
     }
 
-    /// Does a piece of what has to be done. Whether there is more of it, and the least ticks from
-    /// the last step to the next, as far as is known.
+    /// Does a piece of the work. Returns whether there is more, and the least ticks from the last
+    /// step to the next as far as they are known.
     #[inline(always)]
     pub fn work(&mut self, orders: &BrakeOrders) -> (bool, u32) {
         let todo = self.todo;
         if todo & LOOK != 0 {
             self.todo = todo & !LOOK;
-            return (false, self.brake.least_ticks(self.way, orders));
+            return (false, self.brake.least_ticks(self.distances, orders));
         }
         (self.prepare(todo, orders), 0)
     }
@@ -529,7 +552,7 @@ impl StepBrake {
             self.todo = CHANGES;
             return false;
         }
-        self.way = self.length.step();
+        self.distances = self.length.step();
         self.todo = todo.saturating_sub(1);
         self.take(orders)
     }
@@ -717,7 +740,7 @@ mod tests {
                 orders.add(900 * length);
             }
             let (mut some, mut one) = (Brake::new(), Brake::new());
-            let step = StepWay { around: length, behind: length };
+            let step = StepDistances { around: length, behind: length };
             let mut taken_at_once = 0;
             for group in 0..220 {
                 let least = if evenly {
@@ -750,7 +773,7 @@ mod tests {
     fn steps_have_one_way_once_all_of_a_length_are_told() {
         let mut length = StepLength::new();
         length.set(64, false);
-        assert_eq!(length.steady(), Some(StepWay { around: 64, behind: 64 }));
+        assert_eq!(length.steady(), Some(StepDistances { around: 64, behind: 64 }));
         length.set(32, true);
         let mut steady = 0;
         for step in 0..5 {

@@ -16,7 +16,7 @@ pub(super) struct BlockCursor {
     pub(super) pattern: Pattern,
     pub(super) piece: u32,
     pub(super) length: PathLength,
-    #[cfg(feature = "backlash-on-the-way")]
+    #[cfg(feature = "spread-backlash")]
     extra: PathLength,
     pub(super) curve_limit: PathLength,
     /// mm per move, 2^-32.
@@ -26,13 +26,13 @@ pub(super) struct BlockCursor {
     /// Moves at the end of the piece.
     pub(super) piece_moves: u32,
     /// From the start of the block to where the plan is, 2^-32 mm.
-    pub(super) place: u64,
+    pub(super) position: u64,
     /// From there to where the next move is due.
     pub(super) to_next: u64,
-    /// Where it shall stand, if that is not the end: a place like the one above, and else the
+    /// Where it shall stand, if that is not the end: a position like the one above, and else the
     /// greatest number.
     stop: u64,
-    /// The slice in work begins at `place`.
+    /// The slice in work begins at `position`.
     pub(super) slice: Option<SliceMoves>,
     /// What is left of a slice that the end of a chord cut.
     rest: Slice,
@@ -75,14 +75,14 @@ impl BlockCursor {
             pattern,
             piece: 0,
             length: block.length,
-            #[cfg(feature = "backlash-on-the-way")]
+            #[cfg(feature = "spread-backlash")]
             extra: block.extra,
             curve_limit: block.curve_limit,
             move_length,
             moves,
             moves_done: 0,
             piece_moves: pattern.end_of(0),
-            place: 0,
+            position: 0,
             to_next: move_length / 2,
             stop: u64::MAX,
             slice: None,
@@ -99,23 +99,23 @@ impl BlockCursor {
         self.ink.is_some() && self.kind != BlockKind::Gap && Pattern::inked(self.piece)
     }
 
-    /// Whether the motors only take up their slack: the pen stays where it is.
-    pub(super) fn is_slack(&self) -> bool {
-        self.kind == BlockKind::Slack
+    /// Whether the motors only take up their backlash: the pen stays where it is.
+    pub(super) fn takes_up_backlash(&self) -> bool {
+        self.kind == BlockKind::Backlash
     }
 
     /// How much of the block the pen draws.
     pub(super) fn drawn(&self) -> PathLength {
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         return self.length.saturating_sub(self.extra);
-        #[cfg(not(feature = "backlash-on-the-way"))]
+        #[cfg(not(feature = "spread-backlash"))]
         self.length
     }
 
-    /// Whether a motor turns round that has slack.
-    #[cfg(feature = "backlash-on-the-way")]
-    pub(super) fn turns(&self) -> bool {
-        matches!(self.kind, BlockKind::Slack | BlockKind::Turn)
+    /// Whether a motor turns round that has backlash.
+    #[cfg(feature = "spread-backlash")]
+    pub(super) fn reverses(&self) -> bool {
+        matches!(self.kind, BlockKind::Backlash | BlockKind::Reversal)
     }
 
     /// Whether it is the last one.
@@ -123,25 +123,25 @@ impl BlockCursor {
         self.piece_moves == self.moves
     }
 
-    /// From the plan's place to the end of the piece, 2^-32 mm.
+    /// From the plan's position to the end of the piece, 2^-32 mm.
     pub(super) fn room(&self) -> u64 {
         let end = if self.is_last_piece() {
             u64::from(self.length.to_bits()) << 14
         } else {
             self.move_length * u64::from(self.piece_moves)
         };
-        end.saturating_sub(self.place)
+        end.saturating_sub(self.position)
     }
 
-    /// From the plan's place to the first where the machine can stand, which is half a move behind
-    /// one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
+    /// From the plan's position to the first where the machine can stand, which is half a move
+    /// behind one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn to_whole_step(&self, least: u64) -> u64 {
         let length = self.move_length.max(1);
-        // The first such place, or the one before it.
+        // The first such position, or the one before it.
         let behind = (self.to_next + length / 2) % length;
         let stand = behind + least.saturating_sub(behind).div_ceil(length) * length;
-        let end = self.chord_end.saturating_sub(self.place);
+        let end = self.chord_end.saturating_sub(self.position);
         if self.is_last_chord() || stand <= end {
             return stand.min(self.room());
         }
@@ -164,14 +164,14 @@ impl BlockCursor {
         stand.min(self.room())
     }
 
-    /// Stands at the first such place that is not nearer than `least`, and stays with it: how far
-    /// that is, 2^-32 mm.
+    /// Stands at the first such position that is not nearer than `least`, and stays with it: how
+    /// far that is, 2^-32 mm.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn stop_behind(&mut self, least: u64) -> u64 {
         if self.stop == u64::MAX {
-            self.stop = self.place + self.to_whole_step(least);
+            self.stop = self.position + self.to_whole_step(least);
         }
-        self.stop.saturating_sub(self.place)
+        self.stop.saturating_sub(self.position)
     }
 
     /// Goes on to the end.
@@ -224,7 +224,7 @@ impl BlockCursor {
     /// Returns what a slice does within the chord in work, and keeps the rest.
     #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
     fn cut_slice(&mut self, slice: Slice) -> Slice {
-        let room = self.chord_end.saturating_sub(self.place);
+        let room = self.chord_end.saturating_sub(self.position);
         if u64::from(slice.distance) <= room {
             return slice;
         }
@@ -237,11 +237,11 @@ impl BlockCursor {
 
     /// The slice in work is done. Whether a new chord begins.
     pub(super) fn end_slice(&mut self, slice: Slice) -> bool {
-        self.place += u64::from(slice.distance);
+        self.position += u64::from(slice.distance);
         // What is behind the last move is a rest of nothing.
         self.to_next = self.to_next.saturating_sub(slice.distance.into());
         self.slice = None;
-        let ends = !self.is_last_chord() && self.place >= self.chord_end;
+        let ends = !self.is_last_chord() && self.position >= self.chord_end;
         if ends {
             self.next_chord();
         }
@@ -254,7 +254,7 @@ impl BlockCursor {
             let length = u64::from(chord.length().to_bits()) << 14;
             self.line = Line::by(chord.dx.into(), chord.dy.into());
             self.move_length = length / u64::from(chord.moves().max(1));
-            self.to_next = (self.chord_end + self.move_length / 2).saturating_sub(self.place);
+            self.to_next = (self.chord_end + self.move_length / 2).saturating_sub(self.position);
             self.chord_end += length;
             self.begun += 1;
         }
@@ -292,7 +292,7 @@ impl BlockCursor {
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn next_piece(&mut self) {
         self.piece += 1;
-        self.place = self.move_length * u64::from(self.piece_moves);
+        self.position = self.move_length * u64::from(self.piece_moves);
         self.to_next = self.move_length / 2;
         self.piece_moves = self.pattern.end_of(self.piece);
     }
@@ -335,10 +335,10 @@ impl SliceClock {
         Self { zeros, slowness: ((time << 31) / distance) as u32 }
     }
 
-    /// When a place within the slice is reached: below 2^31 units of [`Train`], and 2 units early
-    /// at most.
-    fn time_of(&self, place: u32) -> u32 {
-        ((u64::from(place << self.zeros) * u64::from(self.slowness)) >> 31) as u32
+    /// When a position within the slice is reached: below 2^31 units of [`Train`], and 2 units
+    /// early at most.
+    fn time_of(&self, position: u32) -> u32 {
+        ((u64::from(position << self.zeros) * u64::from(self.slowness)) >> 31) as u32
     }
 }
 
@@ -419,7 +419,7 @@ mod tests {
             }
         }
         for least in 0..=places[places.len() - 1] {
-            let expected = places.iter().find(|place| **place >= least).expect("a place");
+            let expected = places.iter().find(|position| **position >= least).expect("a position");
             assert_eq!(course.to_whole_step(least << 14), expected << 14, "{least}");
         }
     }

@@ -27,7 +27,7 @@ const FRACTION_BITS: u32 = 12;
 const TIGHT_HEIGHT: u64 = 24;
 
 #[derive(Debug, Clone, Copy, Default)]
-struct Place {
+struct PathPoint {
     x: i32,
     y: i32,
 }
@@ -36,7 +36,7 @@ struct Place {
 #[derive(Debug, Clone, Copy, Default)]
 struct Level {
     /// The last two points looked at, the later first.
-    points: [Place; 2],
+    points: [PathPoint; 2],
     /// The last circle.
     circle: Circle,
 }
@@ -75,7 +75,7 @@ impl Curvature {
         }
         blocks.end_curve();
         self.count = 0;
-        let points = [place(limits, point); 2];
+        let points = [path_point(limits, point); 2];
         self.levels = [Level { points, circle: Circle::default() }; LEVELS];
     }
 
@@ -85,13 +85,8 @@ impl Curvature {
     // LM3S6965 has none, and no flash for two of it.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     #[cfg_attr(feature = "lm3s6965", inline(never))]
-    pub(super) fn sync_consumed(
-        &mut self,
-        limits: &Limits,
-        point: PagePoint,
-        blocks: &mut Lookahead<'_>,
-    ) {
-        let latest = place(limits, point);
+    pub(super) fn extend(&mut self, limits: &Limits, point: PagePoint, blocks: &mut Lookahead<'_>) {
+        let latest = path_point(limits, point);
         self.count = self.count.wrapping_add(1);
         for (number, level) in (1u32..).zip(self.levels.iter_mut()) {
             let stride = 1 << number;
@@ -125,19 +120,19 @@ impl Curvature {
     }
 }
 
-fn place(limits: &Limits, point: PagePoint) -> Place {
+fn path_point(limits: &Limits, point: PagePoint) -> PathPoint {
     let [step_x, step_y] = limits.step_length;
     let along = |steps: i32, step: u32| {
         // Steps within ±2^21 of less than 2^-1 mm; clamped where no page reaches.
         let bits = (i64::from(steps) * i64::from(step)) >> (32 - FRACTION_BITS);
         bits.clamp(-(1 << 26), 1 << 26) as i32
     };
-    Place { x: along(point.x, step_x.to_bits()), y: along(point.y, step_y.to_bits()) }
+    PathPoint { x: along(point.x, step_x.to_bits()), y: along(point.y, step_y.to_bits()) }
 }
 
 /// The circle through three points.
 #[inline(always)] // As above.
-fn circle(limits: &Limits, first: Place, middle: Place, last: Place) -> Circle {
+fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint) -> Circle {
     // Within ±2^28, so products of two stay below 2^57.
     let (ax, ay) = (middle.x - first.x, middle.y - first.y);
     let (bx, by) = (last.x - middle.x, last.y - middle.y);

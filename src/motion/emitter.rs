@@ -65,7 +65,7 @@ impl Emitter {
         queue: &mut dyn EventQueue,
     ) -> Result<u32, StepEvent> {
         time = whole_ticks(time);
-        if self.turns(levels) {
+        if self.reverses(levels) {
             self.directions = (self.directions & !levels.axes) | levels.directions;
             let at = time.wrapping_sub(self.setup);
             let at = self.put(self.holding(), at, queue)?;
@@ -79,7 +79,7 @@ impl Emitter {
     }
 
     /// Whether the move needs other levels at the direction pins.
-    pub(super) fn turns(&self, levels: MoveLevels) -> bool {
+    pub(super) fn reverses(&self, levels: MoveLevels) -> bool {
         (self.directions ^ levels.directions) & levels.axes != 0
     }
 
@@ -91,11 +91,11 @@ impl Emitter {
         start: u32,
         train: Train,
         line: &mut Line,
-        levels: Kinds,
+        levels: LineLevels,
         queue: &mut dyn EventQueue,
-    ) -> Result<Stepped, StepEvent> {
+    ) -> Result<TrainResult, StepEvent> {
         let Some((event, since)) = self.pending else {
-            return Ok(Stepped::default());
+            return Ok(TrainResult::default());
         };
         let level_bits = self.level_bits();
         let event_of =
@@ -126,7 +126,7 @@ impl Emitter {
         self.ticks = self.ticks.wrapping_add(last.wrapping_sub(since) >> FRACTION_BITS);
         self.pending = Some((StepEvent::from_bits(steps.event), last));
         let diagonals = steps.diagonals as usize;
-        Ok(Stepped { late, diagonals })
+        Ok(TrainResult { late, diagonals })
     }
 
     /// The same for moves of any kind, one by one.
@@ -135,10 +135,10 @@ impl Emitter {
         start: u32,
         train: Train,
         line: &mut Line,
-        levels: Kinds,
+        levels: LineLevels,
         queue: &mut dyn EventQueue,
-    ) -> Result<Stepped, StepEvent> {
-        let mut stepped = Stepped::default();
+    ) -> Result<TrainResult, StepEvent> {
+        let mut stepped = TrainResult::default();
         for number in 0..train.count as u32 {
             let is_diagonal = line.next_is_diagonal();
             stepped.diagonals += usize::from(is_diagonal);
@@ -300,7 +300,7 @@ impl Train {
 
 /// What became of a [`Train`].
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Stepped {
+pub(super) struct TrainResult {
     /// By how much later it took place, sixteenths of ticks.
     pub(super) late: u32,
     /// Diagonal moves in it.
@@ -318,7 +318,7 @@ fn later(a: u32, b: u32) -> u32 {
 
 /// What the two moves of a line do to the pins.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Kinds {
+pub(super) struct LineLevels {
     pub(super) straight: MoveLevels,
     pub(super) diagonal: MoveLevels,
 }
@@ -326,7 +326,7 @@ pub(super) struct Kinds {
 /// What a move does to the pins.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct MoveLevels {
-    /// The axes that step, and whether they take up slack.
+    /// The axes that step, and whether they take up backlash.
     pulses: u8,
     /// Their direction pins.
     axes: u8,
@@ -343,7 +343,7 @@ impl MoveLevels {
             let mut index = 0;
             while index < Direction::ALL.len() {
                 let direction = Direction::ALL[index];
-                all[direction as usize] = MoveLevels::told_by(direction);
+                all[direction as usize] = MoveLevels::for_direction(direction);
                 index += 1;
             }
             all
@@ -351,7 +351,7 @@ impl MoveLevels {
         ALL[direction as usize]
     }
 
-    const fn told_by(direction: Direction) -> Self {
+    const fn for_direction(direction: Direction) -> Self {
         let (dx, dy) = direction.delta();
         let mut levels = Self { pulses: 0, axes: 0, directions: 0 };
         if dx != 0 {
@@ -371,8 +371,8 @@ impl MoveLevels {
         levels
     }
 
-    /// The same where the motors take up their slack.
-    pub(super) const fn as_slack(self) -> Self {
+    /// The same where the motors take up their backlash.
+    pub(super) const fn for_backlash(self) -> Self {
         Self { pulses: self.pulses | StepEvent::AT_REST, ..self }
     }
 }

@@ -1,27 +1,27 @@
-//! The step event, one word, and the queue in which events wait.
+//! The step event, which is one word, and the queue in which events wait for the step interrupt.
 
 use super::brake::LengthStart;
 use crate::step::Direction;
 use crate::step::tape::Instruction;
 
-/// What the step interrupt is told: pin levels, and how long until the next event. One word.
+/// An instruction to the step interrupt: levels of the pins, and the time until the next event.
 ///
 /// | bits | of a move | of the pen |
 /// |---|---|---|
 /// | 0, 1 | pulse x, pulse y | height, bits 0 to 6 |
-/// | 2, 3 | x, y runs down | |
+/// | 2, 3 | x, y counts down | |
 /// | 4 | drivers on | |
-/// | 5 | at rest afterwards; with a pulse: takes up slack | |
+/// | 5 | at rest afterwards; with a pulse: takes up backlash | |
 /// | 6 | 0 | |
 /// | 7 | 0 | 1 |
 /// | 8–31 | ticks to the next event | the same |
 ///
-/// With bit 6 set and bit 7 clear it stands aside of both. With bit 2 it is an event of the motor
-/// that lifts the pen: bit 3 a pulse, bit 4 it runs down. Without bit 2 it is no event, but tells
-/// how long the steps behind it are: see [`StepBrake`](super::StepBrake).
+/// A word with bit 6 set and bit 7 clear is of another kind. With bit 2 it is an event of the motor
+/// that lifts the pen: bit 3 is a pulse, and bit 4 says that it counts down. Without bit 2 it is no
+/// event, but tells how long the steps behind it are: see [`StepBrake`](super::StepBrake).
 ///
-/// A change of direction is an event of its own, without a pulse, before the pulse. Waits longer
-/// than 2^24 - 1 ticks (0.67 s) are several events.
+/// A change of direction is a separate event without a pulse, before the event with the pulse.
+/// Waits longer than 2^24 - 1 ticks (0.67 s) take several events.
 ///
 /// ```
 /// use penup::motion::{EventKind, StepEvent};
@@ -35,21 +35,21 @@ use crate::step::tape::Instruction;
 #[repr(transparent)]
 pub struct StepEvent(u32);
 
-/// A [`StepEvent`] taken apart.
+/// A decoded [`StepEvent`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum EventKind {
     /// Levels of the axes' pins: the low seven bits, see the constants of [`StepEvent`].
     Levels(u8),
     /// The pen goes to a height: 0 raised fully, 127 lowered fully.
     Pen {
-        /// 0 to 127.
+        /// The height, 0 to 127.
         height: u8,
     },
     /// The motor that lifts the pen: its direction pin takes a level, and it may step.
     Lift {
-        /// With a pulse.
+        /// Whether the motor makes a step.
         step: bool,
-        /// Towards the paper.
+        /// Whether it moves towards the paper.
         down: bool,
     },
 }
@@ -65,8 +65,8 @@ impl StepEvent {
     pub const DOWN_Y: u8 = 1 << 3;
     /// The drivers hold the motors.
     pub const DRIVERS_ON: u8 = 1 << 4;
-    /// Nothing moves after this event: the queue may run dry. With a pulse: the motor takes up its
-    /// slack, and the pen stays where it is.
+    /// Nothing moves after this event, so the queue may run empty. With a pulse: the motor takes up
+    /// its backlash, and the pen stays where it is.
     pub const AT_REST: u8 = 1 << 5;
     /// The longest wait that one event can hold.
     pub const MAX_TICKS: u32 = (1 << 24) - 1;
@@ -77,43 +77,45 @@ impl StepEvent {
     const LIFT_STEP: u8 = 1 << 3;
     const LIFT_DOWN: u8 = 1 << 4;
 
-    /// The axes' pins take `levels` (an "or" of the constants), then `ticks` pass (at most
-    /// [`StepEvent::MAX_TICKS`]; more is cut to it).
+    /// An event that sets the axes' pins to `levels` (an "or" of the constants) and lasts `ticks`,
+    /// which are limited to [`StepEvent::MAX_TICKS`].
     pub const fn levels(levels: u8, ticks: u32) -> Self {
         Self::new(levels & !(Self::PEN | Self::LENGTH), ticks)
     }
 
-    /// The pen goes to `height` (0 to 127), then `ticks` pass.
+    /// An event that sends the pen to `height` (0 to 127) and lasts `ticks`.
     pub const fn pen(height: u8, ticks: u32) -> Self {
         Self::new(height | Self::PEN, ticks)
     }
 
-    /// The motor that lifts the pen takes a direction, and a step if asked, then `ticks` pass.
+    /// An event that sets the direction of the motor that lifts the pen, makes a step if `step`,
+    /// and lasts `ticks`.
     pub const fn lift(step: bool, down: bool, ticks: u32) -> Self {
         let step = if step { Self::LIFT_STEP } else { 0 };
         let down = if down { Self::LIFT_DOWN } else { 0 };
         Self::new(Self::LENGTH | Self::LIFT | step | down, ticks)
     }
 
-    /// Whether it is neither of a move nor of the pen's height.
+    /// Whether the word is neither of a move nor of the height of the pen.
     #[inline(always)]
     pub const fn is_aside(self) -> bool {
         self.0 & (Self::PEN | Self::LENGTH) as u32 == Self::LENGTH as u32
     }
 
-    /// Whether it is no event, but tells something of those behind it.
+    /// Whether the word is no event, but describes those behind it.
     #[inline(always)]
     pub(crate) const fn is_told(self) -> bool {
         const ASIDE: u8 = StepEvent::PEN | StepEvent::LENGTH | StepEvent::LIFT;
         self.0 as u8 & ASIDE == Self::LENGTH
     }
 
-    /// A word that tells how long the steps from somewhere on are: units below 2^16.
+    /// A word that tells the length of the steps behind it, in units below 2^16, and the first step
+    /// to which that applies.
     pub(crate) const fn step_length(units: u32, start: LengthStart) -> Self {
         Self::new(Self::LENGTH, units | (start as u32) << 16)
     }
 
-    /// What such a word tells.
+    /// What a word made by [`StepEvent::step_length`] tells.
     #[inline(always)]
     pub(crate) const fn told_length(self) -> (u32, LengthStart) {
         let start = match self.0 >> 24 {
@@ -126,12 +128,12 @@ impl StepEvent {
 
     const SKIP_NEXT: u32 = 1 << 31;
 
-    /// A word that tells that the next pulse is none of a step.
+    /// A word that tells that the next pulse does not count as a step along the path.
     pub(crate) const fn skip_next() -> Self {
         Self(Self::SKIP_NEXT | Self::LENGTH as u32)
     }
 
-    /// Whether it is such a word.
+    /// Whether the word was made by [`StepEvent::skip_next`].
     #[inline(always)]
     pub(crate) const fn skips_next(self) -> bool {
         self.0 & Self::SKIP_NEXT != 0
@@ -142,12 +144,12 @@ impl StepEvent {
         Self(ticks << 8 | flags as u32)
     }
 
-    /// The word, as a board that feeds a state machine by DMA needs it.
+    /// The event as the word that a board feeds to a state machine by DMA.
     pub const fn to_bits(self) -> u32 {
         self.0
     }
 
-    /// The event of a word.
+    /// The event that a word represents.
     pub const fn from_bits(bits: u32) -> Self {
         Self(bits)
     }
@@ -157,7 +159,7 @@ impl StepEvent {
         self.0 >> 8
     }
 
-    /// What happens.
+    /// Decodes the event.
     #[inline(always)] // Not a call in the step interrupt.
     pub const fn kind(self) -> EventKind {
         let flags = self.0 as u8;
@@ -171,12 +173,13 @@ impl StepEvent {
         }
     }
 
-    /// What the event adds to x and y; nothing where the motors take up their slack.
+    /// What the event adds to the position along x and y; nothing where the motors take up their
+    /// backlash.
     pub const fn step(self) -> (i32, i32) {
-        if self.is_slack() { (0, 0) } else { self.pulses() }
+        if self.takes_up_backlash() { (0, 0) } else { self.pulses() }
     }
 
-    /// Which motors it moves, and which way.
+    /// The step of each motor, with its sign.
     pub const fn pulses(self) -> (i32, i32) {
         match self.kind() {
             EventKind::Pen { .. } | EventKind::Lift { .. } => (0, 0),
@@ -187,13 +190,13 @@ impl StepEvent {
         }
     }
 
-    /// Whether motors take up their slack.
-    pub const fn is_slack(self) -> bool {
+    /// Whether the event is a step by which motors take up their backlash.
+    pub const fn takes_up_backlash(self) -> bool {
         let pulses = (Self::STEP_X | Self::STEP_Y) as u32;
         self.0 & pulses != 0 && self.0 & (Self::PEN | Self::AT_REST) as u32 == Self::AT_REST as u32
     }
 
-    /// Whether it pulses, and does nothing else.
+    /// Whether the event is a step along the path.
     pub const fn is_step(self) -> bool {
         let pulses = (Self::STEP_X | Self::STEP_Y) as u32;
         self.0 & pulses != 0 && self.0 & (Self::PEN | Self::AT_REST) as u32 == 0
@@ -229,42 +232,42 @@ const fn axis_step(levels: u8, pulse: u8, down: u8) -> i32 {
 
 /// Steps at even intervals along a line.
 ///
-/// Times count from somewhere, in units of 2^-15 ticks; events are words without their ticks. Each
-/// step handed over lasts up to the next one, which waits for that. A board may make the words of
-/// its queue from the fields, as [`StepTrain::push_each`] does.
+/// Times are in units of 2^-15 ticks from an arbitrary origin. Events are words without their
+/// ticks. A step is handed over when the next one is known, because it lasts until then. A board
+/// may make the words of its queue directly from the fields, as [`StepTrain::push_each`] does.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub struct StepTrain {
-    /// Of the next step.
+    /// The time of the next step.
     pub time: u32,
-    /// From each to the one behind it, never shorter than two pulses.
+    /// The time from each step to the next, never shorter than two pulses.
     pub interval: u32,
-    /// When the step that waits took place, in whole ticks.
+    /// The time of the step that has not been handed over, in whole ticks.
     pub before: u32,
-    /// That step,
+    /// The event of the step that has not been handed over.
     pub event: u32,
-    /// a straight one of the train,
+    /// The event of a straight step of the train.
     pub straight: u32,
-    /// and a diagonal one.
+    /// The event of a diagonal step of the train.
     pub diagonal: u32,
-    /// If above zero, the next step is diagonal.
+    /// The decision variable of the line: if it is positive, the next step is diagonal.
     pub balance: i32,
-    /// Added to it by a straight step.
+    /// What a straight step adds to `balance`.
     pub gain: i32,
-    /// Taken from it by a diagonal step.
+    /// What a diagonal step subtracts from `balance`.
     pub loss: i32,
-    /// Diagonal steps so far.
+    /// The number of diagonal steps so far.
     pub diagonals: u32,
 }
 
 impl StepTrain {
-    /// Of a tick, in times and intervals.
+    /// The number of bits of times and intervals that are fractions of a tick.
     pub const FRACTION_BITS: u32 = 15;
 
     /// Hands the next `count` steps over.
     ///
     /// # Errors
-    /// That of `push`.
+    /// The error of `push`.
     #[inline]
     pub fn push_each(
         &mut self,
@@ -276,7 +279,7 @@ impl StepTrain {
             // Waits are below 2^24 ticks.
             push(StepEvent(self.event + (ticks.wrapping_sub(self.before) << 8)))?;
             self.before = ticks;
-            // Only behind the last can it wrap.
+            // The time can wrap only after the last step.
             self.time = self.time.wrapping_add(self.interval);
             if self.balance > 0 {
                 self.balance -= self.loss;
@@ -290,7 +293,7 @@ impl StepTrain {
         Ok(())
     }
 
-    /// Turns the three events into others.
+    /// Replaces each of the three events by `turn` of it.
     #[inline]
     pub fn convert(&mut self, turn: impl Fn(u32) -> u32) {
         for event in [&mut self.event, &mut self.straight, &mut self.diagonal] {
@@ -299,28 +302,26 @@ impl StepTrain {
     }
 }
 
-/// Where planned events go: the interrupt's queue on a board, a recorder in tests.
+/// The destination of planned events: the interrupt's queue on a board, a recorder in tests.
 pub trait EventQueue {
     /// How many more events fit.
     fn room(&self) -> usize;
-    /// Appends one.
+    /// Appends an event.
     ///
     /// # Errors
     /// Hands the event back if the queue is full.
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent>;
-    /// Appends the next `count` steps of a train, one at least; there is room.
+    /// Appends the next `count` steps of a train, at least one. There must be room.
     ///
-    /// # Errors
-    /// Hands the first event back that finds the queue full after all.
+    /// # Errors Hands back the first event for which the queue has no room after all.
     fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         train.push_each(count, |event| self.push(event))
     }
-    /// The steps that follow are so long, in units of the [`BrakeRule`](super::BrakeRule), below
-    /// 2^16; but for the next one, if a step of the old length has still to come. Takes a place, as
-    /// an event does.
+    /// Tells the length of the steps that follow, in units of the [`BrakeRule`](super::BrakeRule),
+    /// below 2^16. With `after_next`, the next step still has the old length. This takes as much
+    /// room in the queue as an event.
     ///
-    /// # Errors
-    /// The word that found the queue full.
+    /// # Errors The word for which the queue has no room.
     fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
         let _ = (units, after_next);
         Ok(())
@@ -357,26 +358,26 @@ pub(crate) mod tests {
         assert_eq!(up.instruction(), Some(Instruction::Move(Direction::Up)));
         let left = StepEvent::levels(StepEvent::STEP_X | StepEvent::DOWN_X, 7);
         assert_eq!(left.instruction(), Some(Instruction::Move(Direction::Left)));
-        let slack = StepEvent::levels(StepEvent::STEP_X | StepEvent::AT_REST, 7);
-        assert_eq!(slack.instruction(), None);
+        let backlash = StepEvent::levels(StepEvent::STEP_X | StepEvent::AT_REST, 7);
+        assert_eq!(backlash.instruction(), None);
     }
 
     #[test]
     fn a_word_tells_one_thing() {
         let step = StepEvent::levels(StepEvent::STEP_X | StepEvent::DOWN_Y, 9);
         let direction = StepEvent::levels(StepEvent::DOWN_X | StepEvent::DRIVERS_ON, 9);
-        let slack =
+        let backlash =
             StepEvent::levels(StepEvent::STEP_Y | StepEvent::DOWN_Y | StepEvent::AT_REST, 9);
         let pen = StepEvent::pen(65, 9);
         let lift = StepEvent::lift(true, true, 9);
-        for event in [step, direction, slack, pen, lift] {
+        for event in [step, direction, backlash, pen, lift] {
             assert!(!event.is_told() && event.ticks() == 9, "{event:?}");
             assert_eq!(event.is_step(), event == step, "{event:?}");
-            assert_eq!(event.is_slack(), event == slack, "{event:?}");
+            assert_eq!(event.takes_up_backlash(), event == backlash, "{event:?}");
             assert_eq!(StepEvent::from_bits(event.to_bits()), event);
         }
         assert_eq!(step.step(), (1, 0));
-        assert_eq!((slack.step(), slack.pulses()), ((0, 0), (0, -1)));
+        assert_eq!((backlash.step(), backlash.pulses()), ((0, 0), (0, -1)));
         assert_eq!([direction, pen, lift].map(StepEvent::pulses), [(0, 0); 3]);
         assert_eq!(pen.kind(), EventKind::Pen { height: 65 });
         for (step, down) in [(false, false), (false, true), (true, false), (true, true)] {

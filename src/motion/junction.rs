@@ -2,7 +2,7 @@
 
 use super::{Limits, PathLength};
 
-/// The way in which a block runs: a vector of length 2^30.
+/// The direction of a block, as a vector of length 2^30.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Heading {
     x: i32,
@@ -10,7 +10,7 @@ pub(super) struct Heading {
 }
 
 impl Heading {
-    /// The way of a move by (`dx`, `dy`) steps whose length is `length`, not 0.
+    /// The direction of a move by (`dx`, `dy`) steps of the given `length`, which is not 0.
     pub(super) fn new(limits: &Limits, dx: i32, dy: i32, length: PathLength) -> Self {
         let [step_x, step_y] = limits.step_length;
         // One division for both parts: 2^63 over a length from 2^31 on.
@@ -19,14 +19,15 @@ impl Heading {
         let scale = u64::from(1u32 << zeros);
         let inverse = (1u64 << 63).checked_div((length << zeros).into()).unwrap_or(0);
         let part = |steps: i32, step: u32| {
-            // Units of 2^-32 mm; the length's are 2^-18 mm. A part is no longer than the whole but
-            // for rounding, below 2^46, so that 32 bits hold it in units of the length as it is
-            // shifted.
+            // In units of 2^-32 mm, where the length is in 2^-18 mm. Except for rounding, a
+            // component is no longer than the whole, which is below 2^46. So 32 bits hold it in
+            // units of the shifted length.
             let part = u64::from(steps.unsigned_abs()) * u64::from(step);
-            // A product is a shift, and one instruction where a shift of 64 bits is a call.
+            // A multiplication is used as a shift, because it is one instruction where a shift of
+            // 64 bits is a call.
             let part = ((part * scale) >> 14).min(u32::MAX.into());
             let heading = (part * inverse) >> 33;
-            // 2^30 but for rounding.
+            // At most 2^30, except for rounding.
             let heading = heading.min(1 << 30) as i32;
             if steps < 0 { -heading } else { heading }
         };
@@ -34,28 +35,28 @@ impl Heading {
     }
 }
 
-/// What a corner allows.
+/// How a corner may be passed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Corner {
-    /// Stopping distance with which it may be passed.
+    /// The stopping distance of the greatest speed at the corner.
     pub(super) limit: PathLength,
-    /// Whether the path turns by more than 40° and so is no curve.
+    /// Whether the path turns by more than 40°, so that it is no curve.
     pub(super) is_sharp: bool,
 }
 
 impl Corner {
-    /// Where the machine must stand anyway.
+    /// A corner at which the machine must come to rest anyway.
     pub(super) const STOP: Self = Self { limit: PathLength::ZERO, is_sharp: true };
 }
 
-/// The corner between two blocks, the length of the shorter one given.
+/// Computes how the corner between two blocks may be passed, given the length of the shorter one.
 ///
-/// Junction deviation δ rounds a corner of turning angle θ by an arc of radius
-/// δ cos(θ/2) / (1 - cos(θ/2)); half of it is the stopping distance. Where the blocks are too short
-/// for that arc, the arc that touches both in the middle of the shorter counts, ½ l / tan(θ/2): on
-/// a dense polyline that is the circle through its points.
+/// Junction deviation δ rounds a corner of turning angle θ by an arc of radius δ cos(θ/2) / (1 -
+/// cos(θ/2)), half of which is the stopping distance. If the blocks are too short for that arc, the
+/// arc that touches both in the middle of the shorter one counts instead, whose radius is ½ l /
+/// tan(θ/2). On a dense polyline that is the circle through its points.
 ///
-/// Points lie on the grid of steps, so a corner may be nothing but rounding: it counts as less
+/// Points lie on the grid of steps, so a corner may be mere rounding. It therefore counts as less
 /// sharp by as much as rounding can explain.
 #[inline(always)] // Where each chord is pushed: elsewhere it would drive that out of the cache.
 pub(super) fn corner(
@@ -69,7 +70,8 @@ pub(super) fn corner(
     let (dx, dy) = (after.x.wrapping_sub(before.x), after.y.wrapping_sub(before.y));
     let rounding = u64::from(limits.rounding.to_bits()) << 30;
     let shorter = shorter.to_bits().max(1);
-    // On dense curves rounding explains all, which takes no root to see.
+    // Fast path: on dense curves rounding explains the whole corner, which is known without a
+    // square root.
     let most = dx.unsigned_abs() / 2 + dy.unsigned_abs() / 2 + 1;
     if u64::from(most) * u64::from(shorter) <= rounding {
         return NONE;
@@ -79,16 +81,18 @@ pub(super) fn corner(
         return NONE;
     }
     let cosine = half_length(before.x.wrapping_add(after.x), before.y.wrapping_add(after.y));
-    // Lengths are rounded to whole units, and headings with them: what turns back stands.
+    // Lengths are rounded to whole units, and so are the directions. A path that turns back must
+    // come to rest.
     let cosine = if cosine * u64::from(shorter) <= 1 << 30 { 0 } else { cosine };
     let by_deviation = {
-        // δ c (1 + c) / s², as 1 - c itself would lose all its digits in a slight bend.
+        // δ c (1 + c) / s² is used in place of δ c / (1 - c), because 1 - c would lose all its
+        // digits in a slight bend.
         let scaled = (u64::from(limits.junction_deviation.to_bits()) * cosine) >> 30;
         let doubled = scaled * ((1 << 30) + cosine);
         doubled / ((sine * sine) >> 30).max(1)
     };
     let radius = if limits.centripetal {
-        // l below 2^32, c at most 2^30.
+        // The length is below 2^32, and the cosine at most 2^30.
         by_deviation.min(u64::from(shorter) * cosine / (2 * sine))
     } else {
         by_deviation
@@ -100,21 +104,22 @@ pub(super) fn corner(
     }
 }
 
-/// Whether one of two lines is no chord of the curve that the other is part of: it is four times
-/// as long, and more than 32 times what rounding explains. A single step beside it says nothing,
-/// so that a curve in steps, in which lines of steps are joined, remains one.
-#[inline(always)] // As above.
+/// Whether one of two lines cannot be a chord of the curve that the other is part of, because it is
+/// four times as long and more than 32 times what rounding explains. A single step beside a long
+/// line proves nothing. So a curve of single steps in which collinear ones are joined remains one
+/// curve.
+#[inline(always)] // Like `corner`.
 pub(super) fn bends_apart(limits: &Limits, one: PathLength, other: PathLength) -> bool {
     let (shorter, longer) = (one.min(other).to_bits(), one.max(other).to_bits());
     let rounding = limits.rounding.to_bits();
     longer >> 5 > rounding && shorter > rounding && shorter < longer >> 2
 }
 
-/// Half the length of a vector of two parts within ±2^31, at most 2^30.
-#[inline(always)] // As above.
+/// Returns half the length of a vector whose components are within ±2^31; at most 2^30.
+#[inline(always)] // Like `corner`.
 fn half_length(x: i32, y: i32) -> u64 {
     let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
-    // Opposite headings can add up to 2^31 by one unit of rounding: within 32 unsigned bits.
+    // With a unit of rounding, two directions can add up to 2^31, which fits 32 unsigned bits.
     (square(x) / 4 + square(y) / 4).isqrt().min(1 << 30)
 }
 

@@ -1,28 +1,30 @@
-//! The pen on a motor of its own: from rest to rest, so that it lands softly.
+//! The motor that lifts the pen. Each of its moves is planned from rest to rest, so that the pen
+//! lands softly.
 //!
-//! Its steps count down from an upper stop. Where that is, is not known after the motor had no
-//! current: then the pen is first driven up by more than its travel, slowly, against the stop.
+//! Its steps count downward from an upper stop. The position of this stop is unknown after the
+//! motor had no current. Then the pen is first driven up slowly, against the stop, by more than its
+//! travel.
 //!
-//! Each pulse leaves in the middle of its step: step n from a rest, from 0, leaves √((2n + 1)/a)
-//! after it.
+//! Each pulse leaves in the middle of its step: step n after a rest, counted from 0, leaves √((2n +
+//! 1)/a) after it.
 
 use super::TICKS_PER_SECOND;
 
-/// The motor of the pen, as far as motion needs to know it.
+/// The properties of the pen's motor that motion needs to know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct LiftRule {
-    /// Steps from the upper stop to height 127: 1 to 2^18.
+    /// The steps from the upper stop to height 127: 1 to 2^18.
     pub travel: i32,
     /// The least ticks from one step to the next.
     pub least_ticks: u32,
-    /// The square of the ticks in which acceleration brings a steps-per-tick up: (ticks per
-    /// second)²/(steps/s²).
+    /// The square of the ticks in which the acceleration reaches a speed of one step per tick:
+    /// (ticks per second)² / (steps/s²).
     pub square: u64,
 }
 
 impl LiftRule {
-    /// For `travel` steps, below 2^18, at most `rate` steps a second (1 at least), `acceleration`
-    /// steps/s² (20 at least).
+    /// The rule for `travel` steps (below 2^18), at most `rate` steps a second (at least 1), and an
+    /// `acceleration` in steps/s² (at least 20).
     pub fn new(travel: i32, rate: u32, acceleration: u32) -> Self {
         let second = u64::from(TICKS_PER_SECOND);
         Self {
@@ -33,33 +35,35 @@ impl LiftRule {
         }
     }
 
-    /// Steps below the stop at a height of the pen, 0 to 127.
+    /// The number of steps below the stop at which the pen has a `height` of 0 to 127.
     pub fn steps(self, height: u8) -> i32 {
         // Below 2^25.
         self.travel * i32::from(height) / 127
     }
 
-    /// Ticks from a rest over so many half steps: below 2^24 for one, below 2^32 for 2^19.
+    /// The ticks that this many half steps take from rest: below 2^24 for one, below 2^32 for 2^19.
     fn ticks_over(self, half_steps: i32) -> u32 {
         (u64::from(half_steps.unsigned_abs()) * self.square).isqrt() as u32
     }
 }
 
-/// Where the pen's motor is and where it goes.
+/// The position of the pen's motor and its current move.
 #[derive(Debug, Default)]
 pub(super) struct Lift {
-    /// The sum of all steps planned; wraps.
-    place: i32,
-    /// Where the move in work began and where it ends.
+    /// The sum of all planned steps; wraps.
+    position: i32,
+    /// The position at which the current move began.
     from: i32,
+    /// The position at which the current move ends.
     to: i32,
-    /// That sum at the upper stop.
+    /// The position of the upper stop, if it is known.
     top: Option<i32>,
-    /// Until the pins have worked off so many ticks, they have not been there.
+    /// While the pins have not yet carried out events of this many ticks, the motor has not yet
+    /// been driven against the stop.
     found_at: Option<u32>,
 }
 
-/// What the motor does next: a direction alone, or a step. Then so many ticks pass.
+/// The next action of the motor: a change of direction or a step, after which `ticks` pass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct LiftStep {
     pub(super) step: bool,
@@ -68,63 +72,65 @@ pub(super) struct LiftStep {
 }
 
 impl Lift {
-    /// A search for the stop is as much slower as this, and as much longer than the travel as 1/8.
+    /// How many times slower the motor moves while it searches for the stop. The search is longer
+    /// than the travel by 1/8.
     const SLOWER: u32 = 4;
 
-    /// Whether it is known where the stop is.
+    /// Whether the position of the stop is known.
     pub(super) fn is_known(&self) -> bool {
         self.top.is_some()
     }
 
-    /// The motor had no current, or another travel is in force.
+    /// Forgets the position of the stop, because the motor had no current or its travel was
+    /// changed.
     pub(super) fn forget(&mut self) {
         (self.top, self.found_at) = (None, None);
     }
 
-    /// The stop was found, by the plan, by the event that begins after `ticks`.
+    /// Records that the plan has reached the stop, with the event that begins after `ticks`.
     pub(super) fn found(&mut self, ticks: u32) {
         self.found_at = Some(ticks);
     }
 
-    /// The pins have worked off so many ticks.
+    /// Records that the pins have carried out events of this many ticks.
     pub(super) fn sync_consumed(&mut self, ticks: u32) {
         self.found_at = self.found_at.filter(|at| ticks.wrapping_sub(*at).cast_signed() <= 0);
     }
 
-    /// The pulses so far sum up to `place`, and nothing waits.
-    pub(super) fn stand_at(&mut self, place: i32) {
-        (self.place, self.from, self.to) = (place, place, place);
+    /// Sets the position to the sum of the pulses so far. No pulse may wait.
+    pub(super) fn set_position(&mut self, position: i32) {
+        (self.position, self.from, self.to) = (position, position, position);
         if self.found_at.is_some() {
             self.forget();
         }
     }
 
-    /// The next step on the way to `height`; `None` if the pen is there.
+    /// Returns the next action on the way to `height`; `None` if the pen is there.
     pub(super) fn next(&mut self, rule: LiftRule, height: u8) -> Option<LiftStep> {
-        if self.place == self.to {
+        if self.position == self.to {
             self.to = match self.top {
                 Some(top) => top.wrapping_add(rule.steps(height)),
-                None => self.place.wrapping_sub(rule.travel + rule.travel / 8 + 1),
+                None => self.position.wrapping_sub(rule.travel + rule.travel / 8 + 1),
             };
-            self.from = self.place;
+            self.from = self.position;
             let down = self.to.wrapping_sub(self.from) > 0;
             let ticks = rule.ticks_over(1);
             return (self.to != self.from).then_some(LiftStep { step: false, down, ticks });
         }
-        let way = self.to.wrapping_sub(self.from);
-        let down = way > 0;
-        let done = self.place.wrapping_sub(self.from).abs();
-        self.place = self.place.wrapping_add(way.signum());
-        // The steps from the rests to the two pulses.
-        let left = way.abs() - 2 - done;
+        let distance = self.to.wrapping_sub(self.from);
+        let down = distance > 0;
+        let done = self.position.wrapping_sub(self.from).abs();
+        self.position = self.position.wrapping_add(distance.signum());
+        // The steps between this pulse and the end of the move.
+        let left = distance.abs() - 2 - done;
         let within = 2 * done.min(left) + 1;
         let slower = if self.top.is_none() { Self::SLOWER } else { 1 };
         let ticks = if left < 0 {
-            self.top = self.top.or(Some(self.place));
+            self.top = self.top.or(Some(self.position));
             rule.ticks_over(1)
         } else {
             let planned = match rule.ticks_over(within) {
-                // The top speed is reached between the two.
+                // The motor is fastest in the middle of this interval.
                 before if done == left => 2 * (rule.ticks_over(within + 1) - before),
                 before => rule.ticks_over(within + 2) - before,
             };
@@ -173,17 +179,18 @@ mod tests {
                 }
                 time += f64::from(next.ticks) / f64::from(TICKS_PER_SECOND);
             }
-            // When and where, and how fast in the middle of the way there.
+            // The times and positions, and the speed in the middle between two of them.
             let (mut before, mut slower) = ((0.0, 0.0), (0.0, 0.0));
-            for &(at, place) in places.iter().chain(&[(time, f64::from(steps))]) {
-                let (middle, speed) = ((before.0 + at) / 2.0, (place - before.1) / (at - before.0));
+            for &(at, position) in places.iter().chain(&[(time, f64::from(steps))]) {
+                let (middle, speed) =
+                    ((before.0 + at) / 2.0, (position - before.1) / (at - before.0));
                 assert!(speed <= 1.001 * f64::from(rate));
                 let change = (speed - slower.1) / (middle - slower.0);
                 // Pulses are at whole ticks.
                 let rounding = 2.0 * speed.powi(3) / f64::from(TICKS_PER_SECOND);
                 let most = 1.02 * f64::from(acceleration) + rounding;
                 assert!(change.abs() <= most, "{steps}: {change}");
-                (before, slower) = ((at, place), (middle, speed));
+                (before, slower) = ((at, position), (middle, speed));
             }
         }
     }
@@ -197,7 +204,7 @@ mod tests {
             lift.next(rule, 127);
         }
         // The last 3 of the 300 steps never left.
-        lift.stand_at(-901 + 297);
+        lift.set_position(-901 + 297);
         assert_eq!(run(&mut lift, rule, 0).iter().filter(|next| next.step).count(), 297);
         lift.forget();
         assert_eq!(run(&mut lift, rule, 0).iter().filter(|next| next.step).count(), 901);

@@ -55,8 +55,8 @@ pub enum LimitsError {
     /// A stepper motor lifts the pen, which moves only while the machine stands.
     #[cfg(feature = "pen-overlap")]
     PenByMotor,
-    /// Slack is to be taken up on the way, and the motors draw no straight line together.
-    #[cfg(feature = "backlash-on-the-way")]
+    /// Backlash is to be taken up on the way, and the motors draw no straight line together.
+    #[cfg(feature = "spread-backlash")]
     BacklashOfBelts,
     /// So many steps per second that the pulses would run together: lower the speed or the pulse.
     TooManySteps {

@@ -14,7 +14,7 @@ fn surely_known(limits: &Limits) -> u32 {
 }
 
 /// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes,
-/// or 52 with the feature `backlash-on-the-way`.
+/// or 52 with the feature `spread-backlash`.
 ///
 /// The LM3S6965 lends 16 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
 /// far as the stopping distance asks for it (`Lookahead::join`). With fewer blocks than hold
@@ -39,8 +39,8 @@ pub struct Block {
     pub(super) points: u8,
     /// Those chords, in front. What is behind them has no meaning.
     pub(super) chords: [Chord; MOST_CHORDS - 1],
-    /// How much longer its steps are than what the pen draws: they take up slack besides.
-    #[cfg(feature = "backlash-on-the-way")]
+    /// How much longer its steps are than what the pen draws: they take up backlash besides.
+    #[cfg(feature = "spread-backlash")]
     pub(super) extra: PathLength,
 }
 
@@ -75,11 +75,11 @@ pub(super) enum BlockKind {
     Line,
     /// A gap within an inked line: the pen is raised.
     Gap,
-    /// The motors only take up their slack: the pen stays where it is.
-    Slack,
-    /// A line with which a motor turns round that takes up its slack on the way.
-    #[cfg(feature = "backlash-on-the-way")]
-    Turn,
+    /// The motors only take up their backlash: the pen stays where it is.
+    Backlash,
+    /// A line with which a motor turns round that takes up its backlash on the way.
+    #[cfg(feature = "spread-backlash")]
+    Reversal,
 }
 
 impl Block {
@@ -96,7 +96,7 @@ impl Block {
         chord_count: 0,
         points: 1,
         chords: [Chord { dx: 0, dy: 0, length: 0 }; MOST_CHORDS - 1],
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         extra: PathLength::ZERO,
     };
 
@@ -222,7 +222,7 @@ impl<'m> Lookahead<'m> {
         slot.ink = block.ink;
         slot.offsets = block.offsets;
         slot.kind = block.kind;
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         {
             slot.extra = block.extra;
         }
@@ -269,7 +269,7 @@ impl<'m> Lookahead<'m> {
         };
         let are_lines = [&*block, line].iter().all(|block| {
             let is_whole = matches!(block.ink, None | Some(LineType::Full));
-            #[cfg(feature = "backlash-on-the-way")]
+            #[cfg(feature = "spread-backlash")]
             let is_whole = is_whole && block.extra == 0;
             is_whole && block.kind == BlockKind::Line && block.offsets == [0; 2]
         });

@@ -1,19 +1,19 @@
 //! Speed profile with look-ahead; step events for the interrupt.
 //!
-//! The ordered drawing comes in as straight [`Block`]s. [`Lookahead`] knows how fast each junction
-//! may be passed, [`Profile`] how the speed runs through one block, [`Runner`] turns both into
-//! [`StepEvent`]s, which wait in an [`EventQueue`] for the step interrupt.
+//! The ordered drawing comes in as straight [`Block`]s. A [`Lookahead`] determines how fast each
+//! junction may be passed, and a [`Profile`] plans the speed within one block. The [`Runner`] turns
+//! both into [`StepEvent`]s, which wait in an [`EventQueue`] for the step interrupt.
 //!
 //! Speed is planned as *stopping distance*, v²/2a, in millimetres: a block of length L raises or
 //! lowers it by at most L, and an arc of radius r allows r/2. So the look-ahead only adds and
-//! compares lengths, exactly; a square root is taken when a block begins, if at all. What a block
-//! allows is passed on to those before it as it comes, so nothing is looked for when one begins.
-//! Within a block time goes in slices of [`SLICE_TICKS`], or longer ones while the speed stays; the
-//! speed is constant within a slice, so its moves are evenly spaced, a [`StepTrain`], and every
-//! slice begins on the exact parabola.
+//! compares lengths, exactly; a square root is taken when a block begins, if at all. When a block
+//! is appended, what it allows is passed on to the blocks before it, so that nothing has to be
+//! searched when a block begins. Within a block, time is divided into slices of [`SLICE_TICKS`], or
+//! longer ones while the speed stays the same. The speed is constant within a slice, so its moves
+//! are evenly spaced (a [`StepTrain`]), and every slice begins on the exact parabola.
 //!
-//! With a limit on jerk, another planner (`smooth`) is at work: at intervals it looks how far
-//! acceleration may rise such that all that is known ahead can still be kept.
+//! With a limit on jerk, another planner (`smooth`) takes over: at intervals it determines how far
+//! the acceleration may rise such that all known limits ahead can still be kept.
 //!
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
@@ -23,7 +23,8 @@
 //! jerk; for chords of five moves at 5,000 a second 451, and 483 to 499. The step interrupt is not
 //! counted in that. `cargo xtask bench --motion` counts both.
 //!
-//! Not done here: limits of travel, the pen's heights, states. That is `machine`.
+//! The module `machine` is responsible for the limits of travel, the heights of the pen, and the
+//! states.
 
 mod brake;
 mod course;
@@ -39,7 +40,7 @@ mod runner;
 mod smooth;
 mod steady;
 
-pub use brake::{Brake, BrakeOrders, BrakeRule, StepBrake, StepLength, StepWay};
+pub use brake::{Brake, BrakeOrders, BrakeRule, StepBrake, StepDistances, StepLength};
 pub use emitter::Emitter;
 pub use event::{EventKind, EventQueue, StepEvent, StepTrain};
 pub use lift::LiftRule;
@@ -48,9 +49,9 @@ pub use lookahead::{Block, Lookahead};
 pub use profile::Profile;
 #[cfg(feature = "pen-overlap")]
 pub use runner::PenOverlap;
+#[cfg(feature = "spread-backlash")]
+pub use runner::{BacklashTakeUp, Reversal};
 pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
-#[cfg(feature = "backlash-on-the-way")]
-pub use runner::{OnTheWay, Turn};
 pub use steady::SteadySpeed;
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.

@@ -1,45 +1,51 @@
-//! How the speed runs through one piece of the path: up, along, down, cut into slices.
+//! The speed along one piece of the path: how it rises, stays and falls, divided into slices of
+//! constant speed.
 
 use super::{Limits, PathLength, SLICE_TICKS, SliceSpeed};
 
-/// Sixteenths of a tick: the fraction keeps short blocks from losing a tick each.
+/// Times are counted in sixteenths of ticks, which is this number of fractional bits. In whole
+/// ticks each short block would lose up to one tick.
 pub(super) const FRACTION_BITS: u32 = 4;
 
-/// A speed both ways: as such, and as the distance in which it can be shed.
+/// A speed along the path, together with the distance within which the machine can shed it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Pace {
+pub struct PathSpeed {
+    /// The distance within which the speed can be shed.
     pub(super) stopping_distance: PathLength,
+    /// The speed itself.
     pub(super) speed: SliceSpeed,
 }
 
-impl Pace {
-    /// Standing.
+impl PathSpeed {
+    /// No movement.
     pub const REST: Self = Self { stopping_distance: PathLength::ZERO, speed: SliceSpeed::ZERO };
 
+    /// Returns a speed with its stopping distance.
     pub(super) fn of_speed(limits: &Limits, speed: SliceSpeed) -> Self {
         Self { stopping_distance: limits.stopping_distance(speed), speed }
     }
 
+    /// Returns the speed that has this stopping distance.
     pub(super) fn of_stopping_distance(limits: &Limits, stopping_distance: PathLength) -> Self {
         Self { stopping_distance, speed: limits.speed(stopping_distance) }
     }
 }
 
-/// A stretch of constant acceleration.
+/// A part of a profile in which the acceleration is constant.
 #[derive(Debug, Clone, Copy, Default)]
 struct Phase {
-    /// Still to go, 2^-32 mm.
+    /// The distance that is left, in units of 2^-32 mm.
     distance: u64,
-    /// Still to pass, 1/16 ticks.
+    /// The time that is left, in sixteenths of ticks.
     time: u64,
-    /// Now.
+    /// The speed now.
     speed: SliceSpeed,
-    /// Gained by each slice.
+    /// The speed that each slice adds.
     gain: i32,
 }
 
 impl Phase {
-    /// From one speed to another.
+    /// A phase of `distance` whose speed changes from `from` to `to`.
     #[inline(always)] // A copy of what it returns costs more.
     fn new(limits: &Limits, from: SliceSpeed, to: SliceSpeed, distance: PathLength) -> Self {
         let speeds = u64::from(from.to_bits()) + u64::from(to.to_bits());
@@ -62,50 +68,55 @@ impl Phase {
     }
 }
 
-/// A short time of constant speed.
+/// A short time within which the speed is constant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Slice {
-    /// Gone in it, 2^-32 mm.
+    /// The distance covered, in units of 2^-32 mm.
     pub(super) distance: u32,
-    /// It lasts, 1/16 ticks, at most [`Slice::MOST`] times [`Slice::TIME`].
+    /// The duration in sixteenths of ticks, at most [`Slice::MOST`] times [`Slice::TIME`].
     pub(super) time: u32,
 }
 
 impl Slice {
-    /// [`SLICE_TICKS`].
+    /// The duration of an ordinary slice, which is [`SLICE_TICKS`], in sixteenths of ticks.
     pub(super) const TIME: u32 = SLICE_TICKS << FRACTION_BITS;
-    /// Where the speed does not change, so many are one: 1.3 ms.
+    /// The most ordinary slices that are merged into one where the speed stays the same, which is
+    /// 1.3 ms.
     pub(super) const MOST: u32 = 8;
 }
 
 /// The speed along one piece of the path: at most three phases of constant acceleration.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Profile {
-    /// The phase in work.
+    /// The current phase.
     phase: Phase,
-    /// How long the speed then stays, and how long it sinks at the end.
+    /// After the current phase, the distance at constant speed.
     flat: PathLength,
+    /// After that, the distance on which the speed falls.
     down: PathLength,
-    peak: Pace,
-    exit: Pace,
+    /// The greatest speed of the profile.
+    peak: PathSpeed,
+    /// The speed at the end of the profile.
+    exit: PathSpeed,
 }
 
 impl Profile {
-    /// Begins at `entry`, goes `length`, at most `top` fast, and ends as fast as `exit_allowed` and
-    /// the acceleration let it.
+    /// Plans a piece of `length` that begins at the speed `entry`. The speed never exceeds `top`,
+    /// and at the end it is as close to the stopping distance `exit_allowed` as the acceleration
+    /// permits, but not above it.
     ///
-    /// If `entry` is faster than `top`, the speed is shed first. `exit_allowed` must be within
-    /// reach, which it is if it comes from the same look-ahead as `entry`; else the profile sheds
-    /// all it can.
+    /// If `entry` is faster than `top`, the speed is first reduced to `top`. `exit_allowed` must be
+    /// reachable, which is guaranteed if it comes from the same look-ahead as `entry`; otherwise
+    /// the profile reduces the speed as far as it can.
     pub(super) fn new(
         limits: &Limits,
-        entry: Pace,
+        entry: PathSpeed,
         length: PathLength,
-        top: Pace,
+        top: PathSpeed,
         exit_allowed: PathLength,
     ) -> Self {
         let (start, reach) = (entry.stopping_distance, length);
-        // Most chords are run at the greatest speed from end to end.
+        // Fast path: most chords are run at the greatest speed from end to end.
         if start == top.stopping_distance && start > 0 && exit_allowed >= start {
             let phase = Phase::new(limits, top.speed, top.speed, length);
             return Self {
@@ -123,39 +134,40 @@ impl Profile {
             top.stopping_distance.max(slowest)
         } else {
             let sum = u64::from(fastest.to_bits()) + u64::from(exit.to_bits());
-            // Half of two numbers of 32 bits has 32.
+            // Half the sum of two 32-bit numbers fits 32 bits.
             PathLength::from_bits((sum / 2) as u32).min(top.stopping_distance)
         };
         let exit = exit.min(peak);
-        let pace = |distance: PathLength| {
+        let speed_of = |distance: PathLength| {
             if distance == top.stopping_distance {
                 top
             } else if distance == start {
                 entry
             } else if distance == 0 {
-                Pace::REST
+                PathSpeed::REST
             } else {
-                Pace::of_stopping_distance(limits, distance)
+                PathSpeed::of_stopping_distance(limits, distance)
             }
         };
-        let peak_pace = pace(peak);
-        // Even if the top speed is so slow that it needs no length to be shed.
-        let exit_pace = if exit == 0 { Pace::REST } else { pace(exit) };
+        let peak_speed = speed_of(peak);
+        // An exit at rest is exact even if the top speed is so low that its stopping distance
+        // rounds to zero.
+        let exit_speed = if exit == 0 { PathSpeed::REST } else { speed_of(exit) };
         let up = start.abs_diff(peak).min(length);
         let down = (peak - exit).min(length - up);
         let (mut flat, mut down) = (length - up - down, down);
         let (from, to, distance) = if up > 0 {
-            (entry, peak_pace, up)
+            (entry, peak_speed, up)
         } else if flat > 0 {
-            (peak_pace, peak_pace, core::mem::take(&mut flat))
+            (peak_speed, peak_speed, core::mem::take(&mut flat))
         } else {
-            (peak_pace, exit_pace, core::mem::take(&mut down))
+            (peak_speed, exit_speed, core::mem::take(&mut down))
         };
         let phase = Phase::new(limits, from.speed, to.speed, distance);
-        Self { phase, flat, down, peak: peak_pace, exit: exit_pace }
+        Self { phase, flat, down, peak: peak_speed, exit: exit_speed }
     }
 
-    /// Takes the next phase into work, if there is one.
+    /// Begins the next phase. Returns whether there is one.
     fn begin_phase(&mut self, limits: &Limits) -> bool {
         let (to, length) = if self.flat > 0 {
             (self.peak, core::mem::take(&mut self.flat))
@@ -170,12 +182,12 @@ impl Profile {
         true
     }
 
-    /// The speed at its end.
-    pub(super) fn exit(&self) -> Pace {
+    /// The speed at the end of the profile.
+    pub(super) fn exit(&self) -> PathSpeed {
         self.exit
     }
 
-    /// How long it still takes to its end, in sixteenths of ticks.
+    /// The time until the end of the profile, in sixteenths of ticks.
     #[cfg(feature = "pen-overlap")]
     pub(super) fn time_left(&self, limits: &Limits) -> u64 {
         let flat = Phase::new(limits, self.peak.speed, self.peak.speed, self.flat);
@@ -183,7 +195,7 @@ impl Profile {
         self.phase.time.saturating_add(flat.time).saturating_add(down.time)
     }
 
-    /// The speed where the next slice begins.
+    /// The speed at which the next slice begins.
     pub(super) fn speed(&self) -> SliceSpeed {
         if self.phase.distance > 0 {
             self.phase.speed
@@ -194,7 +206,7 @@ impl Profile {
         }
     }
 
-    /// The next slice, `None` at the end.
+    /// Returns the next slice, or `None` at the end of the profile.
     pub(super) fn next_slice(&mut self, limits: &Limits) -> Option<Slice> {
         loop {
             let phase = &mut self.phase;
@@ -208,10 +220,11 @@ impl Profile {
                 phase.speed = SliceSpeed::from_bits(after as u32);
                 phase.distance -= distance;
                 phase.time -= time;
-                // Speeds are at most 0.09, and a slice is no longer than eight.
+                // The distance fits 32 bits: a speed is at most 0.09 mm in an ordinary slice, and
+                // at most eight of these are merged.
                 return Some(Slice { distance: distance as u32, time: time as u32 });
             }
-            // No more than that.
+            // The rest is no longer than a slice, so it fits 32 bits, too.
             let rest = Slice { distance: phase.distance as u32, time: phase.time as u32 };
             let goes_on = self.begin_phase(limits);
             if rest.distance > 0 {
@@ -244,7 +257,7 @@ mod tests {
     }
 
     /// From `entry` on to rest, or as far as `length` allows.
-    fn stopping(limits: &Limits, entry: Pace, length: PathLength) -> Profile {
+    fn stopping(limits: &Limits, entry: PathSpeed, length: PathLength) -> Profile {
         let length = length.min(entry.stopping_distance);
         Profile::new(limits, entry, length, entry, PathLength::ZERO)
     }
@@ -252,7 +265,7 @@ mod tests {
     #[test]
     fn triangle_trapezoid_and_stop_take_the_time_of_the_formula() {
         let limits = Limits::new(&settings()).expect("valid");
-        let top = Pace::of_speed(&limits, limits.draw_speed);
+        let top = PathSpeed::of_speed(&limits, limits.draw_speed);
         let cases = [
             // length, entry, exit, seconds
             (20.0, 0.0, 0.0, 0.25 + 0.25 + 7.5 / 50.0),
@@ -263,7 +276,8 @@ mod tests {
             (1.0, 0.0, 10.0, (2.0f64 / 200.0).sqrt()),
         ];
         for (length, entry, exit, seconds) in cases {
-            let entry = Pace::of_stopping_distance(&limits, mm(entry).min(top.stopping_distance));
+            let entry =
+                PathSpeed::of_stopping_distance(&limits, mm(entry).min(top.stopping_distance));
             let profile = Profile::new(&limits, entry, mm(length), top, mm(exit));
             let (distance, time) = run(&limits, profile);
             assert!((distance - length).abs() < 1e-5, "{length}: {distance}");
@@ -273,6 +287,6 @@ mod tests {
         assert!((distance - 6.25).abs() < 1e-3 && (time - 0.25).abs() < 1e-4);
         let short = stopping(&limits, top, mm(1.0));
         assert_eq!(short.exit().stopping_distance, top.stopping_distance - mm(1.0));
-        assert_eq!(run(&limits, stopping(&limits, Pace::REST, mm(1.0))), (0.0, 0.0));
+        assert_eq!(run(&limits, stopping(&limits, PathSpeed::REST, mm(1.0))), (0.0, 0.0));
     }
 }

@@ -1,25 +1,26 @@
-//! Runs the blocks: pen changes at rest, slices, moves, events.
+//! Carries out the blocks of the look-ahead: plans their speed slice by slice, and hands over the
+//! events of moves, pen changes and dwells.
 
 #[cfg_attr(not(feature = "pen-overlap"), path = "runner/pen_at_rest.rs")]
 mod pen;
-#[cfg(feature = "backlash-on-the-way")]
-mod turns;
+#[cfg(feature = "spread-backlash")]
+mod reversals;
 
 #[cfg(feature = "pen-overlap")]
 pub use pen::PenOverlap;
 use pen::PenTiming;
-#[cfg(feature = "backlash-on-the-way")]
-pub use turns::{OnTheWay, Turn};
+#[cfg(feature = "spread-backlash")]
+pub use reversals::{BacklashTakeUp, Reversal};
 
 use super::course::BlockCursor;
 use super::curvature::Curvature;
-use super::emitter::{Kinds, MoveLevels, whole_ticks};
+use super::emitter::{LineLevels, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
 use super::limits::{mm_per_min, square};
 use super::lookahead::BlockKind;
-use super::profile::{FRACTION_BITS, Pace, Profile};
-use super::smooth::{Interval, Road, State};
+use super::profile::{FRACTION_BITS, PathSpeed, Profile};
+use super::smooth::{Interval, PathLimits, State};
 use super::{
     Block, BrakeRule, Emitter, EventQueue, Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed,
     StepEvent,
@@ -29,92 +30,94 @@ use crate::fixed::Millimetres;
 use crate::step::Direction;
 use core::cmp::Ordering;
 
-/// Where the pen stands and how long it takes to get there.
+/// The heights of the pen, and how long it takes to reach them.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PenPositions {
-    /// Height when raised, 0 (fully raised) to 127.
+    /// The height of the raised pen, 0 (fully raised) to 127.
     pub up_height: u8,
-    /// Height when drawing, 0 to 127.
+    /// The height of the pen when it draws, 0 to 127.
     pub down_height: u8,
-    /// From the order to raise it to the first move.
+    /// The ticks from the order to raise the pen to the first move.
     pub up_ticks: u32,
-    /// From the order to lower it to the first move.
+    /// The ticks from the order to lower the pen to the first move.
     pub down_ticks: u32,
-    /// From one height to the next on the way between the two; 0 for no way.
+    /// The ticks from one height to the next while the pen is lowered or raised gradually; 0 if it
+    /// moves at once.
     pub ramp_ticks: u32,
-    /// Length of a dot or gap.
+    /// The length of a dot or gap of a dotted line.
     pub dot_length: PathLength,
-    /// The motor that lifts it, if that is how it is lifted.
+    /// The motor that lifts the pen, if a motor does.
     pub lift: Option<LiftRule>,
-    /// For how long it moves while the machine does.
+    /// How long the pen may move while the machine moves, too.
     #[cfg(feature = "pen-overlap")]
     pub overlap: PenOverlap,
 }
 
-/// What one call of [`Runner::produce`] came to.
+/// The result of one call of [`Runner::produce`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Progress {
     /// There is more to do.
     More,
-    /// All blocks are run, the pen is raised, the machine stands.
+    /// All blocks are carried out, the pen is raised, and the machine is at rest.
     Done,
-    /// It stands on the path with the pen raised, as [`Runner::stop`] or
+    /// The machine is at rest on the path with the pen raised, as [`Runner::stop`] or
     /// [`Runner::stop_after_stroke`] asked.
     Stopped,
 }
 
-/// A straight move of the pen, or a piece of one.
+/// A straight move of the pen, or a segment of one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Move {
-    /// Where it takes the motors.
+    /// The positions of the motors at its end.
     pub motors: PagePoint,
-    /// How far start and end lie beside the motors' steps: see
+    /// How far its ends lie beside the points that the motors can reach: see
     /// [`Line::beside`](crate::step::Line::beside).
     pub offsets: [i16; 2],
-    /// Where it takes the pen.
+    /// The position of the pen at its end.
     pub page: PagePoint,
-    /// The whole move on the page,
-    pub way: (i32, i32),
-    /// its length,
-    pub whole: PathLength,
-    /// and that of the piece.
+    /// The displacement of the whole move on the page, in steps.
+    pub displacement: (i32, i32),
+    /// The length of the whole move.
+    pub whole_length: PathLength,
+    /// The length of this segment of it.
     pub length: PathLength,
-    /// The pen is raised within an inked line.
+    /// Whether this is a gap within an inked line, for which the pen is raised.
     pub is_gap: bool,
 }
 
-/// Why a block was not appended.
+/// The reasons why a block was not appended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum PushError {
-    /// The ring is full: produce events first.
+    /// The look-ahead is full: produce events first.
     Full,
-    /// The move is longer than 16 m: beyond every page.
+    /// The move is longer than 16 m, which exceeds every page.
     TooLong,
 }
 
-/// What a runner has run. Lengths in units of 2^-18 mm.
+/// What a runner has carried out so far. Lengths are in units of 2^-18 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct RunLengths {
-    /// Strokes begun; wraps.
+    /// The number of strokes begun; wraps.
     pub strokes: u32,
-    /// Length of the blocks ended with the pen down.
+    /// The length of the blocks completed with the pen down.
     pub drawn: u64,
-    /// The same with the pen up.
+    /// The length of the blocks completed with the pen up.
     pub travelled: u64,
 }
 
-/// The speed planned.
+/// The plan of the speed.
 #[derive(Debug)]
 enum Plan {
-    /// For the rest of the piece in work.
+    /// A plan without a limit on jerk, for the rest of the current piece.
     Profile(Profile),
-    /// With a limit on jerk, for an interval of time, whatever ends in it.
+    /// A plan with a limit on jerk, for an interval of time, regardless of how many blocks end
+    /// within it.
     Interval(Interval),
 }
 
-/// Turns blocks into events.
+/// Turns the blocks of the look-ahead into step events.
 #[derive(Debug)]
 pub struct Runner<'m> {
     limits: Limits,
@@ -125,62 +128,71 @@ pub struct Runner<'m> {
     emitter: Emitter,
     course: Option<BlockCursor>,
     plan: Option<Plan>,
-    /// Where the last plan ended.
-    pace: Pace,
-    /// The acceleration there, with a limit on jerk.
+    /// The speed at the end of the last plan.
+    plan_end: PathSpeed,
+    /// The acceleration at the end of the last plan, as a ramp ([`State`]); only with a limit on
+    /// jerk.
     ramp: i32,
-    draw: Pace,
-    travel: Pace,
-    /// The last pace in a curve: many blocks in a row have the same.
-    curve: Pace,
-    /// The plan's time, 1/16 ticks; wraps.
+    /// The greatest speed with the pen down.
+    draw: PathSpeed,
+    /// The greatest speed with the pen up.
+    travel: PathSpeed,
+    /// The last speed limit of a curve, cached because many blocks in a row have the same.
+    curve: PathSpeed,
+    /// The time up to which events are planned, in sixteenths of ticks; wraps.
     now: u32,
-    /// Not known after an emergency stop, when it may still be on its way.
+    /// Whether the pen is down. `None` while it moves, and after an emergency stop, when it may
+    /// still be moving.
     pen_is_down: Option<bool>,
-    /// Where the pen was sent last; not known at the start.
+    /// The height to which the pen was last sent; `None` at the start.
     pen_height: Option<u8>,
     lift: Lift,
     timing: PenTiming,
     stopping: bool,
     stopping_after_stroke: bool,
-    /// How fast the piece in work was allowed to end, if more blocks may allow it to be faster.
-    hurried: Option<PathLength>,
-    /// How fast the plan that was thrown away would have ended the piece in work.
-    exit_reached: Option<PathLength>,
-    /// Stands after the stroke in which so much is drawn, all in all.
+    /// The stopping distance with which the current piece was allowed to end, if it is so low only
+    /// because few blocks are known. When a later block allows more, the piece is planned again.
+    provisional_exit: Option<PathLength>,
+    /// The stopping distance with which a discarded plan would have ended the current piece.
+    discarded_exit: Option<PathLength>,
+    /// The runner stops after the stroke in which the total drawn length reaches this value.
     ink_bound: u64,
-    /// Where the events so far lead.
+    /// The positions of the motors where the events so far end, without the steps that took up
+    /// backlash at rest.
     position: PagePoint,
-    /// Where the steps so far lead that take up slack, and where the blocks so far do.
-    slack: PagePoint,
-    slack_end: PagePoint,
-    /// Where the blocks so far lead: the motors, and the pen on the page.
+    /// For each motor, the sum of the steps in the events so far that took up backlash at rest.
+    backlash: PagePoint,
+    /// The same sum for the blocks so far.
+    backlash_end: PagePoint,
+    /// The positions of the motors where the blocks so far end.
     end: PagePoint,
+    /// The position of the pen where the blocks so far end.
     page_end: PagePoint,
-    /// The way in which the last block runs, its length and ink.
+    /// The direction, length and ink of the last block appended.
     last: Option<(Heading, PathLength, Option<LineType>)>,
-    /// The stopping distance of its speed.
+    /// The stopping distance of the speed limit of the last block appended.
     last_limit: PathLength,
     run: RunLengths,
     /// Whether the last block begun is inked.
     in_stroke: bool,
-    /// Since the pen last moved, speeds were greater: what waits may still be as fast.
-    was_faster: SliceSpeed,
-    /// When the pen was last told to go up, in ticks of the events; wraps.
+    /// The greatest speed that was in force since the pen last moved. Events that still wait in the
+    /// queue may be as fast, even if the speed has been lowered since.
+    waiting_top_speed: SliceSpeed,
+    /// The ticks of all events before the pen was last told to go up; wraps.
     #[cfg(feature = "resume")]
     raised_at: u32,
-    #[cfg(feature = "backlash-on-the-way")]
-    turns: turns::Turns,
-    /// What the next move is, besides a move.
-    #[cfg(feature = "backlash-on-the-way")]
-    on_the_way: OnTheWay,
+    #[cfg(feature = "spread-backlash")]
+    reversals: reversals::Reversals,
+    /// The part of the next appended move that takes up backlash.
+    #[cfg(feature = "spread-backlash")]
+    backlash_take_up: BacklashTakeUp,
 }
 
 impl<'m> Runner<'m> {
-    /// Room in the queue that one call of [`Runner::produce`] needs at least.
+    /// The room in the queue that one call of [`Runner::produce`] needs at least.
     pub const ROOM: usize = Emitter::ROOM;
 
-    /// A runner that stands at the page's origin with the pen raised.
+    /// Creates a runner that is at rest at the origin of the page with the pen raised.
     pub fn new(limits: Limits, pen: PenPositions, blocks: &'m mut [Block]) -> Self {
         let mut runner = Self {
             limits,
@@ -191,13 +203,13 @@ impl<'m> Runner<'m> {
             emitter: Emitter::new(&limits),
             course: None,
             plan: None,
-            pace: Pace::REST,
+            plan_end: PathSpeed::REST,
             ramp: 0,
-            draw: Pace::REST,
-            travel: Pace::REST,
-            curve: Pace::REST,
+            draw: PathSpeed::REST,
+            travel: PathSpeed::REST,
+            curve: PathSpeed::REST,
             now: 0,
-            // A motor holds it where it happened to stand.
+            // A motor holds the pen at the height at which it happened to be switched on.
             pen_is_down: pen.lift.is_none().then_some(false),
             pen_height: None,
             lift: Lift::default(),
@@ -206,32 +218,32 @@ impl<'m> Runner<'m> {
             raised_at: 0,
             stopping: false,
             stopping_after_stroke: false,
-            hurried: None,
-            exit_reached: None,
+            provisional_exit: None,
+            discarded_exit: None,
             ink_bound: u64::MAX,
             position: PagePoint::default(),
-            slack: PagePoint::default(),
-            slack_end: PagePoint::default(),
+            backlash: PagePoint::default(),
+            backlash_end: PagePoint::default(),
             end: PagePoint::default(),
             page_end: PagePoint::default(),
             last: None,
             last_limit: PathLength::ZERO,
             run: RunLengths::default(),
             in_stroke: false,
-            was_faster: SliceSpeed::ZERO,
-            #[cfg(feature = "backlash-on-the-way")]
-            turns: turns::Turns::default(),
-            #[cfg(feature = "backlash-on-the-way")]
-            on_the_way: OnTheWay::default(),
+            waiting_top_speed: SliceSpeed::ZERO,
+            #[cfg(feature = "spread-backlash")]
+            reversals: reversals::Reversals::default(),
+            #[cfg(feature = "spread-backlash")]
+            backlash_take_up: BacklashTakeUp::default(),
         };
         runner.set_limits(limits, pen);
         runner
     }
 
-    /// Takes new settings, while nothing moves.
+    /// Adopts new settings. It may only be called while nothing moves.
     pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
         self.limits = limits;
-        self.curve = Pace::REST;
+        self.curve = PathSpeed::REST;
         if pen.lift != self.pen.lift {
             self.forget_lift();
         }
@@ -241,34 +253,36 @@ impl<'m> Runner<'m> {
         self.set_override(100, 100);
     }
 
-    /// The rule by which the lengths of steps are told, while nothing moves.
+    /// Sets the rule by which the lengths of steps are told to the brake. It may only be called
+    /// while nothing moves.
     pub fn set_brake(&mut self, brake: BrakeRule) {
         self.brake = brake;
     }
 
-    /// How long the events that wait must last so that the machine can stop within them, wherever
-    /// in them it is, no matter what comes behind.
+    /// How long the waiting events must last so that the machine can stop within them, whatever
+    /// follows and wherever in them it is.
     ///
-    /// Events that end at a speed u and last t hold the stopping distance of every speed v in them
-    /// if t ≥ (v - (√2 - 1) u) / a: then the plan is slower in between, or goes far enough.
+    /// Events that end at a speed u and last t contain the stopping distance of every speed v
+    /// within them if t ≥ (v - (√2 - 1) u) / a: either the plan is slower in between, or it goes
+    /// far enough.
     pub fn stopping_ticks(&self) -> u32 {
         let end = match &self.plan {
             Some(Plan::Profile(profile)) => profile.speed().to_bits(),
             Some(Plan::Interval(interval)) => interval.state().speed,
-            None => self.pace.speed.to_bits(),
+            None => self.plan_end.speed.to_bits(),
         };
-        let speed = self.top(self.in_stroke).speed.max(self.was_faster).to_bits();
+        let speed = self.top(self.in_stroke).speed.max(self.waiting_top_speed).to_bits();
         let change = speed.saturating_sub(end / 8 * 3);
         let slices = change.checked_div(self.limits.acceleration.to_bits()).unwrap_or(u32::MAX);
         slices.saturating_mul(SLICE_TICKS)
     }
 
-    /// The speed that is planned, in mm/min.
+    /// The planned speed, in mm/min.
     pub fn speed(&self) -> Millimetres {
         let speed = match &self.plan {
             Some(Plan::Profile(profile)) => profile.speed().to_bits(),
             Some(Plan::Interval(interval)) => interval.state().speed,
-            None => self.pace.speed.to_bits(),
+            None => self.plan_end.speed.to_bits(),
         };
         mm_per_min(SliceSpeed::from_bits(speed))
     }
@@ -278,8 +292,9 @@ impl<'m> Runner<'m> {
         self.lookahead.capacity() - self.lookahead.len()
     }
 
-    /// Scales both speeds to `percent` (10 to 200), at once, and that with the pen up to
-    /// `travel_percent` (1 to 100) of this; never above the greater of the two as set.
+    /// Scales both speeds to `percent` (10 to 200) at once, and the speed with the pen up to
+    /// `travel_percent` (1 to 100) of the result. Neither exceeds the greater of the two speeds
+    /// that are set.
     pub fn set_override(&mut self, percent: u8, travel_percent: u8) {
         let percent = u64::from(percent.clamp(10, 200));
         let travel_percent = percent * u64::from(travel_percent.clamp(1, 100)) / 100;
@@ -287,11 +302,11 @@ impl<'m> Runner<'m> {
         let scaled = |speed: SliceSpeed, percent: u64| {
             let bits = u64::from(speed.to_bits()) * percent / 100;
             let bits = bits.min(greatest.to_bits().into()).max(1);
-            Pace::of_speed(&self.limits, SliceSpeed::from_bits(bits as u32))
+            PathSpeed::of_speed(&self.limits, SliceSpeed::from_bits(bits as u32))
         };
         let draw = scaled(self.limits.draw_speed, percent);
         let travel = scaled(self.limits.travel_speed, travel_percent);
-        self.was_faster = self.was_faster.max(self.top(self.in_stroke).speed);
+        self.waiting_top_speed = self.waiting_top_speed.max(self.top(self.in_stroke).speed);
         self.draw = draw;
         self.travel = travel;
         self.plan_again();
@@ -302,27 +317,28 @@ impl<'m> Runner<'m> {
         &self.limits
     }
 
-    /// Where the events handed over, and the one kept back, lead.
+    /// The positions of the motors where the events end that were handed over, including the one
+    /// that is kept back.
     pub fn position(&self) -> PagePoint {
         self.position
     }
 
-    /// Where the blocks lead the motors.
+    /// The positions of the motors where the blocks end.
     pub fn end(&self) -> PagePoint {
         self.end
     }
 
-    /// Where the blocks lead the pen.
+    /// The position of the pen where the blocks end.
     pub fn page_end(&self) -> PagePoint {
         self.page_end
     }
 
-    /// Ticks of all events handed over; wraps.
+    /// The ticks of all events handed over; wraps.
     pub fn ticks(&self) -> u32 {
         self.emitter.ticks()
     }
 
-    /// How many targets fit in all.
+    /// The number of targets that fit into an empty look-ahead.
     pub fn capacity(&self) -> usize {
         self.lookahead.capacity()
     }
@@ -332,23 +348,23 @@ impl<'m> Runner<'m> {
         self.lookahead.is_full()
     }
 
-    /// Whether nothing waits or moves.
+    /// Whether nothing waits and nothing moves.
     pub fn is_at_rest(&self) -> bool {
         self.course.is_none() && self.lookahead.is_empty() && !self.emitter.is_open()
     }
 
-    /// Whether all blocks are run. The pen is where it was with the last one.
+    /// Whether all blocks are carried out. The pen is still where the last one left it.
     #[cfg(feature = "resume")]
     pub fn has_run_all(&self) -> bool {
         self.course.is_none() && self.lookahead.is_empty()
     }
 
-    /// Ends the events of all blocks that are run, and leaves the pen where it is.
+    /// Ends the events of all blocks that are carried out, and leaves the pen where it is.
     ///
     /// # Errors
     /// The event that the queue refused although it had room.
     #[cfg(feature = "resume")]
-    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    #[inline(never)] // Rarely called: inlined, it would fill the cache.
     pub fn rest_on_paper(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         if self.emitter.is_open() {
             let at = self.emitter.rest(self.now, true, queue)?;
@@ -368,13 +384,13 @@ impl<'m> Runner<'m> {
         self.pen_is_down == Some(false)
     }
 
-    /// Whether the pen is up once the pins have begun events of so many `ticks` in all.
+    /// Whether the pen is up, if all events that the pins have begun lasted `ticks`.
     #[cfg(feature = "resume")]
     pub fn is_pen_up_at(&self, ticks: u32) -> bool {
         self.is_pen_up() && ticks.wrapping_sub(self.raised_at).cast_signed() > 0
     }
 
-    /// How many strokes are planned to their end; wraps.
+    /// The number of strokes that are planned to their end; wraps.
     #[cfg(feature = "resume")]
     pub fn strokes_over(&self) -> u32 {
         let next_is_travel = self.lookahead.front().is_some_and(|block| block.ink.is_none());
@@ -382,68 +398,70 @@ impl<'m> Runner<'m> {
         self.run.strokes.wrapping_sub(u32::from(!is_over))
     }
 
-    /// The pen was raised by somebody else and may still be on its way.
+    /// Records that something other than this runner has raised the pen, which may still be moving.
     pub fn forget_pen(&mut self) {
         self.pen_is_down = None;
         self.pen_height = None;
         self.forget_timing();
     }
 
-    /// The pen's motor had no current: where it stands is not known.
+    /// Records that the motor of the pen had no current, so that its position is unknown.
     pub fn forget_lift(&mut self) {
         self.lift.forget();
         self.forget_pen();
     }
 
-    /// The pins have worked off so many ticks: they may have found the stop of the pen's motor.
+    /// Records that the pins have carried out events of this many ticks. By then the motor of the
+    /// pen may have found its stop.
     pub fn follow_lift(&mut self, ticks: u32) {
         self.lift.sync_consumed(ticks);
     }
 
-    /// The pulses of the pen's motor sum up to `place`, and none waits.
-    pub fn set_lift(&mut self, place: i32) {
-        self.lift.stand_at(place);
+    /// Sets the position of the motor of the pen, the sum of all its pulses. No pulse may wait.
+    pub fn set_lift(&mut self, position: i32) {
+        self.lift.set_position(position);
     }
 
-    /// Whether a motor has still to raise the pen. Where it is not known how far, only if
-    /// `anywhere`.
+    /// Whether a motor still has to raise the pen. If the position of the motor is unknown, this is
+    /// only so if `anywhere`.
     pub fn is_pen_held(&self, anywhere: bool) -> bool {
         let is_lowered = self.pen_is_down != Some(false) && (anywhere || self.lift.is_known());
         self.pen.lift.is_some() && (is_lowered || self.emitter.is_open())
     }
 
-    /// Hands over the next few events of a pen that is raised while nothing else moves.
+    /// Hands over the next few events that raise the pen while nothing else moves.
     ///
     /// # Errors
     /// The event that the queue refused although it had room.
     pub fn raise_pen(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
-        self.stand(Progress::Done, queue)
+        self.come_to_rest(Progress::Done, queue)
     }
 
-    /// What has been run since the runner was made.
+    /// What has been carried out since the runner was created.
     pub fn run(&self) -> RunLengths {
         self.run
     }
 
-    /// The motors stand at `motors` and have taken up `slack`, the pen at `page`, nothing waits,
-    /// and the events worked off took `ticks` (it wraps): after homing, or after an emergency stop.
+    /// Sets the position after homing or an emergency stop: of the `motors`, of the steps that took
+    /// up `backlash` at rest, and of the pen on the `page`. The events carried out so far lasted
+    /// `ticks` (it wraps), and none may wait.
     pub fn set_position(
         &mut self,
         motors: PagePoint,
-        slack: PagePoint,
+        backlash: PagePoint,
         page: PagePoint,
         ticks: u32,
     ) {
         self.position = motors;
-        self.slack = slack;
-        #[cfg(feature = "backlash-on-the-way")]
-        self.turns.clear();
+        self.backlash = backlash;
+        #[cfg(feature = "spread-backlash")]
+        self.reversals.clear();
         self.forget_path(page);
         self.emitter.restart(ticks);
     }
 
-    /// Appends a move; a speed, by its stopping distance ([`Limits::feed`]), is not passed.
-    /// Lengths, corners and bends are those of the page. A move of no length is skipped.
+    /// Appends a move whose speed is limited by a stopping distance ([`Limits::feed`]). Lengths,
+    /// corners and bends are measured on the page. A move without length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
@@ -453,21 +471,23 @@ impl<'m> Runner<'m> {
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<(), PushError> {
-        let Move { motors, offsets, page, mut way, mut whole, mut length, is_gap } = *piece;
+        let Move { motors, offsets, page, mut displacement, mut whole_length, mut length, is_gap } =
+            *piece;
         let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
-            // The pen may stand only about there.
+            // The pen may be only near this point, because the motors move in whole steps.
             self.page_end = page;
             return Ok(());
         }
-        if way == (0, 0) || length == 0 {
-            // Less than a step of the page.
-            way = (dx.signum(), dy.signum());
-            whole = self.limits.length(way.0, way.1).ok_or(PushError::TooLong)?;
-            length = whole;
+        if displacement == (0, 0) || length == 0 {
+            // The move is shorter than a step on the page, so its direction is that of the motors.
+            displacement = (dx.signum(), dy.signum());
+            whole_length =
+                self.limits.length(displacement.0, displacement.1).ok_or(PushError::TooLong)?;
+            length = whole_length;
         }
         let inked = ink.filter(|_| !is_gap);
-        let heading = Heading::new(&self.limits, way.0, way.1, whole);
+        let heading = Heading::new(&self.limits, displacement.0, displacement.1, whole_length);
         let corner = match self.last {
             Some((before, length_before, ink_before)) if passes(ink_before, inked) => {
                 junction::corner(&self.limits, before, heading, length.min(length_before))
@@ -482,8 +502,8 @@ impl<'m> Runner<'m> {
         }
         let (entry_limit, curve_limit) = (corner.limit, limit);
         let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
-        #[cfg(feature = "backlash-on-the-way")]
-        let (kind, extra) = core::mem::take(&mut self.on_the_way).of_block(kind);
+        #[cfg(feature = "spread-backlash")]
+        let (kind, extra) = core::mem::take(&mut self.backlash_take_up).of_block(kind);
         let block = Block {
             dx,
             dy,
@@ -493,11 +513,12 @@ impl<'m> Runner<'m> {
             ink,
             offsets,
             kind,
-            #[cfg(feature = "backlash-on-the-way")]
+            #[cfg(feature = "spread-backlash")]
             extra,
             ..Block::EMPTY
         };
-        // Between two blocks the speed is looked at.
+        // The speed is checked only between blocks, so moves are joined only if nothing limits it
+        // there.
         let is_free = corner.limit >= self.limits.top && limit == self.last_limit;
         if self.lookahead.is_full() {
             return Err(PushError::Full);
@@ -508,51 +529,52 @@ impl<'m> Runner<'m> {
         }
         self.last_limit = limit;
         if self.limits.centripetal {
-            self.curvature.sync_consumed(&self.limits, page, &mut self.lookahead);
+            self.curvature.extend(&self.limits, page, &mut self.lookahead);
         }
         self.end = motors;
         self.page_end = page;
         self.last = Some((heading, length, inked));
-        self.heed_bends();
+        self.slow_for_bends();
         if self
-            .hurried
+            .provisional_exit
             .is_some_and(|exit| exit < self.lookahead.entry_allowed(PathLength::MAX, &self.limits))
         {
-            self.hurried = None;
+            self.provisional_exit = None;
             self.plan_again();
         }
         Ok(())
     }
 
-    /// Appends steps by which the motors take up their slack, from rest to rest; the pen stays
-    /// where it is, lowered if `ink` says so. Where the pen may move while the machine does, it is
-    /// still raised if these steps come before a stroke.
+    /// Appends steps by which the motors take up their backlash, from rest to rest. The pen stays
+    /// where it is, and is lowered if there is `ink`. If the pen may move while the machine does,
+    /// and these steps come before a stroke, it is still raised.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
-    pub fn push_slack(&mut self, by: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
+    pub fn push_backlash(&mut self, by: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
         let PagePoint { x: dx, y: dy } = by;
         let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
         let ink = ink.map(|_| LineType::Full);
-        let block = Block { dx, dy, length, ink, kind: BlockKind::Slack, ..Block::EMPTY };
+        let block = Block { dx, dy, length, ink, kind: BlockKind::Backlash, ..Block::EMPTY };
         self.end_path();
         self.lookahead.push(block).map_err(|_| PushError::Full)?;
-        self.slack_end.x = self.slack_end.x.wrapping_add(dx);
-        self.slack_end.y = self.slack_end.y.wrapping_add(dy);
+        self.backlash_end.x = self.backlash_end.x.wrapping_add(dx);
+        self.backlash_end.y = self.backlash_end.y.wrapping_add(dy);
         Ok(())
     }
 
-    /// The slack that the blocks that wait take up: what [`Runner::forget_path`] forgets of it.
-    pub fn slack_ahead(&self) -> PagePoint {
+    /// The steps in the waiting blocks that take up backlash. [`Runner::forget_path`] discards
+    /// them.
+    pub fn waiting_backlash(&self) -> PagePoint {
         PagePoint {
-            x: self.slack_end.x.wrapping_sub(self.slack.x),
-            y: self.slack_end.y.wrapping_sub(self.slack.y),
+            x: self.backlash_end.x.wrapping_sub(self.backlash.x),
+            y: self.backlash_end.y.wrapping_sub(self.backlash.y),
         }
     }
 
-    /// All slack taken up so far; wraps.
-    pub fn slack(&self) -> PagePoint {
-        self.slack
+    /// For each motor, the sum of the steps that took up backlash at rest; wraps.
+    pub fn backlash(&self) -> PagePoint {
+        self.backlash
     }
 
     /// Lowers the pen where the path ends so far.
@@ -566,17 +588,17 @@ impl<'m> Runner<'m> {
         Ok(())
     }
 
-    /// The path ends with the last block: a curve ends there, too.
+    /// Ends the path with the last block, and with it a curve.
     pub fn end_path(&mut self) {
         self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         self.last = None;
-        self.heed_bends();
+        self.slow_for_bends();
     }
 
-    /// Slows down for bends that are known only now: on the piece in work, or behind a cruise that
-    /// would pass one too fast.
+    /// Slows down for bends that became known late: those on the current piece, or behind a cruise
+    /// that would pass them too fast.
     #[inline(never)] // Inlined, it would only fill the cache.
-    fn heed_bends(&mut self) {
+    fn slow_for_bends(&mut self) {
         let late = self.lookahead.late_limit();
         if let Some(course) = &mut self.course
             && late < course.curve_limit
@@ -596,16 +618,18 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// Sheds speed on the path, from the next slice or interval on, and stands on a whole step with
-    /// the pen raised. A travel on which the pen was told to go down is carried out first.
+    /// Begins to slow down on the path with the next slice or interval, until the machine is at
+    /// rest on a whole step with the pen raised. If the pen was already told to go down on a
+    /// travel, the travel is completed first.
     pub fn stop(&mut self) {
         self.plan_again();
         self.stopping = true;
     }
 
-    /// Gives the plan up where that leaves no kink. An interval in which the acceleration changes
-    /// is carried out: at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800 mm/s² on. So is the
-    /// rest of a travel on which the pen was told to go down.
+    /// Discards the plan, unless that would cause a jerk: an interval in which the acceleration
+    /// changes is completed, which takes at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800
+    /// mm/s² on. A travel on which the pen was told to go down is completed, too. Returns the
+    /// stopping distance with which the plan would have ended the current piece.
     fn break_plan_off(&mut self) -> Option<PathLength> {
         if self.timing.is_lowering() {
             return None;
@@ -616,44 +640,45 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// The plan ends with the last slice that it gave. Says how fast it would have ended the piece
-    /// in work, if it was to.
+    /// Discards the plan after its last slice. Returns the stopping distance with which it would
+    /// have ended the current piece, if it was to end it.
     fn give_plan_up(&mut self) -> Option<PathLength> {
         match self.plan.take()? {
             Plan::Profile(profile) => {
-                self.pace = Pace::of_speed(&self.limits, profile.speed());
+                self.plan_end = PathSpeed::of_speed(&self.limits, profile.speed());
                 Some(profile.exit().stopping_distance)
             }
             Plan::Interval(interval) => {
                 let State { speed, ramp } = interval.state();
-                self.pace = Pace { speed: SliceSpeed::from_bits(speed), ..Pace::REST };
+                self.plan_end =
+                    PathSpeed { speed: SliceSpeed::from_bits(speed), ..PathSpeed::REST };
                 self.ramp = ramp;
                 None
             }
         }
     }
 
-    /// Plans the rest of the piece in work anew, from the next slice on.
+    /// Plans the rest of the current piece anew, from the next slice on.
     fn plan_again(&mut self) {
         if !self.stopping
             && let Some(exit) = self.break_plan_off()
         {
-            self.exit_reached = Some(exit);
+            self.discarded_exit = Some(exit);
         }
     }
 
-    /// Stands before the next move with the pen up.
+    /// Stops before the next travel, with the pen up.
     pub fn stop_after_stroke(&mut self) {
         self.stopping_after_stroke = true;
     }
 
-    /// Stands before the next move with the pen up once `length` more, in units of 2^-18 mm, is
-    /// drawn; `None` for no bound.
+    /// Stops before the next travel, with the pen up, once this much more `length` is drawn, in
+    /// units of 2^-18 mm. `None` sets no bound.
     pub fn stop_after_ink(&mut self, length: Option<u64>) {
         self.ink_bound = length.map_or(u64::MAX, |length| self.run.drawn.saturating_add(length));
     }
 
-    /// Goes on where [`Runner::stop`] or [`Runner::stop_after_stroke`] stood.
+    /// Continues where [`Runner::stop`] or [`Runner::stop_after_stroke`] stopped.
     pub fn resume(&mut self) {
         self.stopping = false;
         self.stopping_after_stroke = false;
@@ -662,27 +687,27 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// Gives up what waits; the machine must stand, the pen at `page`.
-    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    /// Discards the waiting blocks. The machine must be at rest, with the pen at `page`.
+    #[inline(never)] // Rarely called: inlined, it would fill the cache.
     pub fn forget_path(&mut self, page: PagePoint) {
         self.lookahead.clear();
         self.course = None;
         self.rest();
         self.stopping = false;
         self.stopping_after_stroke = false;
-        self.exit_reached = None;
+        self.discarded_exit = None;
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
-        self.slack_end = self.slack;
+        self.backlash_end = self.backlash;
         self.page_end = page;
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         {
-            self.on_the_way = OnTheWay::default();
+            self.backlash_take_up = BacklashTakeUp::default();
         }
     }
 
-    /// Lets `ticks` pass; nothing must wait or move.
+    /// Lets `ticks` pass. Nothing may wait or move.
     ///
     /// # Errors
     /// The event that the queue refused.
@@ -694,11 +719,11 @@ impl<'m> Runner<'m> {
         Ok(())
     }
 
-    /// Switches the drivers off; nothing must wait or move.
+    /// Switches the drivers off. Nothing may wait or move.
     ///
     /// # Errors
     /// The event that the queue refused.
-    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    #[inline(never)] // Rarely called: inlined, it would fill the cache.
     pub fn release_drivers(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         let at = self.emitter.rest(self.now, false, queue)?;
         self.advance_to(at);
@@ -740,20 +765,20 @@ impl<'m> Runner<'m> {
             course.begin_slice(slice);
         }
         if self.timing.is_due() {
-            self.lower_on_the_way(queue)?;
+            self.lower_while_moving(queue)?;
         }
         self.run_slice(queue)?;
         Ok(Progress::More)
     }
 
-    /// The plan is carried out, or has led to the end of the piece in work.
+    /// Handles the end of a plan, which is carried out or has reached the end of the current piece.
     fn end_plan(&mut self) {
         let Some(course) = &self.course else {
             return;
         };
         let ends = match &self.plan {
             Some(Plan::Profile(profile)) => {
-                self.pace = profile.exit();
+                self.plan_end = profile.exit();
                 self.plan = None;
                 course.moves_done == course.piece_moves
             }
@@ -775,14 +800,14 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// Nothing moves.
+    /// Records that nothing moves.
     fn rest(&mut self) {
         self.plan = None;
-        self.pace = Pace::REST;
+        self.plan_end = PathSpeed::REST;
         self.ramp = 0;
     }
 
-    /// The moves of the slice in work, as far as the queue has room.
+    /// Hands over the moves of the current slice, as far as the queue has room.
     fn run_slice(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         let Some(course) = &mut self.course else {
             return Ok(());
@@ -790,15 +815,16 @@ impl<'m> Runner<'m> {
         let Some(slice) = course.slice.map(|moves| moves.slice) else {
             return Ok(());
         };
-        // A move and its direction set-up are two events; one is left for a long wait.
+        // A move and the change of direction before it are two events; room for one more is kept
+        // for a long wait.
         let mut room = (queue.room().saturating_sub(1)) / 2;
-        // One by one: arrays would go through memory.
+        // Handled one by one, because arrays would go through memory.
         let [straight, diagonal] = course.line.moves();
         let levels = |direction: Direction| {
             let levels = MoveLevels::of(direction);
-            if course.is_slack() { levels.as_slack() } else { levels }
+            if course.takes_up_backlash() { levels.for_backlash() } else { levels }
         };
-        let levels = Kinds { straight: levels(straight), diagonal: levels(diagonal) };
+        let levels = LineLevels { straight: levels(straight), diagonal: levels(diagonal) };
         let ((x, y), (diagonal_x, diagonal_y)) = (straight.delta(), diagonal.delta());
         while let Some(moves) = &course.slice
             && moves.left > 0
@@ -809,20 +835,21 @@ impl<'m> Runner<'m> {
                 return Ok(());
             }
             room -= count;
-            let turning =
-                (self.emitter.turns(levels.straight), self.emitter.turns(levels.diagonal));
-            let turns = turning != (false, false) && {
+            let reversing =
+                (self.emitter.reverses(levels.straight), self.emitter.reverses(levels.diagonal));
+            let reverses = reversing != (false, false) && {
                 let diagonals = course.line.diagonals_within(count);
-                (turning.0 && diagonals < count) || (turning.1 && diagonals > 0)
+                (reversing.0 && diagonals < count) || (reversing.1 && diagonals > 0)
             };
-            let is_even = !turns && !course.is_slack() && self.emitter.has_stepped();
+            let is_even = !reverses && !course.takes_up_backlash() && self.emitter.has_stepped();
             let stepped = if is_even && self.emitter.keeps_up(&train) {
                 self.emitter.steps(self.now, train, &mut course.line, levels, queue)?
             } else {
                 self.emitter.single_steps(self.now, train, &mut course.line, levels, queue)?
             };
             self.now = self.now.wrapping_add(stepped.late);
-            let place = if course.is_slack() { &mut self.slack } else { &mut self.position };
+            let place =
+                if course.takes_up_backlash() { &mut self.backlash } else { &mut self.position };
             let diagonals = stepped.diagonals as i32;
             let straights = count as i32 - diagonals;
             place.x = place.x.wrapping_add(x * straights + diagonal_x * diagonals);
@@ -838,7 +865,7 @@ impl<'m> Runner<'m> {
         self.emitter.split_long_wait(self.now, queue)
     }
 
-    fn top(&self, inked: bool) -> Pace {
+    fn top(&self, inked: bool) -> PathSpeed {
         if inked { self.draw } else { self.travel }
     }
 
@@ -847,8 +874,8 @@ impl<'m> Runner<'m> {
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
         let pauses = self.stopping_after_stroke || self.run.drawn >= self.ink_bound;
         let stops = self.stopping || (pauses && stroke_ends);
-        if stops && self.plan.is_none() && self.pace == Pace::REST {
-            return self.stand(Progress::Stopped, queue);
+        if stops && self.plan.is_none() && self.plan_end == PathSpeed::REST {
+            return self.come_to_rest(Progress::Stopped, queue);
         }
         let dot_length = self.pen.dot_length;
         let Self { course, lookahead, .. } = self;
@@ -856,7 +883,7 @@ impl<'m> Runner<'m> {
             *course = Some(BlockCursor::new(block, dot_length));
         });
         if begun.is_none() {
-            return self.stand(Progress::Done, queue);
+            return self.come_to_rest(Progress::Done, queue);
         }
         let Some(course) = &self.course else {
             return Ok(Progress::More);
@@ -865,20 +892,20 @@ impl<'m> Runner<'m> {
             self.run.strokes = self.run.strokes.wrapping_add(1);
         }
         self.in_stroke = course.ink.is_some();
-        #[cfg(feature = "backlash-on-the-way")]
-        if course.turns() {
-            self.turns.add(Turn::new(self.emitter.ticks(), self.position, self.slack));
+        #[cfg(feature = "spread-backlash")]
+        if course.reverses() {
+            self.reversals.add(Reversal::new(self.emitter.ticks(), self.position, self.backlash));
         }
         if self.plan.is_some() {
-            // The interval in work goes on with these moves.
+            // The current interval continues with these moves.
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
         Ok(Progress::More)
     }
 
-    /// Stands: raises the pen, then closes the time line.
-    fn stand(
+    /// Raises the pen, and then ends the sequence of events.
+    fn come_to_rest(
         &mut self,
         standing: Progress,
         queue: &mut dyn EventQueue,
@@ -901,20 +928,20 @@ impl<'m> Runner<'m> {
         Ok(standing)
     }
 
-    /// The pen goes up or down, or one height further on its ramp; at the end the dwell passes. At
-    /// most four events.
+    /// Moves the pen up or down, or one height further on its ramp. After the last height the dwell
+    /// passes. Hands over at most four events.
     fn move_pen(&mut self, down: bool, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         let (height, dwell) = if down {
             (self.pen.down_height, self.pen.down_ticks)
         } else {
             (self.pen.up_height, self.pen.up_ticks)
         };
-        if let Some(passed) = self.lowered_on_the_way(down) {
+        if let Some(passed) = self.lowered_while_moving(down) {
             return self.dwell_for_pen(down, dwell.saturating_sub(passed), queue);
         }
-        // On its way it is neither up nor down.
+        // While it moves it is neither up nor down.
         self.pen_is_down = None;
-        self.was_faster = SliceSpeed::ZERO;
+        self.waiting_top_speed = SliceSpeed::ZERO;
         let was_known = self.lift.is_known();
         if let Some(rule) = self.pen.lift
             && let Some(next) = self.lift.next(rule, height)
@@ -931,7 +958,8 @@ impl<'m> Runner<'m> {
             self.now = self.now.wrapping_add(ticks << FRACTION_BITS);
             return Ok(());
         }
-        // Where it stands if that is not known: at the start, and after an emergency stop.
+        // At the start and after an emergency stop the height is unknown, and the pen is taken to
+        // be raised.
         let from = self.pen_height.unwrap_or(self.pen.up_height);
         let next = self.next_height(from, height);
         let at = self.emitter.pen(next, self.now, queue)?;
@@ -944,7 +972,7 @@ impl<'m> Runner<'m> {
         self.dwell_for_pen(down, dwell, queue)
     }
 
-    /// The height at which the pen is next on its way from one to another.
+    /// Returns the next height of a pen that moves between two heights.
     fn next_height(&self, from: u8, to: u8) -> u8 {
         match to.cmp(&from) {
             _ if self.pen.ramp_ticks == 0 || self.pen.lift.is_some() => to,
@@ -954,7 +982,7 @@ impl<'m> Runner<'m> {
         }
     }
 
-    /// The dwell passes of a pen that was told its last height.
+    /// Lets the dwell pass after the pen was sent to its last height.
     fn dwell_for_pen(
         &mut self,
         down: bool,
@@ -983,30 +1011,31 @@ impl<'m> Runner<'m> {
         Ok(())
     }
 
-    /// The pins needed until then: the plan waits for them.
+    /// Delays the plan to the time `at`, until which the pins needed.
     fn advance_to(&mut self, at: u32) {
         let late = at.wrapping_sub(whole_ticks(self.now));
         self.now = self.now.wrapping_add(late);
     }
 
-    /// Plans the rest of the piece in work.
+    /// Plans the rest of the current piece.
     fn plan(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         let Some(course) = &mut self.course else {
             return Ok(Progress::More);
         };
-        let at_rest = self.pace == Pace::REST;
+        let at_rest = self.plan_end == PathSpeed::REST;
         if self.stopping && at_rest {
-            return self.stand(Progress::Stopped, queue);
+            return self.come_to_rest(Progress::Stopped, queue);
         }
         #[cfg(not(feature = "pen-overlap"))]
         let inked = course.is_inked();
         #[cfg(feature = "pen-overlap")]
         let inked = {
             let stays_raised = PenTiming::stays_raised(&self.pen, self.pen_is_down);
-            course.is_inked() && !(stays_raised && course.is_slack())
+            course.is_inked() && !(stays_raised && course.takes_up_backlash())
         };
         if at_rest {
-            // On the way to a stroke, motors may stand before they take up their slack.
+            // Before a stroke, the machine may come to rest once more so that motors take up their
+            // backlash.
             #[cfg(feature = "pen-overlap")]
             let must_move =
                 self.pen_is_down != Some(inked) && (inked || !self.timing.is_lowering());
@@ -1023,15 +1052,15 @@ impl<'m> Runner<'m> {
                 self.emitter.hold(self.now, queue)?;
             }
         }
-        if course.moves_done == 0 && !course.is_slack() {
+        if course.moves_done == 0 && !course.takes_up_backlash() {
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
         let top = if inked { self.draw } else { self.timing.travel_top(self.travel) };
         let stopping = self.stopping && !self.timing.is_lowering();
         if let Some(jerk) = self.limits.jerk {
-            let state = State { speed: self.pace.speed.to_bits(), ramp: self.ramp };
-            let mut road = Road {
+            let state = State { speed: self.plan_end.speed.to_bits(), ramp: self.ramp };
+            let mut path_limits = PathLimits {
                 limits: &self.limits,
                 jerk,
                 top: top.speed,
@@ -1041,31 +1070,32 @@ impl<'m> Runner<'m> {
             };
             if stopping {
                 let least = jerk.braking_distance(state, 0);
-                if least <= road.room {
-                    road.room = course.stop_behind(least);
-                    (road.top, road.beyond) = (self.pace.speed, None);
+                if least <= path_limits.room {
+                    path_limits.room = course.stop_behind(least);
+                    (path_limits.top, path_limits.beyond) = (self.plan_end.speed, None);
                 } else {
-                    road.top = SliceSpeed::ZERO;
+                    path_limits.top = SliceSpeed::ZERO;
                 }
             }
-            self.plan = Some(Plan::Interval(road.next(state)));
+            self.plan = Some(Plan::Interval(path_limits.next(state)));
             return self.planned(inked, at_rest, queue);
         }
         let left = course.left();
-        if let Some(exit) = self.exit_reached.take() {
-            // It was within reach; the root that gave the speed back must not deny it.
+        if let Some(exit) = self.discarded_exit.take() {
+            // The discarded plan would have reached this exit. The speed was rounded when it was
+            // recovered by a square root, which must not make the exit unreachable.
             let bound = left.saturating_add(exit);
-            self.pace.stopping_distance = self.pace.stopping_distance.min(bound);
+            self.plan_end.stopping_distance = self.plan_end.stopping_distance.min(bound);
         }
         let mut top = top;
         if course.curve_limit < top.stopping_distance {
             if self.curve.stopping_distance != course.curve_limit {
-                self.curve = Pace::of_stopping_distance(&self.limits, course.curve_limit);
+                self.curve = PathSpeed::of_stopping_distance(&self.limits, course.curve_limit);
             }
             top = self.curve;
         }
         let (length, exit_allowed) = if stopping {
-            let least = u64::from(self.pace.stopping_distance.to_bits()) << 14;
+            let least = u64::from(self.plan_end.stopping_distance.to_bits()) << 14;
             let length = course.to_whole_step(least).div_ceil(1 << 14) as u32;
             (PathLength::from_bits(length).min(left), PathLength::ZERO)
         } else {
@@ -1077,16 +1107,21 @@ impl<'m> Runner<'m> {
             };
             let may_change =
                 is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
-            self.hurried = may_change.then_some(exit_allowed);
+            self.provisional_exit = may_change.then_some(exit_allowed);
             (left, exit_allowed)
         };
-        // No copies: they cost as much as the plan.
-        self.plan =
-            Some(Plan::Profile(Profile::new(&self.limits, self.pace, length, top, exit_allowed)));
+        // Constructed in place, because a copy costs as much as the plan.
+        self.plan = Some(Plan::Profile(Profile::new(
+            &self.limits,
+            self.plan_end,
+            length,
+            top,
+            exit_allowed,
+        )));
         self.planned(inked, at_rest, queue)
     }
 
-    /// The next piece of a dotted line, or the end of the block.
+    /// Begins the next piece of a dotted line, or ends the block.
     fn end_piece(&mut self) {
         let Some(course) = &mut self.course else {
             return;
@@ -1095,7 +1130,8 @@ impl<'m> Runner<'m> {
             course.next_piece();
             return;
         }
-        let length = if course.is_slack() { 0 } else { u64::from(course.drawn().to_bits()) };
+        let length =
+            if course.takes_up_backlash() { 0 } else { u64::from(course.drawn().to_bits()) };
         if course.ink.is_some() {
             self.run.drawn += length;
         } else {
@@ -1105,7 +1141,7 @@ impl<'m> Runner<'m> {
     }
 }
 
-/// Whether the machine may pass from one block to the next without standing.
+/// Whether the machine may pass from one block to the next without coming to rest.
 fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
     before == after && matches!(after, None | Some(LineType::Full))
 }

@@ -1,20 +1,21 @@
-//! Speeds without kinks: acceleration along the path changes no faster than the limit on jerk.
+//! Plans speeds without kinks: the acceleration along the path changes no faster than the limit on
+//! jerk.
 //!
-//! Time goes in intervals of constant jerk. At the beginning of each, [`Road::next`] takes the
-//! greatest acceleration for its end from which all that is known ahead can still be kept: the end
-//! of the path, corners, bends, feeds. Every limit is looked at by itself: braking to it as fast as
-//! acceleration and jerk let it, and without acceleration in the end, must be possible before it
-//! stands. That is enough for all of them together, since who brakes harder than one limit asks is
-//! slower everywhere. So nothing is bound to where blocks begin or end: acceleration runs on
-//! through any number of short ones. At the greatest speed an interval lasts as long as what is
-//! known lets it; a bend that is found later ends it.
+//! Time is divided into intervals of constant jerk. At the beginning of each, [`PathLimits::next`]
+//! chooses the greatest acceleration for its end from which everything that is known ahead can
+//! still be kept: the end of the path, corners, bends and feeds. Each limit is tested by itself: it
+//! must be possible to brake to it as fast as acceleration and jerk allow, with no acceleration
+//! left when it is reached. That suffices for all limits together, because braking harder than one
+//! limit requires only makes the machine slower everywhere. So nothing depends on where blocks
+//! begin or end, and acceleration continues through any number of short ones. At the greatest
+//! speed, an interval lasts as long as the known path permits; a bend that is found later ends it.
 //!
-//! Within an interval acceleration grows evenly until it is at its limit, and stays there. So an
-//! interval of the hardest braking is nowhere behind the braking that was reckoned with. Where
-//! braking ends soon, intervals are shorter, so that speed and acceleration end together.
+//! Within an interval the acceleration changes evenly until it reaches its limit, and then stays
+//! there. So an interval of the hardest braking is never slower to brake than the tests assumed.
+//! Where braking ends soon, intervals are shorter, so that speed and acceleration end together.
 //!
-//! An acceleration is told by its *ramp*: for how long the jerk has built it up, in sixteenths of
-//! slices, negative for braking. Then all changes are polynomials in whole numbers.
+//! An acceleration is represented by its *ramp*: the time for which the jerk has built it up, in
+//! sixteenths of slices, negative for braking. Then all changes are polynomials in whole numbers.
 
 use super::limits::square;
 use super::profile::Slice;
@@ -22,34 +23,36 @@ use super::{Limits, Lookahead, PathLength, SliceSpeed};
 use crate::fixed::Millimetres;
 use core::num::NonZeroU32;
 
-/// The limit in sixteenths of the jerk with which braking is reckoned: the difference makes up for
-/// changes at the ends of intervals only.
+/// The limit on jerk, in sixteenths of the jerk that is assumed for braking. The difference makes
+/// up for the fact that the jerk changes only at the ends of intervals.
 const MOST_GROWTH: i32 = 18;
 
-/// Where slices are taken together, a constant speed leaves the place that the acceleration leads
-/// to by no more than this, 2^-32 mm: 4 nm.
+/// Where slices are merged, a constant speed deviates from the exact position by no more than this,
+/// in units of 2^-32 mm: 4 nm.
 const MOST_DEVIATION: u64 = 1 << 14;
 
-/// Slices, about 0.1 s: a cruise is not looked after more often than that.
+/// The greatest length of an interval at constant speed, in slices; about 0.1 s.
 const LONGEST_CRUISE: u16 = 512;
 
 /// The limit on jerk as the planner needs it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct JerkLimit {
-    /// With which braking is reckoned, 2^-40 mm per slice³, below 2^23.
+    /// The jerk that is assumed for braking, in units of 2^-40 mm per slice³, below 2^23.
     jerk: NonZeroU32,
-    /// The longest ramp, 2^7 to 2^16: no acceleration beyond the limit, nor beyond what the
-    /// greatest speed leaves time for. A multiple of the slices of an interval, as all ramps are at
-    /// its ends.
+    /// The longest ramp, 2^7 to 2^16. It is chosen so that neither the acceleration exceeds its
+    /// limit nor the greatest speed is passed. It is a multiple of the length of an interval in
+    /// slices, as all ramps are at the ends of intervals.
     longest: i32,
 }
 
 impl JerkLimit {
-    /// The least longest ramp: eight slices. The speed is not looked after more often.
+    /// The least value of the longest ramp, which is eight slices. The speed is not planned more
+    /// often.
     const SHORTEST: u32 = 1 << 7;
+    /// The greatest value of the longest ramp.
     const LONGEST: u64 = 1 << 16;
 
-    /// `None` for no limit, 0. Jerks up to 1000 m/s³.
+    /// Creates the limit from a jerk up to 1000 m/s³; `None` if it is 0, which means no limit.
     pub(super) fn new(
         jerk_m_per_s3: Millimetres,
         acceleration: SliceSpeed,
@@ -62,7 +65,7 @@ impl JerkLimit {
         let jerk = jerk * 16 / u64::from(MOST_GROWTH.unsigned_abs());
         let (acceleration, fastest) =
             (u64::from(acceleration.to_bits()), u64::from(fastest.to_bits()));
-        // A jerk that builds all up within less than the shortest ramp is of no use.
+        // A jerk that would reach the limits within less than the shortest ramp is reduced.
         let most = (acceleration << 12) / u64::from(Self::SHORTEST);
         let jerk = jerk
             .min(most)
@@ -75,14 +78,15 @@ impl JerkLimit {
         Some(Self { longest: longest - longest % i32::from(limit.slices()), ..limit })
     }
 
-    /// How long an interval is, 8 to 256 slices: a power of two, about a 16th of the longest ramp.
+    /// The length of an interval: 8 to 256 slices, a power of two, and about a 16th of the longest
+    /// ramp.
     fn slices(self) -> u16 {
         1 << (self.longest / 170).clamp(8, 256).ilog2()
     }
 
-    /// How long the interval from there on is. It is shorter where braking ends soon, so that speed
-    /// and acceleration end together, and as long as the ramp is no multiple of a longer one. The
-    /// second value tells whether that is the only reason.
+    /// The length of the interval that begins in `state`, in slices. It is shorter where braking
+    /// ends soon, so that speed and acceleration end together, and where the ramp is no multiple of
+    /// a longer interval. The second value tells whether the latter shortened it.
     fn slices_from(self, state: State) -> (u16, bool) {
         let ramp = state.ramp.unsigned_abs();
         let ends_soon = |slices: u16| {
@@ -105,7 +109,7 @@ impl JerkLimit {
         (slices, is_uneven)
     }
 
-    /// The speed that is shed while a ramp of braking ends.
+    /// The speed that is shed while a ramp of braking fades.
     fn speed_shed(self, ramp: u32) -> u64 {
         (u64::from(self.jerk.get()) * square(ramp.into())) >> 17
     }
@@ -114,15 +118,15 @@ impl JerkLimit {
         i64::from(self.jerk.get())
     }
 
-    /// The ramp after so many slices in which it grows from `ramp` by `growth` a slice, until it is
-    /// as long as it may be.
+    /// Returns the ramp after it has grown from `ramp` by `growth` in each of this many slices,
+    /// limited to the longest ramp.
     fn grown(self, ramp: i32, growth: i32, slices: u16) -> i32 {
         (ramp + growth * i32::from(slices)).min(self.longest).max(-self.longest)
     }
 
-    /// What such a ramp adds to the speed.
+    /// Returns what such a ramp adds to the speed.
     fn gain(self, ramp: i32, growth: i32, slices: u16) -> i64 {
-        // Below 2^27: without a ramp, intervals may be longer.
+        // These products are below 2^27; only intervals without a ramp are longer.
         let time = i32::from(slices);
         let end = ramp + growth * time;
         let twice_ramp = if end.abs() <= self.longest {
@@ -133,19 +137,20 @@ impl JerkLimit {
         (self.jerk() * i64::from(twice_ramp)) >> 13
     }
 
-    /// The way that it adds, 2^-32 mm.
-    fn gained_way(self, ramp: i32, growth: i32, slices: u16) -> i64 {
+    /// Returns the distance that such a ramp adds, in units of 2^-32 mm.
+    fn gained_distance(self, ramp: i32, growth: i32, slices: u16) -> i64 {
         let time = i32::from(slices);
         let end = ramp + growth * time;
-        let six_ways = if end.abs() <= self.longest {
+        let six_distances = if end.abs() <= self.longest {
             i64::from(time * time) * i64::from(2 * ramp + end)
         } else {
-            self.sums(ramp, growth, time).six_ways
+            self.sums(ramp, growth, time).six_distances
         };
-        self.jerk() * six_ways / (6 << 12)
+        self.jerk() * six_distances / (6 << 12)
     }
 
-    /// What a ramp comes to that becomes the longest: in the slice in which it does, it grows less.
+    /// Returns the sums of a ramp that reaches the longest one. In the slice in which it does, it
+    /// grows less.
     #[inline(never)] // It is rare.
     fn sums(self, ramp: i32, growth: i32, slices: i32) -> RampSums {
         let mut sums = RampSums::default();
@@ -158,27 +163,29 @@ impl JerkLimit {
         sums
     }
 
-    /// Speed over jerk, in squares of sixteenths of slices.
+    /// Returns speed over jerk, in squares of sixteenths of slices.
     fn scaled(self, speed: u32) -> i64 {
         ((u64::from(speed) << 16) / u64::from(self.jerk.get())) as i64
     }
 
-    /// How fast it is when the ramp has ended as soon as it can. One that builds speed up does not
-    /// end within less than an interval: to reckon with less would let a speed that cannot be kept
-    /// rise and fall for ever.
+    /// Returns the speed after the ramp has ended as soon as it can. A ramp that accelerates takes
+    /// at least an interval to end: if less were assumed, the speed would rise and fall for ever
+    /// below a limit that it cannot keep exactly.
     fn settled(self, state: State) -> u64 {
         let shortest = if state.ramp > 0 { 16 * i32::from(self.slices()) } else { 0 };
         let square = i64::from(state.ramp) * i64::from(state.ramp.abs().max(shortest));
         (i64::from(state.speed) + ((self.jerk() * square) >> 17)).max(0).unsigned_abs()
     }
 
-    /// How far it is, 2^-32 mm, from the speed and ramp of `from` to the speed `to` and no ramp,
-    /// braking as hard as the limits let it; to `to` alone, if the ramp of a faster `from` leads on
-    /// to a slower speed. If `to` is never passed, nothing of use.
+    /// Returns the distance, in units of 2^-32 mm, from the speed and ramp of `from` to the speed
+    /// `to` without a ramp, if the machine brakes as hard as the limits allow. If the ramp of
+    /// `from` leads below `to` anyway, it is the distance until the speed `to` is passed. If `to`
+    /// is never reached, the result has no meaning.
     pub(super) fn braking_distance(self, from: State, to: u32) -> u64 {
         let ramp = i64::from(from.ramp);
         let (from, to) = (self.scaled(from.speed) + 1, self.scaled(to));
-        // The ramp at which to turn, if none is too long: v - u = (2 peak² - ramp²) / 2.
+        // The ramp at which braking begins to fade, if it does not exceed the longest one: v - u =
+        // (2 peak² - ramp²) / 2.
         let longest = i64::from(self.longest);
         let square = from - to + ramp * ramp / 2;
         if ramp < 0 && square < ramp * ramp {
@@ -197,32 +204,33 @@ impl JerkLimit {
         let hold = (first - second + peak - 1).max(0) / peak;
         // Times below 2^22, speeds below 2^37, their product below 2^58.
         let curves = down * down * (3 * ramp - down) + peak * peak * peak;
-        let way = from * down + hold * ((first + second) / 2) + to * peak + curves / 6;
-        self.distance(way)
+        let distance = from * down + hold * ((first + second) / 2) + to * peak + curves / 6;
+        self.distance(distance)
     }
 
-    /// How long it takes at most, in sixteenths of ticks, to come to rest after such a way
-    /// (2^-32 mm), on which nothing but the speed `top` and that rest limits the machine.
+    /// Returns an upper bound of the time, in sixteenths of ticks, until the machine comes to rest
+    /// at this distance (2^-32 mm), if nothing but the speed `top` and that rest limits it.
     ///
-    /// While it is never slower than some speed before it brakes to that rest, it takes no longer
-    /// than three times the way over that speed: just so long while braking fades. Where it must
-    /// brake to rest, it also takes no longer than at the present acceleration, which then fades;
-    /// and no longer than the hardest braking, and three times the rest of the way over the speed.
+    /// If the machine is never slower than some speed before it brakes to rest, it takes at most
+    /// three times the distance over that speed, which is exact while braking fades. If it must
+    /// brake to rest, it also takes no longer than with the present acceleration, which then fades,
+    /// and no longer than the hardest braking plus three times the rest of the distance over the
+    /// speed.
     #[cfg(feature = "pen-overlap")]
     #[inline(never)] // Only on travels: inlined, it would fill the cache.
-    fn time_to_rest(self, from: State, way: u64, top: SliceSpeed) -> u64 {
+    fn time_to_rest(self, from: State, distance: u64, top: SliceSpeed) -> u64 {
         let speed = from.speed.max(1);
-        // Ways are below 2^46; what is further away is not waited for yet.
-        let over = |way: u64, speed: u32| {
-            (3 * (way.min(1 << 45) << 16)).checked_div(speed.into()).unwrap_or(u64::MAX)
+        // Distances are below 2^46; the pen does not wait for anything further away yet.
+        let over = |distance: u64, speed: u32| {
+            (3 * (distance.min(1 << 45) << 16)).checked_div(speed.into()).unwrap_or(u64::MAX)
         };
         if speed > top.to_bits() {
-            return over(way, top.to_bits());
+            return over(distance, top.to_bits());
         }
-        let rest = way.saturating_sub(self.braking_distance(from, 0));
-        if from.ramp < 0 && rest > way / 8 {
+        let rest = distance.saturating_sub(self.braking_distance(from, 0));
+        if from.ramp < 0 && rest > distance / 8 {
             // It slows down to another speed.
-            return over(way, u32::try_from(self.settled(from)).unwrap_or(speed).min(speed));
+            return over(distance, u32::try_from(self.settled(from)).unwrap_or(speed).min(speed));
         }
         let ramp = u64::from(from.ramp.unsigned_abs());
         let acceleration = (u64::from(self.jerk.get()) * ramp) >> 12;
@@ -231,11 +239,11 @@ impl JerkLimit {
             _ => u64::MAX,
         };
         let by_braking = self.braking_time(from).saturating_add(over(rest, speed));
-        over(way, speed).min(by_ramp).min(by_braking)
+        over(distance, speed).min(by_ramp).min(by_braking)
     }
 
-    /// How long the braking of [`JerkLimit::braking_distance`] to rest takes, in sixteenths of
-    /// ticks; the greatest number where the ramp has only to end.
+    /// Returns the time that the braking of [`JerkLimit::braking_distance`] to rest takes, in
+    /// sixteenths of ticks; the greatest number if the ramp only has to end.
     #[cfg(feature = "pen-overlap")]
     fn braking_time(self, from: State) -> u64 {
         let (ramp, speed) = (i64::from(from.ramp), self.scaled(from.speed) + 1);
@@ -245,45 +253,45 @@ impl JerkLimit {
         }
         let peak = square.max(1).unsigned_abs().isqrt() as i64;
         let peak = peak.min(self.longest.into()).max(-ramp).max(1);
-        // What is left to be shed at the peak.
+        // The speed that is left to be shed at the peak.
         let left = (speed + ramp * ramp / 2 - peak * peak + peak - 1).max(0);
         let hold = left.unsigned_abs().checked_div(peak.unsigned_abs()).unwrap_or(0);
         let ramps = (ramp + 2 * peak).max(0).unsigned_abs();
         (ramps + hold) << 12
     }
 
-    /// Scaled speed times sixteenths of slices, as 2^-32 mm.
+    /// Converts a product of scaled speed and sixteenths of slices to units of 2^-32 mm.
     fn distance(self, scaled: i64) -> u64 {
         ((scaled.max(0).unsigned_abs() >> 8) * u64::from(self.jerk.get())) >> 12
     }
 }
 
-/// What a ramp comes to over some time.
+/// The sums of a ramp over some time.
 #[derive(Debug, Default)]
 struct RampSums {
     /// Twice the sum of the ramp over the slices.
     twice_ramp: i32,
     /// Six times the sum of that sum.
-    six_ways: i64,
+    six_distances: i64,
 }
 
 impl RampSums {
-    /// The ramp goes evenly from one to another in so many slices.
+    /// Adds a ramp that changes evenly between two values within this many slices.
     #[inline]
     fn add(&mut self, from: i32, to: i32, slices: i32) {
         let time = i64::from(slices);
-        self.six_ways +=
+        self.six_distances +=
             3 * i64::from(self.twice_ramp) * time + time * time * i64::from(2 * from + to);
         self.twice_ramp += (from + to) * slices;
     }
 }
 
-/// How the plan moves at an instant.
+/// The state of motion of the plan at an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct State {
-    /// 2^-32 mm per slice.
+    /// The speed, in units of 2^-32 mm per slice.
     pub(super) speed: u32,
-    /// See the module.
+    /// The acceleration as a ramp: see the module documentation.
     pub(super) ramp: i32,
 }
 
@@ -291,16 +299,19 @@ pub(super) struct State {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interval {
     limit: JerkLimit,
+    /// The state at the beginning of the interval.
     from: State,
-    /// Added to the ramp by each slice: sixteenths of the jerk of [`JerkLimit`].
+    /// What each slice adds to the ramp: the jerk in sixteenths of that of [`JerkLimit`].
     growth: i8,
-    /// So many slices are one.
+    /// The number of slices that are merged into one.
     stride: u8,
+    /// The length of the interval in slices.
     slices: u16,
+    /// The number of slices that were returned.
     done: u16,
-    /// When so many are done.
+    /// The speed after these slices.
     speed: u32,
-    /// What is left of a slice that the end of a block cut.
+    /// The rest of a slice that was cut at the end of a block.
     rest: Slice,
 }
 
@@ -316,14 +327,14 @@ impl Interval {
         Self { limit, from, growth, stride, slices, done: 0, speed, rest: Slice::default() }
     }
 
-    /// The next slice, or as much of it as there is `room` for (2^-32 mm); `None` at the end of the
-    /// interval or without room.
+    /// Returns the next slice, or as much of it as fits `room` (in units of 2^-32 mm); `None` at
+    /// the end of the interval or without room.
     #[inline(never)] // Without a limit of jerk, it would only fill the cache.
     pub(super) fn next_slice(&mut self, room: u64) -> Option<Slice> {
         if room == 0 {
             return None;
         }
-        // What is left of one is made up to a whole.
+        // The rest of a slice is completed to a whole one.
         let missing = (u32::from(self.stride) * Slice::TIME).saturating_sub(self.rest.time);
         let slices = ((missing / Slice::TIME) as u16).min(self.slices - self.done);
         let is_even = self.growth == 0 && self.from.ramp == 0;
@@ -331,8 +342,8 @@ impl Interval {
             let before = self.speed;
             self.done += slices;
             self.speed = self.speed_after(self.done);
-            let stands = before == 0 && self.speed == 0 && self.growth <= 0;
-            if !stands {
+            let stays_at_rest = before == 0 && self.speed == 0 && self.growth <= 0;
+            if !stays_at_rest {
                 let slices = u32::from(slices);
                 // Speeds are at most 0.09.
                 self.rest.distance += before.midpoint(self.speed) * slices;
@@ -344,7 +355,7 @@ impl Interval {
         }
         let mut slice = core::mem::take(&mut self.rest);
         if u64::from(slice.distance) > room {
-            // Less than the distance, and so than the time.
+            // The room is less than the distance, so the result is less than the time.
             let time = (u64::from(slice.time) * room / u64::from(slice.distance)) as u32;
             let distance = room as u32;
             self.rest = Slice { distance: slice.distance - distance, time: slice.time - time };
@@ -353,23 +364,23 @@ impl Interval {
         Some(slice)
     }
 
-    /// See [`JerkLimit::time_to_rest`], from where the last slice given ends.
+    /// [`JerkLimit::time_to_rest`], from the end of the last slice returned.
     #[cfg(feature = "pen-overlap")]
-    pub(super) fn time_to_rest(&self, way: u64, top: SliceSpeed) -> u64 {
-        self.limit.time_to_rest(self.state(), way, top)
+    pub(super) fn time_to_rest(&self, distance: u64, top: SliceSpeed) -> u64 {
+        self.limit.time_to_rest(self.state(), distance, top)
     }
 
-    /// Whether it is longer than others.
+    /// Whether this is a cruise: an interval at constant speed that is longer than others.
     pub(super) fn is_cruise(&self) -> bool {
         self.slices > self.limit.slices()
     }
 
-    /// Whether the acceleration changes in it, so that it must not be cut short.
+    /// Whether the acceleration changes within the interval, so that it must not be cut short.
     pub(super) fn changes(&self) -> bool {
         self.growth != 0
     }
 
-    /// How the plan moves at the end of the last slice given.
+    /// The state at the end of the last slice returned.
     pub(super) fn state(&self) -> State {
         let ramp = self.limit.grown(self.from.ramp, self.growth.into(), self.done);
         State { speed: self.speed, ramp: if self.speed == 0 { 0 } else { ramp } }
@@ -377,36 +388,38 @@ impl Interval {
 
     fn speed_after(&self, slices: u16) -> u32 {
         let gain = self.limit.gain(self.from.ramp, self.growth.into(), slices);
-        // The limits keep it below 2^32.
+        // The limits keep the speed below 2^32.
         (i64::from(self.from.speed) + gain).max(0) as u32
     }
 }
 
-/// What the plan has to keep.
+/// The limits on the path ahead that a plan has to keep.
 #[derive(Debug)]
-pub(super) struct Road<'a, 'm> {
+pub(super) struct PathLimits<'a, 'm> {
     pub(super) limits: &'a Limits,
     pub(super) jerk: JerkLimit,
-    /// Not to be passed, but not at once if it is passed already; 0 to brake to rest.
+    /// The greatest speed. If the machine is already faster, it slows down gradually. With 0 it
+    /// brakes to rest.
     pub(super) top: SliceSpeed,
-    /// To the end of the piece in work, 2^-32 mm.
+    /// The distance to the end of the current piece, in units of 2^-32 mm.
     pub(super) room: u64,
-    /// Greatest stopping distance until there.
+    /// The greatest stopping distance until there.
     pub(super) curve_limit: PathLength,
-    /// What comes then; `None` if it ends there at rest.
+    /// The blocks after that; `None` if the path ends there at rest.
     pub(super) beyond: Option<&'a Lookahead<'m>>,
 }
 
-impl Road<'_, '_> {
-    /// The next interval.
+impl PathLimits<'_, '_> {
+    /// Returns the next interval.
     ///
-    /// If nothing is allowed, it brakes. From rest, if not even the least acceleration is, it
-    /// creeps: what is left is less than a start and a stop take.
+    /// If no acceleration is allowed, the machine brakes. From rest, if not even the least
+    /// acceleration is allowed, it creeps, because the remaining distance is less than a start and
+    /// a stop take.
     #[inline(never)] // Without a limit of jerk, it would only fill the cache.
     pub(super) fn next(&self, from: State) -> Interval {
         let jerk = self.jerk;
         let (mut slices, is_uneven) = jerk.slices_from(from);
-        // The hardest braking is as hard as it may be, as soon as it can.
+        // The hardest braking reaches the longest ramp as soon as it can.
         let hardest = if from.ramp > -jerk.longest { -MOST_GROWTH } else { 0 };
         let mut least = hardest;
         let room = (jerk.longest - from.ramp).checked_div(slices.into()).unwrap_or(0);
@@ -422,11 +435,12 @@ impl Road<'_, '_> {
                 most = middle;
             }
         }
-        // At the longest ramp, too: it would brake to rest, and end that with a jerk.
+        // This also ends braking at the longest ramp, which would otherwise continue to rest and
+        // end with a jerk.
         if least == hardest && from.ramp < -MOST_GROWTH * i32::from(slices) && self.is_slow(from) {
             least = MOST_GROWTH;
         }
-        // Where it makes the next interval longer, a little less.
+        // A little less is chosen where that makes the next interval longer.
         if is_uneven
             && least > -MOST_GROWTH
             && (from.ramp.checked_div(slices.into()).unwrap_or(0) + least) & 1 != 0
@@ -434,11 +448,12 @@ impl Road<'_, '_> {
             least -= 1;
         }
         if from.speed == 0 && least <= 0 {
-            let way = jerk.gained_way(0, 1, slices).unsigned_abs();
-            let speed = way.checked_div(slices.into()).unwrap_or(0).max(1) as u32;
+            let distance = jerk.gained_distance(0, 1, slices).unsigned_abs();
+            let speed = distance.checked_div(slices.into()).unwrap_or(0).max(1) as u32;
             return Interval::new(jerk, State { speed, ramp: 0 }, 0, slices);
         }
-        // As fast as it may be at all: nothing that comes can change that.
+        // At the greatest speed, which nothing ahead can raise, the interval is as long as
+        // possible.
         if from.ramp == 0 && least == 0 && self.settled(from, 1, slices).is_none() {
             while slices < LONGEST_CRUISE && self.allows(from, 0, 2 * slices) {
                 slices *= 2;
@@ -447,8 +462,9 @@ impl Road<'_, '_> {
         Interval::new(jerk, from, least, slices)
     }
 
-    /// Whether a limit came too late to be kept, and braking that ends now leads below it. What is
-    /// known is far more than a stop takes, so it is not that which asks for more.
+    /// Whether a limit came too late to be kept, and braking that ends now leads below it. The
+    /// known path must be much longer than a stop takes, so that its end is not what requires
+    /// braking.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn is_slow(&self, from: State) -> bool {
         self.beyond.is_some_and(|blocks| {
@@ -461,8 +477,8 @@ impl Road<'_, '_> {
         })
     }
 
-    /// How it moves after an interval of such a growth, and how fast it is when it has no ramp any
-    /// more; `None` if that is too fast.
+    /// Returns the state after an interval of this growth, and the speed once the ramp has ended;
+    /// `None` if that is too fast.
     fn settled(&self, from: State, growth: i32, slices: u16) -> Option<(State, u64)> {
         let speed = i64::from(from.speed) + self.jerk.gain(from.ramp, growth, slices);
         let ramp = self.jerk.grown(from.ramp, growth, slices);
@@ -471,22 +487,22 @@ impl Road<'_, '_> {
         (settled <= u64::from(self.top.to_bits())).then_some((after, settled))
     }
 
-    /// Whether all limits can be kept after an interval of such a growth, and are kept in it.
+    /// Whether all limits are kept within an interval of this growth, and can be kept after it.
     fn allows(&self, from: State, growth: i32, slices: u16) -> bool {
         let jerk = self.jerk;
         let Some((after, settled)) = self.settled(from, growth, slices) else {
             return false;
         };
-        let way =
-            i64::from(from.speed) * i64::from(slices) + jerk.gained_way(from.ramp, growth, slices);
-        let way = way.max(0).unsigned_abs();
+        let distance = i64::from(from.speed) * i64::from(slices)
+            + jerk.gained_distance(from.ramp, growth, slices);
+        let distance = distance.max(0).unsigned_abs();
         let fastest = settled.max(after.speed.into());
         let exceeds =
             |speed: u64, limit: PathLength| speed * speed > self.limits.squared_speed(limit);
         let passes = |place: u64, limit: PathLength| {
-            // Speed as if it were linear along the way: too much where braking fades.
+            // Speed as if it were linear along the distance: too much where braking fades.
             let change = i64::from(after.speed) - i64::from(from.speed);
-            let part = change * (place >> 12).cast_signed() / (way >> 12).max(1).cast_signed();
+            let part = change * (place >> 12).cast_signed() / (distance >> 12).max(1).cast_signed();
             let speed = (i64::from(from.speed) + part).unsigned_abs();
             let settled = jerk.settled(from);
             !exceeds(speed, limit)
@@ -496,14 +512,14 @@ impl Road<'_, '_> {
         };
         let stop = jerk.braking_distance(after, 0);
         if let Some(blocks) = self.beyond {
-            let left = (self.room + blocks.known()).saturating_sub(way);
+            let left = (self.room + blocks.known()).saturating_sub(distance);
             if stop >> 14 > blocks.stopping_distance_at(left >> 14, self.limits) {
                 return false;
             }
         }
-        // No speed looked at is too fast for limits from this one on.
+        // None of the tested speeds exceeds this limit or a higher one.
         let harmless = self.limits.least_limit(fastest.max(from.speed.into()));
-        let (enough, mut lowest) = (way.saturating_add(stop), PathLength::MAX);
+        let (enough, mut lowest) = (distance.saturating_add(stop), PathLength::MAX);
         let (mut begin, mut end, mut curve_limit) = (0, self.room, self.curve_limit);
         if let Some(blocks) = self.beyond
             && blocks.lowest_limit().min(curve_limit) >= harmless
@@ -516,12 +532,12 @@ impl Road<'_, '_> {
                 if end >= enough {
                     return true;
                 }
-            } else if end < way {
+            } else if end < distance {
                 if !passes(end, limit.min(curve_limit)) {
                     return false;
                 }
             } else {
-                if begin <= way && exceeds(settled, curve_limit) {
+                if begin <= distance && exceeds(settled, curve_limit) {
                     return false;
                 }
                 if end >= enough {
@@ -531,7 +547,7 @@ impl Road<'_, '_> {
                 if limit < lowest && exceeds(fastest, limit) {
                     lowest = limit;
                     let limit = self.limits.speed(limit).to_bits();
-                    if end - way < jerk.braking_distance(after, limit) {
+                    if end - distance < jerk.braking_distance(after, limit) {
                         return false;
                     }
                 }
@@ -539,7 +555,7 @@ impl Road<'_, '_> {
             curve_limit = block.curve_limit;
             (begin, end) = (end, end + (u64::from(block.length.to_bits()) << 14));
         }
-        if begin <= way && exceeds(settled, curve_limit) {
+        if begin <= distance && exceeds(settled, curve_limit) {
             return false;
         }
         enough <= end
@@ -584,20 +600,20 @@ mod tests {
         }
     }
 
-    /// The way, mm, from a speed, mm/s, and ramp, braking as hard as possible for `first` slices
-    /// and then less and less; and the speed then.
+    /// The distance, mm, from a speed, mm/s, and ramp, braking as hard as possible for `first`
+    /// slices and then less and less; and the speed then.
     fn braked(limit: JerkLimit, from: State, hard: f64) -> (f64, f64) {
         let jerk = f64::from(limit.jerk.get()) / 2f64.powi(40) / SLICE.powi(3);
-        let (mut speed, mut way) = (f64::from(from.speed) / 2f64.powi(32) / SLICE, 0.0);
+        let (mut speed, mut distance) = (f64::from(from.speed) / 2f64.powi(32) / SLICE, 0.0);
         let longest = f64::from(limit.longest) / 16.0 * SLICE;
         let (mut ramp, mut time, step) = (f64::from(from.ramp) / 16.0 * SLICE, 0.0, 1e-5);
         loop {
             ramp = if time < hard { (ramp - step).max(-longest) } else { ramp + step };
             if (time >= hard && ramp >= 0.0) || speed < 0.0 {
-                return (speed, way);
+                return (speed, distance);
             }
             speed += jerk * ramp * step;
-            way += speed * step;
+            distance += speed * step;
             time += step;
         }
     }
@@ -629,10 +645,10 @@ mod tests {
                     }
                     let expected = braked(limit, from, long).1;
                     let scaled = (to * SLICE * 2f64.powi(32)) as u32;
-                    let way = limit.braking_distance(from, scaled) as f64 / 2f64.powi(32);
+                    let distance = limit.braking_distance(from, scaled) as f64 / 2f64.powi(32);
                     assert!(
-                        (way - expected).abs() < 0.01 * expected + 0.01,
-                        "{way} mm, not {expected}"
+                        (distance - expected).abs() < 0.01 * expected + 0.01,
+                        "{distance} mm, not {expected}"
                     );
                 }
             }
@@ -650,8 +666,9 @@ mod tests {
             while room > 0 {
                 let jerk = limits.jerk.expect("a limit");
                 let (top, curve_limit) = (limits.draw_speed, PathLength::MAX);
-                let road = Road { limits: &limits, jerk, top, room, curve_limit, beyond: None };
-                let mut interval = road.next(state);
+                let path_limits =
+                    PathLimits { limits: &limits, jerk, top, room, curve_limit, beyond: None };
+                let mut interval = path_limits.next(state);
                 while let Some(slice) = interval.next_slice(room) {
                     room -= u64::from(slice.distance);
                 }

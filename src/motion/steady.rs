@@ -1,27 +1,28 @@
-//! The greatest speed that a stretch of a path can keep all along: what its narrowest bend allows.
+//! The greatest constant speed for a stretch of a path, which its narrowest bend determines.
 
 use super::curvature::Curvature;
 use super::junction::{Heading, bends_apart, corner};
 use super::{Limits, Lookahead, PathLength};
 use crate::drawing::PagePoint;
 
-/// Looks at a stretch of the path that no sharp corner divides, before it is drawn.
+/// Determines the greatest constant speed for a stretch of the path without sharp corners, before
+/// it is drawn.
 #[derive(Debug)]
 pub struct SteadySpeed<'l> {
     limits: &'l Limits,
-    /// Where the stretch ends so far.
+    /// The end of the stretch so far.
     at: PagePoint,
-    /// The way in which the last move runs, and its length.
+    /// The direction and the length of the last move.
     last: Option<(Heading, PathLength)>,
     curvature: Curvature,
-    /// It has no blocks, and tells the lowest limit of the bends alone.
+    /// A look-ahead without blocks, which only reports the lowest limit of the bends.
     bends: Lookahead<'static>,
     lowest: PathLength,
     moves: u32,
 }
 
 impl<'l> SteadySpeed<'l> {
-    /// A stretch that begins at `start`, without moves.
+    /// Begins a stretch at `start`, without moves.
     pub fn new(limits: &'l Limits, start: PagePoint) -> Self {
         let mut bends = Lookahead::new(&mut []);
         let mut curvature = Curvature::default();
@@ -30,13 +31,13 @@ impl<'l> SteadySpeed<'l> {
         Self { limits, at: start, last, curvature, bends, lowest, moves: 0 }
     }
 
-    /// How many moves there are.
+    /// The number of moves in the stretch.
     pub fn moves(&self) -> u32 {
         self.moves
     }
 
-    /// Appends a move to `point`. Returns `false`, and appends nothing, if a sharp corner is before
-    /// it, or if it is longer than 16 m.
+    /// Appends a move to `point`. Returns `false`, and appends nothing, if there is a sharp corner
+    /// before the move, or if the move is longer than 16 m.
     pub fn add(&mut self, point: PagePoint) -> bool {
         let (dx, dy) = (point.x.wrapping_sub(self.at.x), point.y.wrapping_sub(self.at.y));
         let Some(length) = self.limits.length(dx, dy) else {
@@ -55,7 +56,7 @@ impl<'l> SteadySpeed<'l> {
                 }
             }
             if self.limits.centripetal {
-                self.curvature.sync_consumed(self.limits, point, &mut self.bends);
+                self.curvature.extend(self.limits, point, &mut self.bends);
             }
             self.last = Some((heading, length));
             self.at = point;
@@ -64,7 +65,7 @@ impl<'l> SteadySpeed<'l> {
         true
     }
 
-    /// The greatest stopping distance that every bend of the stretch allows; more than 0.
+    /// Returns the greatest stopping distance that every bend of the stretch allows; more than 0.
     pub fn limit(mut self) -> PathLength {
         self.curvature.restart(self.limits, self.at, &mut self.bends);
         self.lowest.min(self.bends.take_lowered()).max(PathLength::DELTA)

@@ -61,7 +61,7 @@ pub struct First {
 }
 
 /// How long the pen is busy.
-pub trait Meanwhile {
+pub trait StrokeDurations {
     /// Returns the milliseconds that so many strokes take, of this length together in 1/256 steps,
     /// without the moves between them.
     fn milliseconds(&self, strokes: u32, length: u64) -> u64;
@@ -190,7 +190,7 @@ pub fn choose_first<I: Index>(
     points: &[PagePoint],
     segments: &mut [Segment<I>],
     options: Options,
-    meanwhile: &dyn Meanwhile,
+    meanwhile: &dyn StrokeDurations,
     scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
 ) -> Result<First, OrderError> {
@@ -209,7 +209,7 @@ fn choose<I: Index>(
     points: &[PagePoint],
     segments: &mut [Segment<I>],
     options: Options,
-    meanwhile: &dyn Meanwhile,
+    meanwhile: &dyn StrokeDurations,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
 ) -> Result<First, OrderError> {
@@ -319,8 +319,8 @@ pub fn order_rest<I: Index>(
         drawing.segments.split_at_checked(count).ok_or(OrderError::TourLength)?;
     let end = before.last().and_then(|last| drawing.points.get(last.to().get()));
     let free_units = match options.effort {
-        Effort::Auto(pace) => {
-            u64::from(first.spare_milliseconds) * u64::from(pace.units_per_second) / 1000
+        Effort::Auto(time_model) => {
+            u64::from(first.spare_milliseconds) * u64::from(time_model.units_per_second) / 1000
         }
         Effort::Units(_) => 0,
     };
@@ -362,7 +362,7 @@ mod tests {
     /// A pen for which each stroke takes so many milliseconds.
     struct Pen(u64);
 
-    impl Meanwhile for Pen {
+    impl StrokeDurations for Pen {
         fn milliseconds(&self, strokes: u32, _: u64) -> u64 {
             u64::from(strokes) * self.0
         }
@@ -532,7 +532,7 @@ mod tests {
     /// Says the same of any strokes.
     struct Always(u64);
 
-    impl Meanwhile for Always {
+    impl StrokeDurations for Always {
         fn milliseconds(&self, _: u32, _: u64) -> u64 {
             self.0
         }

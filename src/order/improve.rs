@@ -13,9 +13,9 @@
 //!
 //! With [`Effort::Units`] the kicks share a fixed budget, also among the first tours. With
 //! [`Effort::Auto`] the work ends where it no longer pays. What is gained is compared with what was
-//! spent, over the last eighth of a second of counted work ([`Pace::units_per_second`]), not kick
-//! by kick: most kicks gain nothing, and hundreds of them are needed to see a rate. A further first
-//! tour is made only if it takes so little work that it may pay, too.
+//! spent, over the last eighth of a second of counted work ([`TimeModel::units_per_second`]), not
+//! kick by kick: most kicks gain nothing, and hundreds of them are needed to see a rate. A further
+//! first tour is made only if it takes so little work that it may pay, too.
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
@@ -25,7 +25,7 @@ use super::network::Network;
 use super::orient::orient;
 use super::patch_cycles::patch_cycles;
 use super::work_budget::WorkBudget;
-use super::{Effort, Leg, OrderError, Pace, even_part, mark_parts, reverse};
+use super::{Effort, Leg, OrderError, TimeModel, even_part, mark_parts, reverse};
 use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::index::Index;
@@ -97,7 +97,7 @@ pub(super) fn improve<I: Index>(
     let neighbours = Neighbours::new(network, per_station, &mut scratch, work_budget)?;
     let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
     let (first, last) = match effort {
-        Effort::Auto(pace) => (Until::Exchanged(pace), Until::Unpaid(pace)),
+        Effort::Auto(time_model) => (Until::Exchanged(time_model), Until::Unpaid(time_model)),
         Effort::Units(units) => {
             let budget = u64::from(moves) * u64::from(units);
             let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
@@ -151,9 +151,9 @@ enum Until {
     /// When so many units of work are spent.
     Spent(u64),
     /// When exchanges alone find nothing better any more. No kick is made.
-    Exchanged(Pace),
+    Exchanged(TimeModel),
     /// When the kicks save less time than they take.
-    Unpaid(Pace),
+    Unpaid(TimeModel),
 }
 
 impl Until {
@@ -262,12 +262,12 @@ impl<I: Index> Best<'_, '_, I> {
         let mut window = None;
         match until {
             Until::Spent(_) => {}
-            Until::Unpaid(pace) => window = Some(self.window(pace, tour.cost())),
-            Until::Exchanged(pace) => {
+            Until::Unpaid(time_model) => window = Some(self.window(time_model, tour.cost())),
+            Until::Exchanged(time_model) => {
                 let spent = until.budget() - work_budget.left();
-                let second = u64::from(pace.units_per_second).max(1);
+                let second = u64::from(time_model.units_per_second).max(1);
                 let parts = spent.saturating_mul(FIRST_TOUR_PART) / second;
-                pays = parts.saturating_mul(self.rate(pace, tour.cost())) <= tour.cost();
+                pays = parts.saturating_mul(self.rate(time_model, tour.cost())) <= tour.cost();
                 work_budget.grant(0);
             }
         }
@@ -305,20 +305,20 @@ impl<I: Index> Best<'_, '_, I> {
     /// steps. A pen that accelerates all along a move of length `l` takes `2 √(l / a)` for it, of
     /// which the derivative is `1 / √(a l)`; on a long move it is one over the speed.
     #[inline(never)] // Its two callers share one copy of the code.
-    fn rate(&self, pace: Pace, cost: u64) -> u64 {
+    fn rate(&self, time_model: TimeModel, cost: u64) -> u64 {
         let mean = (cost / u64::from(self.moves.max(1))).saturating_sub(self.lift_cost.into());
         // The acceleration is below 2^27 and the length of a move below 2^31.
-        let accelerating = 16 * u64::from(root(u64::from(pace.acceleration) * mean));
-        accelerating.min(u64::from(pace.speed) << 8).max(1)
+        let accelerating = 16 * u64::from(root(u64::from(time_model.acceleration) * mean));
+        accelerating.min(u64::from(time_model.speed) << 8).max(1)
     }
 
     /// Returns over how much work the gain of the kicks is watched, and how much it must be.
-    fn window(&self, pace: Pace, cost: u64) -> Window {
-        let second = u64::from(pace.units_per_second).max(1);
+    fn window(&self, time_model: TimeModel, cost: u64) -> Window {
+        let second = u64::from(time_model.units_per_second).max(1);
         let moves = u64::from(self.moves) * WINDOW_UNITS_PER_MOVE;
         let units = moves.min(second / WINDOWS_PER_SECOND);
         // Both factors are below 2^33.
-        let least_gain = units * self.rate(pace, cost) / second;
+        let least_gain = units * self.rate(time_model, cost) / second;
         Window { units, least_gain: (least_gain as i64).max(1) }
     }
 

@@ -44,7 +44,7 @@ mod remaining;
 mod search;
 
 #[cfg(feature = "early-ink")]
-pub use first::{First, Meanwhile, choose_first, first_legs, order_rest};
+pub use first::{First, StrokeDurations, choose_first, first_legs, order_rest};
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
@@ -134,7 +134,7 @@ pub enum Shape {
 /// How fast the pen travels, and how fast the order is improved. They say whether a shorter way is
 /// worth the work.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pace {
+pub struct TimeModel {
     /// The greatest speed with the pen up, in steps per second, below 2^22.
     pub speed: u32,
     /// The greatest acceleration, in steps per second squared, below 2^27.
@@ -143,7 +143,7 @@ pub struct Pace {
     pub units_per_second: u32,
 }
 
-impl Pace {
+impl TimeModel {
     /// The units of work that count as one second on every board, and wherever a board's order is
     /// shown. The Pico's core, which takes 417 cycles for a unit on text300 and 534 on lattice7
     /// (`cargo xtask bench --board pico`), does so many at 125 MHz.
@@ -153,7 +153,7 @@ impl Pace {
     pub const COMPUTER: u32 = 30_000_000;
 }
 
-impl Default for Pace {
+impl Default for TimeModel {
     /// That of a board with the default settings of its machine: 100 mm/s and 800 mm/s², with 80
     /// steps to the millimetre.
     fn default() -> Self {
@@ -166,9 +166,9 @@ impl Default for Pace {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
     /// As much as pays: until a further second of work saves less than a second of drawing at this
-    /// pace. What is saved is taken from the moves with the pen up, each lift at its cost
+    /// time_model. What is saved is taken from the moves with the pen up, each lift at its cost
     /// ([`Options::lift_cost`]).
-    Auto(Pace),
+    Auto(TimeModel),
     /// So many distance computations for each pen-up move. With 0 the tour is not improved: the
     /// parts are drawn nearest first.
     Units(u32),
@@ -176,7 +176,7 @@ pub enum Effort {
 
 impl Default for Effort {
     fn default() -> Self {
-        Self::Auto(Pace::default())
+        Self::Auto(TimeModel::default())
     }
 }
 

@@ -174,9 +174,9 @@ impl<I: Index> Inner<'_, I> {
     /// the order, so it depends on nothing but the options and the settings.
     pub(super) fn early(&self) -> Option<StrokeTime> {
         let settings = self.machine.settings();
-        let pace = settings.pace(order::Pace::BOARD);
+        let time_model = settings.time_model(order::TimeModel::BOARD);
         let order::Options { method, shape, effort, .. } =
-            self.options.order(settings.page_steps(), pace);
+            self.options.order(settings.page_steps(), time_model);
         // A pen that moves while the machine does, and strokes that are longer than they are drawn,
         // depend on what comes behind. The exact method may need more memory than there is.
         let may_begin = shape == Shape::OpenPath
@@ -243,12 +243,12 @@ impl<I: Index> Inner<'_, I> {
     ) -> Result<Job<I>, CommandError> {
         self.forget_job();
         let (steps, early) = (self.machine.settings().page_steps(), self.early());
-        let pace = self.machine.settings().pace(self.units_per_second());
+        let time_model = self.machine.settings().time_model(self.units_per_second());
         let Self { model, options, words, machine, .. } = self;
         let mut approach = Approach { listener, machine, is_on_the_way: false, checks: 0 };
         let (cancel, observer) = (&mut approach, &mut Unobserved);
         let begun =
-            Pipeline { model, options, steps, pace, early, words, cancel, observer }.begin();
+            Pipeline { model, options, steps, time_model, early, words, cancel, observer }.begin();
         if begun.is_ok() {
             approach.arrive()?;
         } else if approach.is_on_the_way {

@@ -3,7 +3,9 @@
 
 #[cfg(feature = "early-ink")]
 use super::plot::ANSWER_MICROSECONDS;
-use super::program::{Kept, MachinePosition, Order, Parameters, Program, TEXT_LIMIT, Text};
+use super::program::{
+    MachinePosition, Order, Parameters, Program, StoredPosition, TEXT_LIMIT, Text,
+};
 use super::reply::Reply;
 use super::stream::Task;
 use super::{Board, Inner, records};
@@ -271,17 +273,17 @@ impl<I: Index> Inner<'_, I> {
     /// [`CommandError::Setting`] for a position of G28 that the settings do not hold.
     pub(super) fn keep_position(
         &mut self,
-        kept: Kept,
+        kept: StoredPosition,
         position: MachinePosition,
         waits: bool,
     ) -> Result<(), CommandError> {
         let [x, y, _] = position;
         match kept {
-            Kept::Park => self.machine.set_park([x, y])?,
-            Kept::Second => self.parameters.second = position,
+            StoredPosition::Park => self.machine.set_park([x, y])?,
+            StoredPosition::Second => self.parameters.second = position,
         }
         if waits {
-            self.task = Some(Task::Keep { settings: kept == Kept::Park });
+            self.task = Some(Task::Keep { settings: kept == StoredPosition::Park });
         }
         Ok(())
     }

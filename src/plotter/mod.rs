@@ -16,7 +16,7 @@ mod help;
 #[cfg(feature = "hpgl")]
 mod hpgl;
 mod job;
-mod kept;
+mod flash_records;
 mod listener;
 mod memory;
 mod options;
@@ -37,9 +37,12 @@ mod streamed;
 mod title;
 
 pub use board::{Board, NotStored, REPLY_BYTES, Record, Replies, Stored};
+pub use flash_records::{FlashRecords, Layout};
 pub use help::help;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
-pub use kept::{Kept, Layout};
+// The name that a target of the fuzzer still uses.
+#[doc(hidden)]
+pub use flash_records::FlashRecords as Kept;
 pub use memory::{EMPTY_LOOKAHEAD, HpGlMemory, Memory, MemorySlices};
 pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,
@@ -312,8 +315,9 @@ impl<'m, I: Index> Plotter<'m, I> {
     }
 
     /// Sets whether this plotter computes for another one, on a computer. Then, unless `$effort` is
-    /// a number, more work is spent on the order ([`Pace::COMPUTER`](crate::order::Pace)), and the
-    /// order is no longer that which a board finds.
+    /// a number, more work is spent on the order
+    /// ([`TimeModel::COMPUTER`](crate::order::TimeModel)), and the order is no longer that which a
+    /// board finds.
     #[cfg(any(test, feature = "host"))]
     pub fn set_thorough(&mut self, is_thorough: bool) {
         self.inner.is_thorough = is_thorough;
@@ -396,7 +400,7 @@ impl<'m, I: Index> Plotter<'m, I> {
             Received::Line(line, label) => {
                 let outcome = match self.inner.carry_out(line, board) {
                     Ok(Next::Plot) => self.inner.plot(board, DrawnJob::Model),
-                    Ok(Next::Again) => self.inner.plot(board, DrawnJob::Kept),
+                    Ok(Next::Again) => self.inner.plot(board, DrawnJob::LastJob),
                     #[cfg(feature = "resume")]
                     Ok(Next::Resume { at_origin }) => {
                         self.inner.plot(board, DrawnJob::Stopped { at_origin })
@@ -654,8 +658,8 @@ impl<I: Index> Inner<'_, I> {
                 #[cfg(not(feature = "stream"))]
                 let may_run = false;
                 let state = self.machine.state();
-                let stands = matches!(state, State::Hold { stopped: true });
-                if !may_run && !stands && !matches!(state, State::Check | State::Jog) {
+                let has_stopped = matches!(state, State::Hold { stopped: true });
+                if !may_run && !has_stopped && !matches!(state, State::Check | State::Jog) {
                     self.check_idle()?;
                 }
                 self.task = Some(Task::List(Listing::Settings, 0));
@@ -746,12 +750,12 @@ impl<I: Index> Inner<'_, I> {
         let steps = self.machine.settings().page_steps();
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
         let observer = &mut Unobserved;
-        let pace = crate::order::Pace::default();
+        let time_model = crate::order::TimeModel::default();
         let pipeline = job::Pipeline {
             model,
             options,
             steps,
-            pace,
+            time_model,
             #[cfg(feature = "early-ink")]
             early: None,
             words,

@@ -9,7 +9,7 @@ use super::reply::Reply;
 use super::{Board, Cursor, Inner, Job, Observer, records};
 use crate::index::Index;
 use crate::machine::State;
-use crate::order::Pace;
+use crate::order::TimeModel;
 use crate::protocol::{CommandError, RealTime};
 use crate::stage::{Aborted, Cancel};
 #[cfg(all(feature = "early-ink", feature = "stream", feature = "resume"))]
@@ -21,7 +21,7 @@ pub(super) enum Drawing {
     /// The job that is computed from the model (`$plot`).
     Model,
     /// The job that was kept last, from its beginning (`$again`).
-    Kept,
+    LastJob,
     /// The rest of the job that has stopped (`$resume`).
     #[cfg(feature = "resume")]
     Stopped {
@@ -76,7 +76,7 @@ impl<I: Index> Inner<'_, I> {
                 }
                 Ok(())
             }),
-            Drawing::Kept => self.load(listener.board).and_then(|()| {
+            Drawing::LastJob => self.load(listener.board).and_then(|()| {
                 #[cfg(feature = "early-ink")]
                 self.complete_order(&mut listener)?;
                 self.begin(&mut listener)?;
@@ -233,7 +233,7 @@ impl<I: Index> Inner<'_, I> {
         observer: &'p mut dyn Observer<I>,
     ) -> Pipeline<'p, I> {
         let steps = self.machine.settings().page_steps();
-        let pace = self.machine.settings().pace(self.units_per_second());
+        let time_model = self.machine.settings().time_model(self.units_per_second());
         #[cfg(feature = "early-ink")]
         let early = self.early();
         let (model, options, words) = (&self.model, &self.options, &mut *self.words);
@@ -241,7 +241,7 @@ impl<I: Index> Inner<'_, I> {
             model,
             options,
             steps,
-            pace,
+            time_model,
             #[cfg(feature = "early-ink")]
             early,
             words,
@@ -253,12 +253,12 @@ impl<I: Index> Inner<'_, I> {
     /// The units of work that count as one second when the order is improved.
     #[cfg(any(test, feature = "host"))]
     pub(super) fn units_per_second(&self) -> u32 {
-        if self.is_thorough { Pace::COMPUTER } else { Pace::BOARD }
+        if self.is_thorough { TimeModel::COMPUTER } else { TimeModel::BOARD }
     }
 
     /// The units of work that count as one second when the order is improved.
     #[cfg(not(any(test, feature = "host")))]
     pub(super) fn units_per_second(&self) -> u32 {
-        Pace::BOARD
+        TimeModel::BOARD
     }
 }

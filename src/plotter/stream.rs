@@ -351,7 +351,7 @@ impl<I: Index> Inner<'_, I> {
             Order::Pause { for_pen } if waits => self.task = Some(Task::Pause { for_pen }),
             Order::Dwell(_) | Order::Pause { .. } => {}
             Order::SetSystem(index, origin) => self.set_system(index, origin, waits),
-            Order::Keep(kept, position) => self.keep_position(kept, position, waits)?,
+            Order::StorePosition(kept, position) => self.keep_position(kept, position, waits)?,
             Order::Position => self.report_position(board),
         }
         self.note_shift(&program);

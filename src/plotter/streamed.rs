@@ -9,7 +9,7 @@ use super::reply::Reply;
 use super::{Board, Cursor, Inner, Job, Strokes};
 use crate::drawing::{LineType, PagePoint};
 use crate::index::Index;
-use crate::machine::{Late, State, Target};
+use crate::machine::{PendingTarget, State, Target};
 use crate::protocol::{CommandError, MOST_TARGETS, StreamHeader, StreamedTarget, StreamedTargets};
 
 /// The number of bits of a coordinate, which is at most [`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT).
@@ -103,13 +103,13 @@ impl<I: Index> Strokes<'_, I> {
 
     /// Whether the next target has not come yet, or not all of its stroke.
     #[inline(never)] // As above.
-    pub(super) fn lateness(&self) -> Option<Late> {
+    pub(super) fn lateness(&self) -> Option<PendingTarget> {
         let (streamed, read) = (self.streamed?, self.cursor.leg);
         if read < streamed.released as usize || read >= streamed.header.targets as usize {
             return None;
         }
         let last = read.checked_sub(1).and_then(|last| unpacked(self.ring, last));
-        Some(Late { within_stroke: last.is_some_and(|last| last.target.ink.is_some()) })
+        Some(PendingTarget { within_stroke: last.is_some_and(|last| last.target.ink.is_some()) })
     }
 }
 

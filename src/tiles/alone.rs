@@ -27,7 +27,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             cancel.check()?;
             let Some(outline) = outline.filter(Outline::has_extent) else { continue };
             let mut outcome = Ok(());
-            outline.each_side(&self.sight, &self.survey, &mut |number, ends| {
+            outline.each_side(&self.parameters, &self.survey, &mut |number, ends| {
                 let side = Rectangle::around(ends[0], ends[1]);
                 if outcome.is_ok() && tile.holds(side.low) && !side.is_within(limit) {
                     let side = (outline.first(), number);
@@ -49,12 +49,12 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         cancel: &mut dyn Cancel,
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
-        let reach = Reach::Segment(ends, self.doubt());
+        let reach = Reach::Segment(ends, self.error_bound());
         let loaded = self.load(reach, None, &mut scratch, cancel)?;
         let Some(here) = loaded.find(first) else { return Ok(()) };
         let Some(pair) = loaded.side(here, number) else { return Ok(()) };
         // All elements with this edge are loaded.
-        if !loaded.is_first_side(here + number, pair) || loaded.is_cut(pair, self.sight.near) {
+        if !loaded.is_first_side(here + number, pair) || loaded.is_cut(pair, self.parameters.near) {
             return Ok(());
         }
         self.search(&loaded, &mut OneEdge(pair), false, scratch, cancel, sink)
@@ -73,7 +73,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let limit = tile.extent();
         let large = |outline: Option<Outline<'t, S>>| {
             let outline = outline?;
-            let bounds = outline.bounds(&self.sight, &self.survey)?;
+            let bounds = outline.bounds(&self.parameters, &self.survey)?;
             let is_large = no_small_faces || !bounds.is_within(limit);
             (!outline.is_bar() && is_large && bounds.meets(tile) && outline.has_extent())
                 .then(|| (outline.first(), bounds))
@@ -103,10 +103,10 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> Result<(), VisibilityError> {
         for number in 0.. {
             let Some(ends) = self.seam(firsts, number, scratch.reborrow(), cancel)? else { break };
-            let ends = ends.map_each(|end| self.survey.point(self.sight.projection, end));
+            let ends = ends.map_each(|end| self.survey.point(self.parameters.projection, end));
             let mut scratch = scratch.reborrow();
             let loaded =
-                self.load(Reach::Segment(ends, self.doubt()), None, &mut scratch, cancel)?;
+                self.load(Reach::Segment(ends, self.error_bound()), None, &mut scratch, cancel)?;
             let [Some(one), Some(other)] = firsts.map_each(|first| loaded.find(first)) else {
                 continue;
             };

@@ -2,7 +2,7 @@
 
 use super::outline::Outline;
 use super::page::{GridPoint, Rectangle, Survey};
-use super::{ModelSource, Sight};
+use super::{ModelSource, ViewParameters};
 use crate::stage::{Cancel, Scratch, items};
 use crate::visibility::VisibilityError;
 use bytemuck::{Pod, Zeroable};
@@ -85,7 +85,7 @@ impl<'t> Blocks<'t> {
     /// [`VisibilityError::Scratch`] or [`VisibilityError::Aborted`].
     pub fn new<S: ModelSource>(
         source: &S,
-        sight: &Sight,
+        parameters: &ViewParameters,
         survey: &Survey,
         scratch: &mut Scratch<'t>,
         cancel: &mut dyn Cancel,
@@ -102,7 +102,7 @@ impl<'t> Blocks<'t> {
                 cancel.check()?;
                 let outline = Outline::at(source, first);
                 first = outline.end();
-                let Some(bounds) = outline.bounds(sight, survey) else { continue };
+                let Some(bounds) = outline.bounds(parameters, survey) else { continue };
                 all = all.union(bounds);
                 for (most, here) in extent.iter_mut().zip(bounds.extent()) {
                     *most = here.max(*most);

@@ -141,7 +141,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         scratch: &mut Scratch<'a>,
         cancel: &mut dyn Cancel,
     ) -> Result<Loaded<'a>, VisibilityError> {
-        let (source, sight) = (self.source, &self.sight);
+        let (source, parameters) = (self.source, &self.parameters);
         let (mut corner_count, mut changes, mut pen) = (0, 0, 0);
         let window = self.survey.window(reach.bounds());
         let firsts: &[u32] = scratch.take_filled(|room| {
@@ -154,11 +154,11 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
                 let is_reached = match reach {
                     Reach::Rectangle(near) => {
                         yield_counter.spend(LOOK)?;
-                        outline.meets(sight, &self.survey, near, &window)
+                        outline.meets(parameters, &self.survey, near, &window)
                     }
                     _ => {
                         yield_counter.spend(PLACE)?;
-                        let bounds = outline.bounds(sight, &self.survey);
+                        let bounds = outline.bounds(parameters, &self.survey);
                         bounds.is_some_and(|bounds| reach.includes(first, bounds))
                     }
                 };
@@ -238,7 +238,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             *slot = source.vertex(number);
         }
         let mut vertices: &'a [Vertex] = seen;
-        if let Some(near) = sight.near
+        if let Some(near) = parameters.near
             && vertices.iter().any(|vertex| vertex.z < near)
         {
             (vertices, elements) = cut(vertices, elements, near, scratch)?;
@@ -246,7 +246,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let points: &mut [GridPoint] = scratch.take(vertices.len())?;
         for (slot, &vertex) in points.iter_mut().zip(vertices) {
             yield_counter.spend(PLACE / 3)?;
-            *slot = self.survey.point(sight.projection, vertex);
+            *slot = self.survey.point(parameters.projection, vertex);
         }
         Ok(Loaded { firsts, numbers, positions, vertices, elements, points })
     }
@@ -267,13 +267,13 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
         let Loaded { vertices, elements, positions, numbers, .. } = *loaded;
-        let sight = &self.sight;
+        let parameters = &self.parameters;
         let unrounded = Unrounded::new(
             bytemuck::cast_slice(positions),
-            sight.precision,
-            sight.error_bound.max(1),
+            parameters.precision,
+            parameters.error_bound.max(1),
         );
-        let scene = Scene { vertices, elements, projection: sight.projection, unrounded };
+        let scene = Scene { vertices, elements, projection: parameters.projection, unrounded };
         if is_fast {
             let available = scratch.available_bytes();
             let needed = WANTED_TIMES * scratch_bytes(&scene);

@@ -76,7 +76,7 @@ pub trait ModelSource {
 
 /// How the model is seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Sight {
+pub struct ViewParameters {
     /// Whether the view is perspective or parallel.
     pub projection: Projection,
     /// The least depth that is drawn; what is nearer is cut off.
@@ -110,7 +110,7 @@ pub struct Tiles<'t, S> {
     /// The model.
     source: &'t S,
     /// How it is seen.
-    sight: Sight,
+    parameters: ViewParameters,
     /// Which kinds of stretches the user wants to see.
     options: Options,
     /// What is known of all elements.
@@ -174,14 +174,14 @@ impl PausedTiles {
 /// See [`VisibilityError`]. By then the sink may already have received some of the stretches.
 pub fn find_stretches<S: ModelSource, N: Index>(
     source: &S,
-    sight: Sight,
+    parameters: ViewParameters,
     options: Options,
     scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
     sink: &mut dyn StretchSink<N>,
 ) -> Result<Option<Survey>, VisibilityError> {
     let mut scratch = scratch; // It lives no longer than the source.
-    let Some(mut tiles) = Tiles::new(source, sight, options, &mut scratch, cancel)? else {
+    let Some(mut tiles) = Tiles::new(source, parameters, options, &mut scratch, cancel)? else {
         return Ok(None);
     };
     while tiles.follow_next(scratch.reborrow(), cancel, sink)? {}
@@ -204,15 +204,23 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     /// [`VisibilityError::Scratch`] or [`VisibilityError::Aborted`].
     pub fn new(
         source: &'t S,
-        sight: Sight,
+        parameters: ViewParameters,
         options: Options,
         scratch: &mut Scratch<'t>,
         cancel: &mut dyn Cancel,
     ) -> Result<Option<Self>, VisibilityError> {
-        let Some(survey) = Survey::new(source, &sight, cancel)? else { return Ok(None) };
-        let blocks = Blocks::new(source, &sight, &survey, scratch, cancel)?;
+        let Some(survey) = Survey::new(source, &parameters, cancel)? else { return Ok(None) };
+        let blocks = Blocks::new(source, &parameters, &survey, scratch, cancel)?;
         let region = Region::new(scratch)?;
-        Ok(Some(Self { source, sight, options, survey, blocks, region, next: Some(Tile::FIRST) }))
+        Ok(Some(Self {
+            source,
+            parameters,
+            options,
+            survey,
+            blocks,
+            region,
+            next: Some(Tile::FIRST),
+        }))
     }
 
     /// Ends for now, so that the memory can be used for other things. The index, which lies at the
@@ -226,7 +234,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     /// to [`Tiles::new`], or the front of it. Returns `None` if it is shorter than the index.
     pub fn go_on(
         source: &'t S,
-        sight: Sight,
+        parameters: ViewParameters,
         options: Options,
         paused: PausedTiles,
         index: &'t mut [u64],
@@ -235,7 +243,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         let (of_blocks, of_region) = index.split_at_mut_checked(blocks.words())?;
         let blocks = Blocks::go_on(blocks, of_blocks)?;
         let region = Region::go_on(region, of_region)?;
-        Some(Self { source, sight, options, survey, blocks, region, next })
+        Some(Self { source, parameters, options, survey, blocks, region, next })
     }
 
     /// Calls `visit` with each point of each element that has an extent and is seen.
@@ -253,9 +261,9 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             yield_counter.spend(PLACE)?;
             let outline = Outline::at(self.source, first);
             first = outline.end();
-            let is_seen = outline.bounds(&self.sight, &self.survey).is_some();
+            let is_seen = outline.bounds(&self.parameters, &self.survey).is_some();
             if is_seen && outline.has_extent() {
-                outline.each_point(self.sight.near, visit);
+                outline.each_point(self.parameters.near, visit);
             }
         }
         Ok(())
@@ -352,14 +360,14 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     }
 
     /// Returns how far on the grid a face may lie beside a seam or an edge that it touches.
-    fn doubt(&self) -> u16 {
+    fn error_bound(&self) -> u16 {
         // The ends of a seam are rounded. In a parallel view they stay within both faces.
         let is_rounded =
-            self.options.with_seams && self.sight.projection == Projection::Perspective;
-        let of_seams = if is_rounded { self.survey.doubt(1) } else { 0 };
+            self.options.with_seams && self.parameters.projection == Projection::Perspective;
+        let of_seams = if is_rounded { self.survey.error_bound(1) } else { 0 };
         // A block touches another if it does so within the error of both.
         let of_blocks = if self.options.merged_blocks {
-            self.survey.doubt(self.sight.error_bound.saturating_mul(2))
+            self.survey.error_bound(self.parameters.error_bound.saturating_mul(2))
         } else {
             0
         };
@@ -384,7 +392,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             return Ok(false);
         }
         let limit = rectangle.extent();
-        let no_small_faces = limit.iter().any(|&part| part < self.doubt());
+        let no_small_faces = limit.iter().any(|&part| part < self.error_bound());
         // Most edges that begin in the tile end not far beside it.
         let margin = limit.iter().min().map_or(0, |limit| limit / 4);
         self.move_region(tile, cancel)?;
@@ -400,9 +408,9 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         }
         let mut batch = |reach: Rectangle, limit: Option<[u16; 2]>| {
             let mut scratch = scratch.reborrow();
-            let reach = Reach::Rectangle(reach.grown(self.doubt()));
+            let reach = Reach::Rectangle(reach.grown(self.error_bound()));
             let loaded = &self.load(reach, listed, &mut scratch, cancel)?;
-            let near = self.sight.near;
+            let near = self.parameters.near;
             let mut owner = OfTile { tile: rectangle, limit, no_small_faces, loaded, near };
             self.search(loaded, &mut owner, can_divide, scratch, cancel, sink)
         };

@@ -78,12 +78,12 @@ impl<S: ModelSource> Tiles<'_, S> {
         for outline in self.outlines(tile, listed) {
             yield_counter.spend(LOOK)?;
             let Some(outline) = outline else { continue };
-            if !outline.meets(&self.sight, &self.survey, tile, &window) {
+            if !outline.meets(&self.parameters, &self.survey, tile, &window) {
                 continue;
             }
             yield_counter.spend(PLACE)?;
             let mut around = none;
-            outline.each_side(&self.sight, &self.survey, &mut |_, [a, b]| {
+            outline.each_side(&self.parameters, &self.survey, &mut |_, [a, b]| {
                 let side = Rectangle::around(a, b);
                 around = around.union(side);
                 if !tile.holds(side.low) {

@@ -2,7 +2,7 @@
 //! along the near plane.
 
 use super::ModelSource;
-use super::Sight;
+use super::ViewParameters;
 use super::page::{GridPoint, Rectangle, Survey, Window};
 use crate::geometry::Vertex;
 use crate::model::Corner;
@@ -90,17 +90,17 @@ impl<'s, S: ModelSource> Outline<'s, S> {
     /// Whether the rectangle around the outline may meet a window. The first vertex decides if it
     /// lies beyond `around`, in which each outline begins that meets the window. It takes a third
     /// of the time that [`Outline::bounds`] takes, as no division is needed.
-    pub fn may_meet(&self, sight: &Sight, window: &Window, around: &Window) -> bool {
+    pub fn may_meet(&self, parameters: &ViewParameters, window: &Window, around: &Window) -> bool {
         let mut beyond = u32::MAX;
         for corner in self.first..self.end {
             let vertex = self.vertex(corner);
-            if sight.near.is_some_and(|near| vertex.z < near) {
+            if parameters.near.is_some_and(|near| vertex.z < near) {
                 return true;
             }
-            if corner == self.first && around.outcode(sight.projection, vertex) != 0 {
+            if corner == self.first && around.outcode(parameters.projection, vertex) != 0 {
                 return false;
             }
-            beyond &= window.outcode(sight.projection, vertex);
+            beyond &= window.outcode(parameters.projection, vertex);
             if beyond == 0 {
                 return true;
             }
@@ -110,25 +110,31 @@ impl<'s, S: ModelSource> Outline<'s, S> {
 
     /// Whether the rectangle around the outline meets another, which `window` stands for.
     #[inline(never)] // One copy of the code is enough: it is long.
-    pub fn meets(&self, sight: &Sight, survey: &Survey, other: Rectangle, window: &Window) -> bool {
+    pub fn meets(
+        &self,
+        parameters: &ViewParameters,
+        survey: &Survey,
+        other: Rectangle,
+        window: &Window,
+    ) -> bool {
         let mut beyond = u32::MAX;
         for corner in self.first..self.end {
             let vertex = self.vertex(corner);
-            if sight.near.is_some_and(|near| vertex.z < near) {
+            if parameters.near.is_some_and(|near| vertex.z < near) {
                 // What the near plane leaves of it must be known.
-                return self.bounds(sight, survey).is_some_and(|bounds| bounds.meets(other));
+                return self.bounds(parameters, survey).is_some_and(|bounds| bounds.meets(other));
             }
-            beyond &= window.outcode(sight.projection, vertex);
+            beyond &= window.outcode(parameters.projection, vertex);
         }
         beyond == 0
     }
 
     /// Returns the rectangle around the outline on the page, `None` if nothing of it is seen.
     #[inline(never)] // One copy of the code is enough: it is long.
-    pub fn bounds(&self, sight: &Sight, survey: &Survey) -> Option<Rectangle> {
+    pub fn bounds(&self, parameters: &ViewParameters, survey: &Survey) -> Option<Rectangle> {
         let (mut bounds, mut count) = (Rectangle::NONE, 0);
-        self.each_point(sight.near, &mut |vertex| {
-            bounds = bounds.with(survey.point(sight.projection, vertex));
+        self.each_point(parameters.near, &mut |vertex| {
+            bounds = bounds.with(survey.point(parameters.projection, vertex));
             count += 1;
         });
         (count >= if self.is_bar() { 2 } else { 3 }).then_some(bounds)
@@ -137,14 +143,14 @@ impl<'s, S: ModelSource> Outline<'s, S> {
     /// Calls `visit` with each side of the outline on the page: its number, from 0, and its ends.
     pub fn each_side(
         &self,
-        sight: &Sight,
+        parameters: &ViewParameters,
         survey: &Survey,
         visit: &mut dyn FnMut(usize, [GridPoint; 2]),
     ) {
         let mut ends: Option<[GridPoint; 2]> = None;
         let mut count = 0;
-        self.each_point(sight.near, &mut |vertex| {
-            let point = survey.point(sight.projection, vertex);
+        self.each_point(parameters.near, &mut |vertex| {
+            let point = survey.point(parameters.projection, vertex);
             if let Some([_, last]) = ends {
                 visit(count - 1, [last, point]);
             }

@@ -58,7 +58,7 @@ impl<'t, S: ModelSource> Iterator for Outlines<'_, 't, S> {
 
     #[inline(never)] // All that go through the elements share one copy of the code.
     fn next(&mut self) -> Option<Self::Item> {
-        let Tiles { source, sight, survey, blocks, region, .. } = self.tiles;
+        let Tiles { source, parameters, survey, blocks, region, .. } = self.tiles;
         let (outline, extent) = match &mut self.origin {
             Origin::List(firsts) => {
                 return Some(Some(Outline::at(*source, *firsts.next()? as usize)));
@@ -73,6 +73,6 @@ impl<'t, S: ModelSource> Iterator for Outlines<'_, 't, S> {
         if self.extent != extent {
             (self.around, self.extent) = (survey.window_around(self.near, extent), extent);
         }
-        Some(outline.may_meet(sight, &self.window, &self.around).then_some(outline))
+        Some(outline.may_meet(parameters, &self.window, &self.around).then_some(outline))
     }
 }

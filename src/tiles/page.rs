@@ -4,7 +4,7 @@
 //! here, too. The converse need not hold: more faces are loaded than is necessary, never fewer.
 
 use super::outline::Outline;
-use super::{ModelSource, Sight};
+use super::{ModelSource, ViewParameters};
 use crate::geometry::{Projection, Vertex};
 use crate::stage::{Aborted, Cancel};
 use crate::visibility::page_position;
@@ -136,7 +136,7 @@ pub struct Survey {
     shift: [u32; 2],
     /// How far a point may lie beside its place on the grid for each half unit by which its view
     /// coordinates may be off.
-    doubt: u64,
+    error_bound: u64,
     /// The number of faces that are left out because they have no area.
     pub degenerate_faces: u32,
 }
@@ -145,7 +145,7 @@ impl Survey {
     /// Goes through all elements. Returns `None` if nothing is in front of the near plane.
     pub(super) fn new<S: ModelSource>(
         source: &S,
-        sight: &Sight,
+        parameters: &ViewParameters,
         cancel: &mut dyn Cancel,
     ) -> Result<Option<Self>, Aborted> {
         let (mut low, mut high) = ([i64::MAX; 2], [i64::MIN; 2]);
@@ -156,8 +156,8 @@ impl Survey {
             cancel.check()?;
             let outline = Outline::at(source, first);
             if outline.has_extent() {
-                outline.each_point(sight.near, &mut |vertex: Vertex| {
-                    let at = page_position(sight.projection, vertex);
+                outline.each_point(parameters.near, &mut |vertex: Vertex| {
+                    let at = page_position(parameters.projection, vertex);
                     for axis in [0, 1] {
                         low[axis] = low[axis].min(at[axis]);
                         high[axis] = high[axis].max(at[axis]);
@@ -178,7 +178,7 @@ impl Survey {
         });
         // Half a unit, in units of 2^-20. In perspective both x / z and its z change.
         let half = 1u64 << 19;
-        let doubt = match sight.projection {
+        let error_bound = match parameters.projection {
             Projection::Parallel => half,
             Projection::Perspective => {
                 let parts = low.iter().chain(&high);
@@ -186,8 +186,8 @@ impl Survey {
                 (half + (farthest >> 1)) / nearest.max(1) as u64 + 1
             }
         };
-        let doubt = (doubt >> shift[0].min(shift[1])) + 1;
-        Ok(Some(Self { low, shift, doubt, degenerate_faces }))
+        let error_bound = (error_bound >> shift[0].min(shift[1])) + 1;
+        Ok(Some(Self { low, shift, error_bound, degenerate_faces }))
     }
 
     /// Returns the place of a vertex. One beyond the grid gets the nearest point on its border.
@@ -219,8 +219,8 @@ impl Survey {
 
     /// Returns how far on the grid a point may be off whose view coordinates may be off by so many
     /// halves of a unit.
-    pub(super) fn doubt(&self, halves: u32) -> u16 {
-        self.doubt.saturating_mul(halves.into()).min(u16::MAX.into()) as u16
+    pub(super) fn error_bound(&self, halves: u32) -> u16 {
+        self.error_bound.saturating_mul(halves.into()).min(u16::MAX.into()) as u16
     }
 }
 

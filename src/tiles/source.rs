@@ -1,6 +1,6 @@
 //! A model in memory or in flash, as the tiles read it.
 
-use super::{ModelSource, Sight};
+use super::{ModelSource, ViewParameters};
 use crate::geometry::{Precision, Vertex};
 use crate::index::Index;
 use crate::model::{Corner, Elements, Model, Position, StoredModel};
@@ -24,12 +24,12 @@ impl<'m, I: Index> Projected<'m, I> {
     }
 
     /// Returns how the model is seen if its positions have this precision.
-    pub fn sight(&self, precision: Precision) -> Sight {
-        Sight::new(self.view, precision)
+    pub fn parameters(&self, precision: Precision) -> ViewParameters {
+        ViewParameters::new(self.view, precision)
     }
 }
 
-impl Sight {
+impl ViewParameters {
     /// Returns how a view shows a model whose positions have this precision.
     pub fn new(view: &View, precision: Precision) -> Self {
         Self {

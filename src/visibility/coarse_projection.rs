@@ -192,7 +192,7 @@ impl Mapping {
 
     /// Returns how far a point may lie beside its true place on the coarse grid if its view
     /// coordinates are off by so many units.
-    fn doubt(&self, units: u32) -> i32 {
+    fn error_bound(&self, units: u32) -> i32 {
         // The unit is below 2^41.
         let fine = self.unit * i64::from(units.min(1 << 20));
         (fine >> self.shift.0.min(self.shift.1)).min(1 << COARSE_BITS) as i32 + 1
@@ -376,8 +376,8 @@ impl<'a> CoarseProjection<'a> {
 
     /// Returns how far on the coarse grid a face may lie beside an edge that it touches in the
     /// model: by the errors of both.
-    pub fn doubt(&self) -> i32 {
-        self.mapping.doubt(self.unrounded.error_bound())
+    pub fn error_bound(&self) -> i32 {
+        self.mapping.error_bound(self.unrounded.error_bound())
     }
 
     /// Returns an axis of the page along which p and q differ, and the sign of their difference.

@@ -340,7 +340,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let Self { around, grid, marks: Marks { seen, profile, .. }, options, .. } = self;
         let faces_by_rank = &around.faces;
         let near = coarse_depth(edge_query.near);
-        let margin = if options.merged_blocks { around.coarse_projection.doubt() } else { 0 };
+        let margin = if options.merged_blocks { around.coarse_projection.error_bound() } else { 0 };
         let cells_along =
             grid.cells_along(edge_query.p.position, edge_query.q.position, near, margin);
         let (mut any_covered, mut all_covered) = (false, true);

@@ -22,7 +22,7 @@ const ROW: usize = 1000;
 const BYTES_A_POINT: usize = 200;
 
 /// By how many bytes the memory of the program differs from one start to the next.
-const SLACK: usize = 1_000_000;
+const TOLERANCE: usize = 1_000_000;
 
 /// How many points are sent, and how many points a polyline has, when the environment does not say
 /// it.
@@ -108,5 +108,5 @@ fn a_drawing_larger_than_the_board_takes_little_memory_for_each_point() {
     let most = memory_for(points, stroke);
     let each = most.saturating_sub(least) as f64 / points as f64;
     println!("{points} points: {most} bytes at most, {each:.0} for each beside {least} for 10");
-    assert!(most <= least + BYTES_A_POINT * points + SLACK, "{each:.0} bytes a point");
+    assert!(most <= least + BYTES_A_POINT * points + TOLERANCE, "{each:.0} bytes a point");
 }

@@ -2,7 +2,7 @@
 
 use crate::program::{Program, file};
 use crate::{by_turns, milliseconds};
-use penup::order::{Effort, Options, Pace};
+use penup::order::{Effort, Options, TimeModel};
 use penup_host_tests::order_drawings::{KINDS, Strokes};
 use std::error::Error;
 use std::path::Path;
@@ -16,7 +16,11 @@ const EFFORTS: [(&str, Effort, &str); 2] = [
     ("`$effort=0`", Effort::Units(0), "linesort"),
     (
         "`--compute host`",
-        Effort::Auto(Pace { speed: 8000, acceleration: 64_000, units_per_second: Pace::COMPUTER }),
+        Effort::Auto(TimeModel {
+            speed: 8000,
+            acceleration: 64_000,
+            units_per_second: TimeModel::COMPUTER,
+        }),
         "linesort --two-opt",
     ),
 ];

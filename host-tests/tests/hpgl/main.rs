@@ -104,7 +104,7 @@ fn files() -> [(&'static str, Vec<u8>); 4] {
 
 /// How far the client's plan may be from the true figure, in steps: the chords of its arcs are up
 /// to 0.2 plotter units off, which are 0.4 steps.
-fn slack(name: &str) -> f64 {
+fn tolerance(name: &str) -> f64 {
     if name == "chiplotle" { 0.4 } else { 0.0 }
 }
 
@@ -115,7 +115,12 @@ fn the_ink_of_files_is_the_plan_of_the_clients_reader() {
         let mut bench = Bench::small();
         let heard = draw(&mut bench, &bytes);
         assert!(!heard.contains("ok") && !heard.contains("error"), "{name}: {heard}");
-        assert_same_ink(name, &inked(&bench), &plan(&bytes).expect("a valid file"), slack(name));
+        assert_same_ink(
+            name,
+            &inked(&bench),
+            &plan(&bytes).expect("a valid file"),
+            tolerance(name),
+        );
     }
 }
 

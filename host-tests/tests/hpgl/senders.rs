@@ -1,7 +1,7 @@
 //! Senders that wait for the plotter, with a slow main loop.
 
 use super::ink::{assert_same_ink, inked, plan};
-use super::{chiplotle, gnuplot, slack, vpype};
+use super::{chiplotle, gnuplot, tolerance, vpype};
 use penup::machine::State;
 use penup::plotter::Board;
 use penup_host_tests::whole_jobs::Bench;
@@ -104,7 +104,7 @@ fn a_sender_that_asks_for_room_loses_nothing() {
             name,
             &inked(&port.bench),
             &plan(&file).expect("a valid file"),
-            slack(name),
+            tolerance(name),
         );
     }
 }
@@ -137,7 +137,7 @@ fn a_sender_that_obeys_xon_and_xoff_loses_nothing() {
             name,
             &inked(&port.bench),
             &plan(&file).expect("a valid file"),
-            slack(name),
+            tolerance(name),
         );
     }
 }

@@ -52,8 +52,8 @@ pub fn with(values: &[(Setting, f64)]) -> Settings {
 
 /// The settings of a machine with 23 and 15 steps of backlash, or without any.
 pub fn with_backlash(loose: bool) -> Settings {
-    let slack = f64::from(u8::from(loose));
-    with(&[(Setting::BacklashX, 0.3 * slack), (Setting::BacklashY, 0.2 * slack)])
+    let backlash = f64::from(u8::from(loose));
+    with(&[(Setting::BacklashX, 0.3 * backlash), (Setting::BacklashY, 0.2 * backlash)])
 }
 
 /// The settings of a machine whose pen is lifted by a motor, or by a servo.

@@ -5,7 +5,7 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
-mod backlash_on_the_way;
+mod spread_backlash;
 mod commands;
 mod disturbed;
 mod fixtures;

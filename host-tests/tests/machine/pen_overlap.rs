@@ -82,7 +82,7 @@ fn long_travels_leave_20_ms_at_rest_and_a_text_is_faster() {
         println!("{jerk} m/s3: from pulse to pulse {:.1?} ms", after.stood);
         assert_eq!(after.stood.len(), 8);
         assert!(after.stood.iter().all(|&stands| stands <= most), "{jerk}: {:?}", after.stood);
-        // Both dwells of every travel but the first pass on the way.
+        // Both dwells of every travel but the first pass on the displacement.
         let saved = milliseconds(&before) - milliseconds(&after);
         assert!(saved >= 7.0 * (300.0 - 2.0 * most), "{jerk}: {saved} ms");
     }
@@ -103,12 +103,12 @@ fn long_travels_leave_20_ms_at_rest_and_a_text_is_faster() {
 /// For how many milliseconds the machine of the default settings is within half a diagonal step of
 /// where it rests, before or behind it, with a limit on jerk in m/s³.
 fn half_step(jerk: f64) -> f64 {
-    let way = 0.01 * std::f64::consts::SQRT_2 / 2.0;
+    let displacement = 0.01 * std::f64::consts::SQRT_2 / 2.0;
     // Braking is reckoned with 16/18 of the jerk.
     let seconds = if jerk == 0.0 {
-        (2.0 * way / 800.0).sqrt()
+        (2.0 * displacement / 800.0).sqrt()
     } else {
-        (6.0 * way / (jerk * 1000.0 * 16.0 / 18.0)).cbrt()
+        (6.0 * displacement / (jerk * 1000.0 * 16.0 / 18.0)).cbrt()
     };
     seconds * 1000.0
 }
@@ -128,7 +128,7 @@ fn a_pen_stands_still_on_the_paper_while_the_machine_brakes_and_starts_half_a_st
                 for early in [0.0, 150.0] {
                     let strokes = strokes(early, contact);
                     println!(
-                        "{name}, {jerk} m/s3, on the paper for {contact} of its way, overlap \
+                        "{name}, {jerk} m/s3, on the paper for {contact} of its displacement, overlap \
                          {early} ms: begin {:.1}, corners {:.1}, end {:.1}, all {:.1} ms, at most \
                          {:.0} steps of travels",
                         greatest(&strokes, |stroke| stroke.begin),
@@ -155,8 +155,8 @@ fn a_pen_stands_still_on_the_paper_while_the_machine_brakes_and_starts_half_a_st
             if jerk != 20.0 {
                 assert!(greatest(&even, Standstill::sum) < 15.0, "{name} {jerk}");
             }
-            // One that is on it for a tenth of its way stands for that tenth, too, where it is not
-            // told early enough.
+            // One that is on it for a tenth of its displacement stands for that tenth, too, where
+            // it is not told early enough.
             let tenth = greatest(&strokes(150.0, 0.1), Standstill::sum);
             let both = if jerk == 0.0 { 15.0 } else { 30.0 };
             assert!(tenth < 4.0 * half + 0.5 + both, "{name} {jerk}: {tenth}");
@@ -193,7 +193,7 @@ fn gaps_ramps_polargraphs_and_chains_of_travels_keep_their_ink() {
 }
 
 #[test]
-fn slack_is_taken_up_before_the_pen_is_lowered() {
+fn backlash_is_taken_up_before_the_pen_is_lowered() {
     let plain = with_backlash(true);
     let travels = text().iter().filter(|target| target.ink.is_none()).count();
     for settings in [overlapping(plain, 0.0, 1.0), overlapping(plain, 150.0, 150.0)] {
@@ -261,9 +261,9 @@ fn a_travel_that_becomes_faster_does_not_stand_on_the_way() {
     for (x, ink) in [(1000, true), (1600, false), (3000, true)] {
         let (motors, from) = (PagePoint { x, y: 0 }, runner.end());
         let length = runner.limits().length(x - from.x, 0).expect("short");
-        let way = (x - from.x, 0);
-        let (offsets, page, whole, is_gap) = ([0; 2], motors, length, false);
-        let piece = Move { motors, offsets, page, way, whole, length, is_gap };
+        let displacement = (x - from.x, 0);
+        let (offsets, page, whole_length, is_gap) = ([0; 2], motors, length, false);
+        let piece = Move { motors, offsets, page, displacement, whole_length, length, is_gap };
         runner.push(&piece, ink.then_some(LineType::Full), PathLength::MAX).expect("room");
     }
     let mut events = Recorder(Vec::new());

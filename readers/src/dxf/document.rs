@@ -23,7 +23,7 @@ pub(super) struct Entity<'a> {
 }
 
 /// A reason for a refusal, and the line.
-pub(super) type Refusal = (usize, String);
+pub(super) type LineError = (usize, String);
 
 impl<'a> Entity<'a> {
     pub(super) fn text(&self, code: i32) -> Option<&'a str> {
@@ -36,24 +36,24 @@ impl<'a> Entity<'a> {
     }
 
     /// All numbers with this code.
-    pub(super) fn numbers(&self, code: i32) -> Result<Vec<f64>, Refusal> {
+    pub(super) fn numbers(&self, code: i32) -> Result<Vec<f64>, LineError> {
         self.pairs.iter().filter(|pair| pair.code == code).map(|pair| number(*pair)).collect()
     }
 
-    pub(super) fn number(&self, code: i32, default: f64) -> Result<f64, Refusal> {
+    pub(super) fn number(&self, code: i32, default: f64) -> Result<f64, LineError> {
         Ok(self.numbers(code)?.first().copied().unwrap_or(default))
     }
 
-    pub(super) fn point(&self, code: i32) -> Result<Point, Refusal> {
+    pub(super) fn point(&self, code: i32) -> Result<Point, LineError> {
         Ok([self.number(code, 0.0)?, self.number(code + 10, 0.0)?])
     }
 
-    pub(super) fn point_in_space(&self, code: i32) -> Result<[f64; 3], Refusal> {
+    pub(super) fn point_in_space(&self, code: i32) -> Result<[f64; 3], LineError> {
         let [x, y] = self.point(code)?;
         Ok([x, y, self.number(code + 20, 0.0)?])
     }
 
-    pub(super) fn points(&self, code: i32) -> Result<Vec<Point>, Refusal> {
+    pub(super) fn points(&self, code: i32) -> Result<Vec<Point>, LineError> {
         let (x, y) = (self.numbers(code)?, self.numbers(code + 10)?);
         if x.len() != y.len() {
             return Err((self.line, format!("{} has points without x or y", self.kind)));
@@ -61,7 +61,7 @@ impl<'a> Entity<'a> {
         Ok(x.into_iter().zip(y).map(|(x, y)| [x, y]).collect())
     }
 
-    pub(super) fn flags(&self) -> Result<i64, Refusal> {
+    pub(super) fn flags(&self) -> Result<i64, LineError> {
         Ok(self.number(70, 0.0)? as i64)
     }
 
@@ -70,7 +70,7 @@ impl<'a> Entity<'a> {
     }
 }
 
-pub(super) fn number(pair: Pair<'_>) -> Result<f64, Refusal> {
+pub(super) fn number(pair: Pair<'_>) -> Result<f64, LineError> {
     match pair.value.trim().parse::<f64>() {
         Ok(value) if value.is_finite() && value.abs() < 1e12 => Ok(value),
         _ => Err((pair.line, "this is no number that can be drawn".to_owned())),
@@ -130,7 +130,7 @@ impl<'a> Document<'a> {
     ///
     /// # Errors
     /// The scale of the entity is no number.
-    pub(super) fn dashes(&self, entity: &Entity<'a>, name: &str) -> Result<Vec<f64>, Refusal> {
+    pub(super) fn dashes(&self, entity: &Entity<'a>, name: &str) -> Result<Vec<f64>, LineError> {
         let scale = self.type_scale * entity.number(48, 1.0)?;
         let lengths = self.line_types.get(&name.to_uppercase());
         Ok(lengths.into_iter().flatten().map(|length| length * scale).collect())
@@ -138,7 +138,7 @@ impl<'a> Document<'a> {
 }
 
 /// The pairs of a file.
-pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, Refusal> {
+pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, LineError> {
     let mut lines = text.lines().enumerate();
     let mut pairs = Vec::new();
     while let Some((index, code)) = lines.next() {
@@ -174,7 +174,7 @@ pub(super) fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
     entities
 }
 
-pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> {
+pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, LineError> {
     let mut document = Document { type_scale: 1.0, ..Document::default() };
     let starts: Vec<usize> = (0..pairs.len())
         .filter(|&at| pairs[at].code == 0 && pairs[at].value == "SECTION")
@@ -263,7 +263,7 @@ pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, Refusal> 
 fn clip<'a>(
     filter: &Entity<'a>,
     objects: &[Entity<'a>],
-) -> Result<Option<(&'a str, Vec<Point>)>, Refusal> {
+) -> Result<Option<(&'a str, Vec<Point>)>, LineError> {
     let owner = |object: &Entity<'a>| object.text(330);
     let owner_of = |handle: &str| {
         owner(objects.iter().find(|object| object.text(5).is_some_and(|own| own == handle))?)
@@ -295,6 +295,6 @@ fn clip<'a>(
     Ok(Some((insertion, corners.into_iter().map(|point| map.apply(point)).collect())))
 }
 
-fn number_of(pair: Pair<'_>) -> Result<i64, Refusal> {
+fn number_of(pair: Pair<'_>) -> Result<i64, LineError> {
     Ok(number(pair)? as i64)
 }

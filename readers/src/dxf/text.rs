@@ -6,7 +6,7 @@
 //! letters are left out.
 
 use super::curves::Affine;
-use super::document::{Entity, Refusal};
+use super::document::{Entity, LineError};
 use super::space::Plane;
 use crate::plan::Point;
 use penup::drawing::Title;
@@ -86,7 +86,7 @@ impl Writing {
 }
 
 /// The letters of a `TEXT` or an `ATTRIB`; `None` if it has no height.
-pub(super) fn line(entity: &Entity<'_>) -> Result<Option<Writing>, Refusal> {
+pub(super) fn line(entity: &Entity<'_>) -> Result<Option<Writing>, LineError> {
     let height = entity.number(40, 0.0)?;
     let text = plain(entity.raw(1).unwrap_or_default());
     if height <= 0.0 || text.chars().count() > MOST_LETTERS {
@@ -134,7 +134,7 @@ pub(super) fn line(entity: &Entity<'_>) -> Result<Option<Writing>, Refusal> {
 }
 
 /// The letters of an `MTEXT`; `None` if it has no height.
-pub(super) fn paragraph(entity: &Entity<'_>, plane: Plane) -> Result<Option<Writing>, Refusal> {
+pub(super) fn paragraph(entity: &Entity<'_>, plane: Plane) -> Result<Option<Writing>, LineError> {
     let height = entity.number(40, 0.0)?;
     if height <= 0.0 {
         return Ok(None);

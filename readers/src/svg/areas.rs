@@ -34,13 +34,13 @@ struct Layers {
 }
 
 /// A mask cannot be applied.
-enum Refusal {
+enum MaskError {
     TooManyPoints,
     /// It has what no region is like.
     Soft,
 }
 
-impl From<TooManyPoints> for Refusal {
+impl From<TooManyPoints> for MaskError {
     fn from(_: TooManyPoints) -> Self {
         Self::TooManyPoints
     }
@@ -119,8 +119,8 @@ impl Drawing<'_, '_, '_> {
                     bounds.add(vec![rectangle(low, high, to_page)], false, Vec::new());
                     areas.0.extend([Arc::new(layers.region), Arc::new(bounds)]);
                 }
-                Err(Refusal::Soft) => soft += 1,
-                Err(Refusal::TooManyPoints) => return Err(TooManyPoints),
+                Err(MaskError::Soft) => soft += 1,
+                Err(MaskError::TooManyPoints) => return Err(TooManyPoints),
             }
             mask = this.mask();
         }
@@ -135,7 +135,7 @@ impl Drawing<'_, '_, '_> {
         within: &Regions,
         opacity: f64,
         layers: &mut Layers,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), MaskError> {
         let own = f64::from(group.opacity().get());
         if own == 0.0 {
             return Ok(());
@@ -145,7 +145,7 @@ impl Drawing<'_, '_, '_> {
             || group.blend_mode() != BlendMode::Normal
             || own < 1.0 && painted(group) > 1
         {
-            return Err(Refusal::Soft);
+            return Err(MaskError::Soft);
         }
         let to_page = to_page * affine(group.transform());
         let mut within = within.clone();
@@ -182,7 +182,7 @@ impl Drawing<'_, '_, '_> {
         within: &Regions,
         opacity: f64,
         layers: &mut Layers,
-    ) -> Result<(), Refusal> {
+    ) -> Result<(), MaskError> {
         let mut fill = None;
         if let Some(paint) = path.fill() {
             let shade = layers.shade(paint.paint(), opacity * f64::from(paint.opacity().get()));

@@ -44,9 +44,14 @@ impl ConvexArea {
         (turned < 1.5 * std::f64::consts::TAU).then_some(Self { sides })
     }
 
-    /// The parts of `polyline` inside the area, or less than `slack` outside it. Appends them to
-    /// `parts` and returns whether anything was cut off.
-    pub(super) fn cut(&self, polyline: &Polyline, slack: f64, parts: &mut Vec<Polyline>) -> bool {
+    /// The parts of `polyline` inside the area, or less than `tolerance` outside it. Appends them
+    /// to `parts` and returns whether anything was cut off.
+    pub(super) fn cut(
+        &self,
+        polyline: &Polyline,
+        tolerance: f64,
+        parts: &mut Vec<Polyline>,
+    ) -> bool {
         let points = &polyline.points;
         let mut is_cut = false;
         let mut part: Vec<Point> = Vec::new();
@@ -58,7 +63,7 @@ impl ConvexArea {
         };
         for pair in points.windows(2) {
             let &[from, to] = pair else { continue };
-            let Some((enter, leave)) = self.inside(from, to, slack) else {
+            let Some((enter, leave)) = self.inside(from, to, tolerance) else {
                 is_cut = true;
                 end(&mut part);
                 continue;
@@ -103,11 +108,11 @@ impl ConvexArea {
 
     /// The range of the segment's parameter, 0 to 1, in which it is inside; `None` if it is
     /// outside.
-    fn inside(&self, from: Point, to: Point, slack: f64) -> Option<(f64, f64)> {
+    fn inside(&self, from: Point, to: Point, tolerance: f64) -> Option<(f64, f64)> {
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for &(point, inward) in &self.sides {
-            let at_start = (from - point).dot(inward) + slack;
-            let at_end = (to - point).dot(inward) + slack;
+            let at_start = (from - point).dot(inward) + tolerance;
+            let at_end = (to - point).dot(inward) + tolerance;
             match (at_start < 0.0, at_end < 0.0) {
                 (true, true) => return None,
                 (true, false) => enter = enter.max(at_start / (at_start - at_end)),

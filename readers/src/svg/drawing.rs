@@ -20,7 +20,7 @@ pub(super) const PIXEL: f64 = 25.4 / 96.0;
 
 /// How far outside of the page a line may lie without being cut, in mm. Single precision, in which
 /// `usvg` computes, is no better on a large page.
-const SLACK: f64 = 0.01;
+const TOLERANCE: f64 = 0.01;
 
 /// The most points before points are left out. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
@@ -295,9 +295,9 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let (mut parts, mut is_cut) = (Vec::new(), false);
         for polyline in &polylines {
             let mut own = Vec::new();
-            if self.page.cut(polyline, SLACK, &mut own) {
+            if self.page.cut(polyline, TOLERANCE, &mut own) {
                 is_cut = true;
-                own.retain(|part| length(&part.positions()) > 2.0 * SLACK);
+                own.retain(|part| length(&part.positions()) > 2.0 * TOLERANCE);
             }
             parts.extend(own);
         }
@@ -356,7 +356,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             let outlines = polylines.iter().map(Polyline::positions).collect();
             shape.add(outlines, is_even_odd(path), Vec::new());
             let page = &self.page;
-            let is_beyond = |[x, y]: [f64; 2]| page.depth(Point::new(x, y)) < SLACK;
+            let is_beyond = |[x, y]: [f64; 2]| page.depth(Point::new(x, y)) < TOLERANCE;
             parts.extend(areas.borders_within(&Arc::new(shape), is_beyond, &mut self.work)?);
         }
         let of_points = |points: Vec<[f64; 2]>| {
@@ -372,7 +372,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let is_on_border = |part: &Polyline| {
             let mut lines = part.points.iter().zip(part.points.iter().skip(1));
             lines.all(|(from, to)| {
-                [*from, from.midpoint(*to), *to].iter().all(|it| self.page.depth(*it) <= SLACK)
+                [*from, from.midpoint(*to), *to].iter().all(|it| self.page.depth(*it) <= TOLERANCE)
             })
         };
         if !parts.iter().all(is_on_border) {

@@ -34,7 +34,7 @@ static STATUS_REQUESTED: AtomicU32 = AtomicU32::new(0);
 /// The data that the handler and the main loop share.
 static SHARED: Shared = Shared::new();
 /// The end of the line into which the interrupt puts received bytes.
-static INLET: Owned<ReceiveMerge> = Owned::empty();
+static RECEIVE_MERGE: Owned<ReceiveMerge> = Owned::empty();
 
 /// The main loop's side of the line, from which it reads bytes.
 pub struct Line(line::Line);
@@ -54,7 +54,7 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     let (receive_merge, line) = SHARED.ends();
     // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
     // it).
-    unsafe { INLET.fill(receive_merge) };
+    unsafe { RECEIVE_MERGE.fill(receive_merge) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.enable();
     Line(line)
@@ -89,7 +89,7 @@ impl Line {
 fn UART0() {
     UART0.clear_interrupt();
     // SAFETY: this is the handler that owns it.
-    if let Some(receive_merge) = unsafe { INLET.get() } {
+    if let Some(receive_merge) = unsafe { RECEIVE_MERGE.get() } {
         while let Some(data) = UART0.poll() {
             let requests = receive_merge.receiver.receive_from_uart(data);
             if requests.has(RealTime::STATUS) {

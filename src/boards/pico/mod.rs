@@ -43,7 +43,9 @@ use cortex_m::peripheral::Peripherals as Core;
 use penup::board_table::{self as table, BoardRow};
 use penup::machine::{Contacts, PulserState};
 use penup::motion::{Block, EventQueue};
-use penup::plotter::{Board, Kept, Memory, MemorySlices, NotStored, Record, Replies, Stored};
+use penup::plotter::{
+    Board, FlashRecords, Memory, MemorySlices, NotStored, Record, Replies, Stored,
+};
 use penup::protocol::RealTime;
 use penup::storage::Noted;
 #[cfg(feature = "tiles")]
@@ -85,7 +87,7 @@ pub struct Pico {
     /// The main loop's end of the queue of step events.
     steps: steps::Steps,
     /// The records in flash.
-    kept: Kept<flash::Flash>,
+    kept: FlashRecords<flash::Flash>,
     /// The fault after which the board restarted, if any.
     fault: Option<emergency::Cause>,
 }
@@ -139,7 +141,7 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     };
     let blocks = once(BLOCKS.try_take());
     let memory = once(MEMORY.try_take()).lend(blocks);
-    let kept = Kept::new(flash, flash::LAYOUT);
+    let kept = FlashRecords::new(flash, flash::LAYOUT);
     let board = Pico { ports, steps, kept, fault };
     (board, memory, &steps::STATE)
 }

@@ -35,12 +35,12 @@ static SHARED: [Shared; COUNT] = [const { Shared::new() }; COUNT];
 
 /// The data that the handlers of both ports share. They have the same priority, so neither
 /// interrupts the other.
-static INLETS: Owned<Inlets> = Owned::empty();
+static RECEIVE_SIDE: Owned<ReceiveSide> = Owned::empty();
 
 /// The receive interrupts' side of both ports.
-pub struct Inlets {
+pub struct ReceiveSide {
     /// The receiving end of each port, by its number.
-    inlets: [ReceiveMerge; COUNT],
+    merges: [ReceiveMerge; COUNT],
     /// The number of times that ctrl-X has come by either port; it wraps.
     pub aborts: u32,
 }
@@ -69,7 +69,7 @@ pub fn set_up() -> [Line; COUNT] {
     let ((uart, uart_line), (usb, usb_line)) = (uart.ends(), usb.ends());
     // SAFETY: the ports' interrupts are masked since reset, and this runs once (the queues' cells
     // ensure it).
-    unsafe { INLETS.fill(Inlets { inlets: [uart, usb], aborts: 0 }) };
+    unsafe { RECEIVE_SIDE.fill(ReceiveSide { merges: [uart, usb], aborts: 0 }) };
     [uart_line, usb_line]
 }
 
@@ -77,15 +77,15 @@ pub fn set_up() -> [Line; COUNT] {
 ///
 /// # Safety
 /// As [`Owned::get`], for the handlers of both ports.
-pub unsafe fn inlets() -> Option<&'static mut Inlets> {
+pub unsafe fn receive_side() -> Option<&'static mut ReceiveSide> {
     // SAFETY: the caller meets the contract.
-    unsafe { INLETS.get() }
+    unsafe { RECEIVE_SIDE.get() }
 }
 
-impl Inlets {
+impl ReceiveSide {
     /// Passes a port's receiver to `take`, and acts on the real-time requests that it returns.
     pub fn take(&mut self, port: Port, take: impl FnOnce(&mut Receiver) -> RealTime) {
-        let receiver = &mut self.inlets[port as usize].receiver;
+        let receiver = &mut self.merges[port as usize].receiver;
         let requests = take(receiver);
         if receiver.has_heard() {
             HAS_RECEIVED
@@ -93,23 +93,23 @@ impl Inlets {
         }
         if requests != RealTime::default() {
             self.aborts = self.aborts.wrapping_add(u32::from(requests.has(RealTime::ABORT)));
-            line::ask(requests, &mut self.inlets);
+            line::ask(requests, &mut self.merges);
         }
     }
 
     /// Records that bytes received by a port were lost.
     pub fn lose(&mut self, port: Port) {
-        self.inlets[port as usize].receiver.lose();
+        self.merges[port as usize].receiver.lose();
     }
 
     /// Records that a line that a port has not ended was ended in its place.
     pub fn end_line(&mut self, port: Port) {
-        self.inlets[port as usize].receiver.end_line();
+        self.merges[port as usize].receiver.end_line();
     }
 
     /// Appends an ordinary byte to the queue of a port; returns it if there is no room.
     pub fn append(&mut self, port: Port, byte: u8) -> Result<(), u8> {
-        self.inlets[port as usize].receiver.append(byte)
+        self.merges[port as usize].receiver.append(byte)
     }
 }
 

@@ -21,7 +21,7 @@ use rp2040_hal::pac::dma::CH;
 use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
 
-use super::ports::{self, Inlets, Port};
+use super::ports::{self, Port, ReceiveSide};
 use super::registers::{self, DMA, Get, Put, UART0, reset};
 use super::{clock, critical, divider};
 use crate::boards::fault::once;
@@ -130,18 +130,18 @@ fn received() -> Option<u32> {
 }
 
 /// Reads what has been written to the ring. It is called by the port's handler.
-fn read_ring(inlets: &mut Inlets) {
+fn read_ring(receive_side: &mut ReceiveSide) {
     // SAFETY: this is the handler that owns it.
     let Some(read_count) = (unsafe { READ_COUNT.get() }) else { return };
     let Some(received) = received() else { return };
     let waiting = received.wrapping_sub(*read_count) % (2 * TURN);
     if waiting > RING_SLOTS - MARGIN {
         *read_count = received.wrapping_sub(RING_SLOTS - MARGIN) % (2 * TURN);
-        inlets.lose(Port::Uart);
+        receive_side.lose(Port::Uart);
     }
     while *read_count != received {
         let data = RING.0[(*read_count % RING_SLOTS) as usize].load(Ordering::Relaxed);
-        inlets.take(Port::Uart, |receiver| receiver.receive_from_uart(data.into()));
+        receive_side.take(Port::Uart, |receiver| receiver.receive_from_uart(data.into()));
         *read_count = (*read_count + 1) % (2 * TURN);
     }
 }
@@ -193,8 +193,8 @@ fn UART0_IRQ() {
         UART0.clear_interrupt();
         send();
         // SAFETY: this is a handler that owns it.
-        if let Some(inlets) = unsafe { ports::inlets() } {
-            read_ring(inlets);
+        if let Some(receive_side) = unsafe { ports::receive_side() } {
+            read_ring(receive_side);
         }
     });
 }

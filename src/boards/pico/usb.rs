@@ -38,7 +38,7 @@ use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 use self::connection::Connection;
 use self::frame::Frame;
 pub use self::frame::forget as forget_frame;
-use super::ports::{self, Inlets, Port};
+use super::ports::{self, Port, ReceiveSide};
 use super::registers::{Get, Put, USB, USB_MEMORY};
 use super::{clock, critical, divider};
 use crate::boards::fault::once;
@@ -124,7 +124,7 @@ struct Device {
     waiting: Deque<u8, WAITING_SLOTS>,
     /// Whether the last received byte does not end a line.
     is_in_line: bool,
-    /// The value of [`Inlets::aborts`] when it was last read.
+    /// The value of [`ReceiveSide::aborts`] when it was last read.
     aborts: u32,
     /// The bytes to send, as the handler takes them from the queue.
     to_send: Consumer<'static>,
@@ -284,7 +284,7 @@ fn take(flag: &AtomicBool) -> bool {
 /// other port are masked.
 fn serve() {
     // SAFETY: by the contract above.
-    if let (Some(device), Some(inlets)) = unsafe { (DEVICE.get(), ports::inlets()) } {
+    if let (Some(device), Some(receive_side)) = unsafe { (DEVICE.get(), ports::receive_side()) } {
         device.frame.follow();
         // This must be read before polling, which clears it.
         let took = device.class.write_ep().address().index();
@@ -296,11 +296,11 @@ fn serve() {
         }
         device.await_bus(USB.intr().get() & BUS_RESET != 0);
         device.follow_state();
-        device.follow_port(inlets);
+        device.follow_port(receive_side);
         if took {
             device.resume_host();
         }
-        device.receive(inlets);
+        device.receive(receive_side);
         device.send();
         IS_WAITED.store(device.awaits_bus || !device.waiting.is_empty(), Ordering::Relaxed);
     }
@@ -331,7 +331,7 @@ impl Device {
     }
 
     /// Follows whether a program at the host has the port open.
-    fn follow_port(&mut self, inlets: &mut Inlets) {
+    fn follow_port(&mut self, receive_side: &mut ReceiveSide) {
         let is_open = self.class.dtr();
         if is_open == self.is_open {
             return;
@@ -350,7 +350,7 @@ impl Device {
         if self.is_in_line {
             // The unfinished line is refused, and the next one is a separate line. There is room,
             // because packets are read only while there are two slots more than they need.
-            inlets.end_line(Port::Usb);
+            receive_side.end_line(Port::Usb);
             let _ = self.waiting.push_back(DAMAGED);
             let _ = self.waiting.push_back(b'\n');
             self.is_in_line = false;
@@ -398,9 +398,9 @@ impl Device {
     }
 
     /// Discards the waiting bytes if ctrl-X has come by either port since the last call.
-    fn drop_void(&mut self, inlets: &Inlets) {
-        if self.aborts != inlets.aborts {
-            self.aborts = inlets.aborts;
+    fn drop_void(&mut self, receive_side: &ReceiveSide) {
+        if self.aborts != receive_side.aborts {
+            self.aborts = receive_side.aborts;
             self.is_in_line = false;
             self.waiting.clear();
         }
@@ -408,11 +408,11 @@ impl Device {
 
     /// Passes received bytes on to the line's queue, as far as there is room for them, and reads
     /// further packets while there is room for those.
-    fn receive(&mut self, inlets: &mut Inlets) {
-        self.drop_void(inlets);
+    fn receive(&mut self, receive_side: &mut ReceiveSide) {
+        self.drop_void(receive_side);
         loop {
             while let Some(&byte) = self.waiting.front()
-                && inlets.append(Port::Usb, byte).is_ok()
+                && receive_side.append(Port::Usb, byte).is_ok()
             {
                 self.waiting.pop_front();
             }
@@ -431,7 +431,7 @@ impl Device {
             }
             for &byte in packet.iter().take(count) {
                 let (waiting, is_in_line) = (&mut self.waiting, &mut self.is_in_line);
-                inlets.take(Port::Usb, |receiver| match receiver.sort_out(byte) {
+                receive_side.take(Port::Usb, |receiver| match receiver.sort_out(byte) {
                     Ok(byte) => {
                         *is_in_line = byte != b'\n' && byte != b'\r';
                         let _ = waiting.push_back(byte); // There is room.
@@ -439,7 +439,7 @@ impl Device {
                     }
                     Err(requests) => requests,
                 });
-                self.drop_void(inlets);
+                self.drop_void(receive_side);
             }
         }
     }

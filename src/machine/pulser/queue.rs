@@ -65,7 +65,7 @@ impl<'q, const N: usize> StepQueue<'q, N> {
     pub fn sync_consumed(&mut self) {
         let stopped = !self.ring.is_running();
         let down = self.state.inverted() << 2;
-        let (mut steps, mut slack, mut ticks) = (0u32, 0u32, 0u32);
+        let (mut steps, mut backlash, mut ticks) = (0u32, 0u32, 0u32);
         let moving = &mut self.moving;
         self.ring.count(&mut self.counted, |word| {
             let (event, flags) = (StepEvent::from_bits(word), word as u8);
@@ -81,10 +81,10 @@ impl<'q, const N: usize> StepQueue<'q, N> {
             }
             let levels = self.order.levels[usize::from(flags & LEVELS)] ^ down;
             let step = PACKED_STEPS[usize::from(levels & STEPS)];
-            let sum = if flags & StepEvent::AT_REST == 0 { &mut steps } else { &mut slack };
+            let sum = if flags & StepEvent::AT_REST == 0 { &mut steps } else { &mut backlash };
             *sum = sum.wrapping_add(step);
         });
-        self.state.count(steps, slack, ticks);
+        self.state.count(steps, backlash, ticks);
         if stopped && core::mem::take(&mut self.moving) && !self.state.is_halted() {
             self.state.note_underrun();
         }
@@ -105,7 +105,7 @@ impl<const N: usize> EventQueue for StepQueue<'_, N> {
 
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
         let is_no_step =
-            event.is_slack() || matches!(event.kind(), EventKind::Lift { step: true, .. });
+            event.takes_up_backlash() || matches!(event.kind(), EventKind::Lift { step: true, .. });
         if self.ring.room(self.counted) <= usize::from(is_no_step) {
             return Err(event);
         }

@@ -16,10 +16,10 @@ pub struct PulserState {
     x: AtomicU32,
     /// The sum of the steps of y, as a wrapping `i32`.
     y: AtomicU32,
-    /// The sum of the steps of x that took up slack, as a wrapping `i32`.
-    slack_x: AtomicU32,
-    /// The sum of the steps of y that took up slack, as a wrapping `i32`.
-    slack_y: AtomicU32,
+    /// The sum of the steps of x that took up backlash, as a wrapping `i32`.
+    backlash_x: AtomicU32,
+    /// The sum of the steps of y that took up backlash, as a wrapping `i32`.
+    backlash_y: AtomicU32,
     /// The position of the motor of z in steps downward, as a wrapping `i32`.
     z: AtomicU32,
     /// The sum of the ticks of the events taken from the queue; it wraps.
@@ -61,8 +61,8 @@ impl PulserState {
         Self {
             x: AtomicU32::new(0),
             y: AtomicU32::new(0),
-            slack_x: AtomicU32::new(0),
-            slack_y: AtomicU32::new(0),
+            backlash_x: AtomicU32::new(0),
+            backlash_y: AtomicU32::new(0),
             z: AtomicU32::new(0),
             ticks: AtomicU32::new(0),
             underruns: AtomicU32::new(0),
@@ -82,10 +82,10 @@ impl PulserState {
         (x, y)
     }
 
-    /// The sum of the steps that took up slack, which [`PulserState::steps`] does not include; it
-    /// wraps.
-    pub fn slack(&self) -> (i32, i32) {
-        let [x, y] = [&self.slack_x, &self.slack_y]
+    /// The sum of the steps that took up backlash, which [`PulserState::steps`] does not include;
+    /// it wraps.
+    pub fn backlash(&self) -> (i32, i32) {
+        let [x, y] = [&self.backlash_x, &self.backlash_y]
             .map_each(|sum| sum.load(Ordering::Relaxed).cast_signed());
         (x, y)
     }
@@ -146,8 +146,10 @@ impl PulserState {
 
     /// Adds the steps and ticks of the step events that were taken from the queue. Steps are packed
     /// as in the queue's table, with less than 2^15 for each motor.
-    pub(super) fn count(&self, steps: u32, slack: u32, ticks: u32) {
-        for (x, y, packed) in [(&self.x, &self.y, steps), (&self.slack_x, &self.slack_y, slack)] {
+    pub(super) fn count(&self, steps: u32, backlash: u32, ticks: u32) {
+        for (x, y, packed) in
+            [(&self.x, &self.y, steps), (&self.backlash_x, &self.backlash_y, backlash)]
+        {
             let dx = i32::from(packed as u16 as i16).cast_unsigned();
             add(x, dx);
             add(y, (packed.wrapping_sub(dx).cast_signed() >> 16).cast_unsigned());
@@ -165,11 +167,11 @@ impl PulserState {
         self.drained.store(drained, Ordering::Release);
     }
 
-    /// Reports the sums of the steps that took up slack, for a board that calls
+    /// Reports the sums of the steps that took up backlash, for a board that calls
     /// [`PulserState::report`].
-    pub fn report_slack(&self, (x, y): (i32, i32)) {
-        self.slack_x.store(x.cast_unsigned(), Ordering::Relaxed);
-        self.slack_y.store(y.cast_unsigned(), Ordering::Relaxed);
+    pub fn report_backlash(&self, (x, y): (i32, i32)) {
+        self.backlash_x.store(x.cast_unsigned(), Ordering::Relaxed);
+        self.backlash_y.store(y.cast_unsigned(), Ordering::Relaxed);
     }
 
     /// Counts that the queue ran empty while the machine moved.

@@ -4,7 +4,7 @@ use super::{Setting, Settings, Value};
 use crate::array::MapEach;
 use crate::machine::{Kinematics, Tool};
 use crate::motion::{BrakeRule, Limits, LimitsError, MotionSettings, PathLength};
-use crate::order::Pace;
+use crate::order::TimeModel;
 
 impl Settings {
     /// Checks the settings against each other.
@@ -72,7 +72,7 @@ impl Settings {
 
     /// Returns how fast the pen travels on the page, for an order that is improved by so many units
     /// of work in a second. It does not depend on the board.
-    pub fn pace(&self, units_per_second: u32) -> Pace {
+    pub fn time_model(&self, units_per_second: u32) -> TimeModel {
         let MotionSettings { steps_per_mm, travel_mm_per_min, acceleration_mm_per_s2, .. } =
             self.motion_settings();
         let in_steps = |value: Value| {
@@ -83,7 +83,7 @@ impl Settings {
         // At most 32767 times 4000.
         let [per_minute, acceleration] =
             [travel_mm_per_min, acceleration_mm_per_s2].map_each(|value| in_steps(value) as u32);
-        Pace { speed: per_minute / 60, acceleration, units_per_second }
+        TimeModel { speed: per_minute / 60, acceleration, units_per_second }
     }
 
     /// Returns the length of the dots of a dotted line.
@@ -130,7 +130,7 @@ pub struct StrokeTime {
 }
 
 #[cfg(feature = "early-ink")]
-impl crate::order::Meanwhile for StrokeTime {
+impl crate::order::StrokeDurations for StrokeTime {
     fn milliseconds(&self, strokes: u32, length: u64) -> u64 {
         let drawn = ((length >> 8) * 1000).checked_div(self.steps_per_second);
         u64::from(strokes) * self.stroke_milliseconds + drawn.unwrap_or(0)

@@ -154,9 +154,9 @@ pub enum Setting {
     BacklashX,
     /// `$236` The backlash of y, or of the second motor.
     BacklashY,
-    /// `$237` The distance along a stroke within which slack is taken up while the pen draws on; 0
-    /// to take it up at rest.
-    #[cfg(feature = "backlash-on-the-way")]
+    /// `$237` The distance along a stroke within which backlash is taken up while the pen draws on;
+    /// 0 to take it up at rest.
+    #[cfg(feature = "spread-backlash")]
     BacklashDistance,
     /// `$240` The x coordinate at which the pen is parked (G28).
     ParkX,
@@ -315,7 +315,7 @@ pub const SETTINGS: &[SettingInfo] = {
         row(HomedBelt, 234, "belt length when homed", "mm", (10.0, 8000.0, 500.0), false),
         row(BacklashX, 235, "backlash of x", "mm", (0.0, 10.0, 0.0), false),
         row(BacklashY, 236, "backlash of y", "mm", (0.0, 10.0, 0.0), false),
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         row(BacklashDistance, 237, "backlash taken up within", "mm", (0.0, 10.0, 0.0), false),
         row(ParkX, 240, "park at x", "mm", (0.0, 8000.0, 0.0), false),
         row(ParkY, 241, "park at y", "mm", (0.0, 8000.0, 0.0), false),

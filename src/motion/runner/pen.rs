@@ -1,57 +1,58 @@
-//! The pen moves while the machine does ([`PenOverlap`]): it is told to go down before a travel
-//! ends, and a travel begins before it is up.
+//! Lets the pen move while the machine does ([`PenOverlap`]): the pen is told to go down before a
+//! travel ends, and a travel begins before the pen is up.
 //!
-//! When the pen is to go down is counted back from where the travel ends at rest, so that end must
-//! be known: all moves up to the next stroke wait. Without a limit on jerk it is known to the tick
-//! when the machine will be there; with one, how much later it will be there at most. The pen goes
-//! down no sooner than it was up.
+//! The time at which the pen is told to go down is counted back from the end of the travel, where
+//! the machine is at rest. So that end must be known, which means that all moves up to the next
+//! stroke are in the look-ahead. Without a limit on jerk, the time of arrival is known to the tick;
+//! with one, an upper bound is known. The pen never goes down before it has been up.
 //!
-//! From then on the travel is carried out as it was planned: a stop waits for its end, and another
-//! speed begins behind it. So the pen is down nowhere but where the stroke begins, and it is down
-//! no earlier than it would be with a dwell at rest. Whatever stands there before the stroke begins
-//! raises it again ([`Runner::stand`]).
+//! From then on the travel is completed as it was planned: a stop waits for its end, and a change
+//! of speed takes effect after it. So the pen touches the paper only where the stroke begins, and
+//! no earlier than it would with a dwell at rest. If the machine comes to rest before the stroke
+//! begins, the pen is raised again ([`Runner::come_to_rest`]).
 
-use super::{Pace, PenPositions, Plan, Progress, Runner};
+use super::{PathSpeed, PenPositions, Plan, Progress, Runner};
 use crate::motion::lookahead::BlockKind;
 use crate::motion::profile::{FRACTION_BITS, Profile};
 use crate::motion::{EventQueue, PathLength, StepEvent};
 
-/// For how long the pen moves while the machine does, in ticks.
+/// How long the pen moves while the machine does, in ticks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct PenOverlap {
-    /// At most so long before a travel ends, the pen is told to go down: not longer than it takes.
+    /// How long before the end of a travel the pen is told to go down, at most. No longer than the
+    /// pen takes.
     pub down_ticks: u32,
-    /// So long before the pen is up, a travel begins: not longer than its dwell.
+    /// How long before the pen is up a travel begins. No longer than the dwell after raising.
     pub up_ticks: u32,
 }
 
-/// What the pen does beside the motion. Times are sixteenths of ticks.
+/// What the pen does while the machine moves. Times are in sixteenths of ticks.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PenTiming {
-    /// Until the pen, which was told to go up, is up.
+    /// The time until a pen that was told to go up is up.
     rising: u32,
-    /// Until it is to go down, if the end of the travel in work is known.
+    /// The time until the pen is to be told to go down, if the end of the current travel is known.
     until_lowered: Option<u64>,
-    /// It was told to go down on the way.
+    /// Set once the pen was told to go down during a travel.
     lowering: Option<Lowering>,
 }
 
-/// A pen on its way down, while the machine is on its way to the stroke.
+/// A pen that goes down while the machine still travels to the stroke.
 #[derive(Debug, Clone, Copy)]
 struct Lowering {
-    /// When it was told last.
+    /// The time at which the pen was last told to move.
     since: u32,
     /// The greatest speed of the travel that was in force then.
-    top: Pace,
+    top: PathSpeed,
 }
 
 impl PenTiming {
-    /// The pen does nothing beside the motion.
+    /// The pen does nothing while the machine moves.
     pub(super) const fn new() -> Self {
         Self { rising: 0, until_lowered: None, lowering: None }
     }
 
-    /// So much time passes, which was planned.
+    /// Counts down by a planned `time`.
     #[inline(always)]
     pub(super) fn pass(&mut self, time: u32) {
         if self.rising > 0 || self.until_lowered.is_some() {
@@ -65,82 +66,86 @@ impl PenTiming {
         self.until_lowered = self.until_lowered.map(|left| left.saturating_sub(time.into()));
     }
 
-    /// Whether a pen that is not down stays so while motors take up their slack.
+    /// Whether a pen that is not down stays raised while motors take up their backlash.
     #[inline(always)]
     pub(super) fn stays_raised(pen: &PenPositions, is_down: Option<bool>) -> bool {
         pen.overlap != PenOverlap::default() && is_down != Some(true)
     }
 
-    /// Whether the pen, or the next height of its ramp, is due.
+    /// Whether it is time to tell the pen to go down, or to the next height of its ramp.
     #[inline(always)]
     pub(super) fn is_due(&self) -> bool {
         self.until_lowered == Some(0) && self.rising == 0
     }
 
-    /// Whether the pen was told to go down on the way, so that the travel goes on as planned.
+    /// Whether the pen was told to go down during the current travel, which is then completed as
+    /// planned.
     #[inline(always)]
     pub(super) fn is_lowering(&self) -> bool {
         self.lowering.is_some()
     }
 
-    /// The greatest speed of the travel in work, if another is in force by now.
+    /// The greatest speed of the current travel, which may differ from the one that is now in force
+    /// (`travel`).
     #[inline(always)]
-    pub(super) fn travel_top(&self, travel: Pace) -> Pace {
+    pub(super) fn travel_top(&self, travel: PathSpeed) -> PathSpeed {
         self.lowering.map_or(travel, |lowering| lowering.top)
     }
 }
 
 impl Runner<'_> {
-    /// How long the travels behind the piece in work are until the machine is at rest, 2^-18 mm,
-    /// and how long it takes after that until a stroke begins: motors may have slack to take up
-    /// there. `None` if no stroke is known, or if the machine may be slower in between.
-    fn way_to_stroke(&self) -> Option<(u64, u64)> {
+    /// Returns the length of the travels after the current piece until the machine is at rest, in
+    /// units of 2^-18 mm, and how long it then takes until a stroke begins, because motors may have
+    /// backlash to take up. `None` if no stroke is known, or if the machine may be slower in
+    /// between.
+    fn distance_to_stroke(&self) -> Option<(u64, u64)> {
         if self.course.as_ref().is_some_and(|course| !course.is_last_piece()) {
             return Some((0, 0));
         }
         let is_smooth = self.limits.jerk.is_some();
-        let (mut way, mut time) = (0, 0u64);
+        let (mut distance, mut time) = (0, 0u64);
         for block in self.lookahead.in_order() {
             if block.ink.is_some() && block.kind == BlockKind::Line {
-                return Some((way, time));
+                return Some((distance, time));
             }
             let is_slower = is_smooth && block.limit() < self.travel.stopping_distance;
-            if is_slower || (time > 0 && block.kind != BlockKind::Slack) {
+            if is_slower || (time > 0 && block.kind != BlockKind::Backlash) {
                 return None;
             }
-            if block.kind == BlockKind::Slack {
-                let (from, to) = (Pace::REST, PathLength::ZERO);
+            if block.kind == BlockKind::Backlash {
+                let (from, to) = (PathSpeed::REST, PathLength::ZERO);
                 let profile = Profile::new(&self.limits, from, block.length, self.travel, to);
                 time = time.saturating_add(profile.time_left(&self.limits)).max(1);
             } else {
-                way += u64::from(block.length.to_bits());
+                distance += u64::from(block.length.to_bits());
             }
         }
         None
     }
 
-    /// How long it takes at most until the travel in work is at rest where a stroke begins, by the
-    /// plan that has just been made; `None` if that is not known.
+    /// Returns the greatest time until the current travel is at rest where a stroke begins,
+    /// according to the plan that was just made; `None` if it is unknown.
     fn time_to_stroke(&self) -> Option<u64> {
-        let (way, later) = self.way_to_stroke()?;
+        let (distance, later) = self.distance_to_stroke()?;
         let time = match self.plan.as_ref()? {
             Plan::Profile(profile) => {
                 let exit = profile.exit();
-                // Braking from there to rest takes just that way: v/a.
-                let brakes = u64::from(exit.stopping_distance.to_bits()) == way;
+                // If the stopping distance at the exit equals the remaining distance, the machine
+                // brakes from there to rest, which takes v/a.
+                let brakes = u64::from(exit.stopping_distance.to_bits()) == distance;
                 let slices = (u64::from(exit.speed.to_bits()) << 16)
                     .checked_div(self.limits.acceleration.to_bits().into())?;
                 brakes.then(|| profile.time_left(&self.limits).saturating_add(slices))?
             }
             Plan::Interval(interval) => {
                 let room = self.course.as_ref()?.room();
-                interval.time_to_rest(room.saturating_add(way << 14), self.travel.speed)
+                interval.time_to_rest(room.saturating_add(distance << 14), self.travel.speed)
             }
         };
         Some(time.saturating_add(later))
     }
 
-    /// A plan has been made, of an `inked` piece or a travel, from rest or not.
+    /// Called after a plan has been made, for an `inked` piece or a travel, `at_rest` or not.
     ///
     /// # Errors
     /// The event that the queue refused.
@@ -157,12 +162,12 @@ impl Runner<'_> {
         Ok(Progress::More)
     }
 
-    /// Looks when the pen is to go down on the travel that has just been planned. Where it has to
-    /// wait for the pen, a short travel begins later: the pen may then go down on the way.
+    /// Determines when the pen is to go down on the travel that was just planned. A travel that is
+    /// too short for this begins later, so that the pen may still go down during it.
     ///
     /// # Errors
     /// The event that the queue refused.
-    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    #[inline(never)] // Rarely called: inlined, it would fill the cache.
     fn plan_pen(&mut self, at_rest: bool, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         if self.timing.is_lowering() {
             return Ok(());
@@ -188,13 +193,16 @@ impl Runner<'_> {
         Ok(())
     }
 
-    /// Tells the pen to go down, or one height further on its ramp, midway to the next move, which
-    /// is one of the slice in work. If that leaves no room, it waits for another slice.
+    /// Tells the pen to go down, or to the next height of its ramp. The event lies midway before
+    /// the next move of the current slice. If there is no room for it, it waits for another slice.
     ///
     /// # Errors
     /// The event that the queue refused.
-    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
-    pub(super) fn lower_on_the_way(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+    #[inline(never)] // Rarely called: inlined, it would fill the cache.
+    pub(super) fn lower_while_moving(
+        &mut self,
+        queue: &mut dyn EventQueue,
+    ) -> Result<(), StepEvent> {
         let Some(due) = self.course.as_ref().and_then(|course| course.next_due()) else {
             return Ok(());
         };
@@ -210,14 +218,15 @@ impl Runner<'_> {
         self.timing.until_lowered =
             (next != height).then(|| u64::from(self.pen.ramp_ticks) << FRACTION_BITS);
         self.pen_height = Some(next);
-        // On its way it is neither up nor down.
+        // While it moves it is neither up nor down.
         self.pen_is_down = None;
         Ok(())
     }
 
-    /// The machine stands where the stroke begins. Returns whether the pen has reached its height,
-    /// told on the way, and how long ago, in ticks; else its ramp goes on when its time has come.
-    pub(super) fn lowered_on_the_way(&mut self, down: bool) -> Option<u32> {
+    /// Called at rest where the stroke begins. If the pen has been told its last height during the
+    /// travel, returns how many ticks ago; otherwise waits until the next height of its ramp is
+    /// due.
+    pub(super) fn lowered_while_moving(&mut self, down: bool) -> Option<u32> {
         self.timing.until_lowered = None;
         let Lowering { since, .. } = self.timing.lowering.take()?;
         let passed = self.now.wrapping_sub(since) >> FRACTION_BITS;
@@ -232,8 +241,8 @@ impl Runner<'_> {
         None
     }
 
-    /// The dwell with which the machine waits for the pen to be up. What is left of it passes
-    /// beside the motion.
+    /// Returns the part of the dwell for which the machine waits until the pen is up. The rest
+    /// passes while the machine moves.
     pub(super) fn begin_rising(&mut self, dwell: u32) -> u32 {
         let early = self.pen.overlap.up_ticks.min(dwell);
         self.timing.rising = early << FRACTION_BITS;
@@ -260,7 +269,7 @@ impl Runner<'_> {
         self.timing = PenTiming::new();
     }
 
-    /// Stands for so long, below 2^28.
+    /// Rests for this time, below 2^28.
     fn wait(&mut self, time: u32, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         self.now = self.now.wrapping_add(time);
         let at = self.emitter.hold(self.now, queue)?;

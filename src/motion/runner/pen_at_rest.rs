@@ -1,7 +1,7 @@
-//! Without the feature `pen-overlap`, the pen moves only while the machine stands: `pen.rs` has
-//! what these functions do with it.
+//! Without the feature `pen-overlap`, the pen moves only while the machine is at rest. These
+//! functions take the place of those in `pen.rs`, and nearly all do nothing.
 
-use super::{Pace, Progress, Runner};
+use super::{PathSpeed, Progress, Runner};
 use crate::motion::{EventQueue, StepEvent};
 
 /// The pen does nothing beside the motion.
@@ -14,7 +14,7 @@ impl PenTiming {
         Self
     }
 
-    /// So much time passes.
+    /// Does nothing.
     #[inline(always)]
     pub(super) const fn pass(&mut self, _: u32) {}
 
@@ -32,7 +32,7 @@ impl PenTiming {
 
     /// The greatest speed of the travel in work: the one in force.
     #[inline(always)]
-    pub(super) const fn travel_top(&self, travel: Pace) -> Pace {
+    pub(super) const fn travel_top(&self, travel: PathSpeed) -> PathSpeed {
         travel
     }
 }
@@ -52,7 +52,7 @@ impl Runner<'_> {
 
     /// The pen goes down at rest.
     #[inline(always)]
-    pub(super) const fn lower_on_the_way(
+    pub(super) const fn lower_while_moving(
         &mut self,
         _queue: &mut dyn EventQueue,
     ) -> Result<(), StepEvent> {
@@ -61,7 +61,7 @@ impl Runner<'_> {
 
     /// The pen was not told on the way.
     #[inline(always)]
-    pub(super) const fn lowered_on_the_way(&mut self, _down: bool) -> Option<u32> {
+    pub(super) const fn lowered_while_moving(&mut self, _down: bool) -> Option<u32> {
         None
     }
 

@@ -20,10 +20,10 @@ pub(super) const PEN: PenPositions = PenPositions {
 /// Appends a straight move.
 pub(super) fn push(runner: &mut Runner<'_>, [x, y]: [i32; 2], ink: Option<LineType>) {
     let (motors, from) = (PagePoint { x, y }, runner.end());
-    let way = (x - from.x, y - from.y);
-    let length = runner.limits().length(way.0, way.1).expect("short");
-    let (offsets, whole, is_gap) = ([0; 2], length, false);
-    let piece = Move { motors, offsets, page: motors, way, whole, length, is_gap };
+    let displacement = (x - from.x, y - from.y);
+    let length = runner.limits().length(displacement.0, displacement.1).expect("short");
+    let (offsets, whole_length, is_gap) = ([0; 2], length, false);
+    let piece = Move { motors, offsets, page: motors, displacement, whole_length, length, is_gap };
     runner.push(&piece, ink, PathLength::MAX).expect("room");
 }
 

@@ -17,7 +17,7 @@ use crate::model::Model;
 use crate::order::First;
 #[cfg(not(feature = "early-ink"))]
 use crate::order::Leg;
-use crate::order::{self, Pace};
+use crate::order::{self, TimeModel};
 use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
 use crate::stage::{Cancel, Stage};
@@ -33,7 +33,7 @@ pub(in crate::plotter) struct Pipeline<'p, I> {
     /// The steps per millimetre on the page, in which the drawing is measured.
     pub steps: StepsPerMillimetre,
     /// How fast the machine travels and the order is improved, by which its default effort ends.
-    pub pace: Pace,
+    pub time_model: TimeModel,
     /// How long strokes take, if some are chosen that are drawn before the order of the others is
     /// known.
     #[cfg(feature = "early-ink")]
@@ -85,14 +85,14 @@ impl<I: Index> Pipeline<'_, I> {
     #[cfg(feature = "early-ink")]
     #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     fn graph(&mut self, found: &Found) -> Result<Job<I>, CommandError> {
-        let Self { options, steps, pace, words, cancel, early, .. } = self;
+        let Self { options, steps, time_model, words, cancel, early, .. } = self;
         cancel.enter(Stage::Order);
         let stored = build_graph::<I>(words, found.lines, *cancel)?;
         let [legs, _] = stored.counts();
         if legs == 0 {
             return Err(CommandError::NothingToPlot);
         }
-        let order = options.order(*steps, *pace);
+        let order = options.order(*steps, *time_model);
         let first = match early {
             Some(time) => {
                 let (points, segments, scratch) =
@@ -152,7 +152,7 @@ impl<I: Index> Pipeline<'_, I> {
     #[cfg(not(feature = "early-ink"))]
     #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
     fn order(self, found: &Found) -> Result<Job<I>, CommandError> {
-        let Self { options, steps, pace, words, cancel, .. } = self;
+        let Self { options, steps, time_model, words, cancel, .. } = self;
         cancel.enter(Stage::Order);
         let stored = build_graph(words, found.lines, cancel)?;
         let (drawing, mut rest) = stored.split(words).map_err(CommandError::DrawingTooLarge)?;
@@ -161,7 +161,7 @@ impl<I: Index> Pipeline<'_, I> {
             return Err(CommandError::NothingToPlot);
         }
         let tour = rest.take::<Leg<I>>(legs).map_err(CommandError::DrawingTooLarge)?;
-        let report = order::order(drawing, options.order(steps, pace), rest, cancel, tour)?;
+        let report = order::order(drawing, options.order(steps, time_model), rest, cancel, tour)?;
         let Found { degenerate_faces, joined_edges, .. } = *found;
         Ok(Job { stored, legs, report, degenerate_faces, joined_edges })
     }

@@ -3,7 +3,7 @@
 use crate::drawing::{Drawing, LineType, PagePoint, Segment};
 use crate::index::Index;
 #[cfg(any(feature = "stream", feature = "early-ink"))]
-use crate::machine::Late;
+use crate::machine::PendingTarget;
 #[cfg(feature = "resume")]
 use crate::machine::StrokePoints;
 use crate::machine::{Path, StrokeEnds, Target};
@@ -202,10 +202,11 @@ impl<I: Index> Path for Strokes<'_, I> {
     }
 
     #[cfg(any(feature = "stream", feature = "early-ink"))]
-    fn late(&self) -> Option<Late> {
+    fn late(&self) -> Option<PendingTarget> {
         #[cfg(feature = "early-ink")]
         if self.has_more {
-            return (self.cursor.leg >= self.tour.len()).then_some(Late { within_stroke: false });
+            return (self.cursor.leg >= self.tour.len())
+                .then_some(PendingTarget { within_stroke: false });
         }
         #[cfg(feature = "stream")]
         return self.lateness();

@@ -3,7 +3,7 @@
 use super::{Job, Unordered};
 use crate::drawing::Drawing;
 use crate::index::Index;
-use crate::order::{self, Effort, First, Leg, Method, Options, Pace, Shape};
+use crate::order::{self, Effort, First, Leg, Method, Options, Shape, TimeModel};
 use crate::protocol::CommandError;
 use crate::stage::{Cancel, Scratch, items};
 
@@ -31,7 +31,7 @@ impl Unordered {
             Method::Exact => 2,
         };
         let effort = match effort {
-            Effort::Auto(Pace { speed, acceleration, units_per_second }) => {
+            Effort::Auto(TimeModel { speed, acceleration, units_per_second }) => {
                 [0, speed, acceleration, units_per_second]
             }
             Effort::Units(units) => [1, units, 0, 0],
@@ -65,7 +65,7 @@ impl Unordered {
             _ => return None,
         };
         let effort = match kind {
-            0 => Effort::Auto(Pace { speed, acceleration, units_per_second }),
+            0 => Effort::Auto(TimeModel { speed, acceleration, units_per_second }),
             1 => Effort::Units(speed),
             _ => return None,
         };

@@ -18,7 +18,7 @@ use crate::drawing::{Page, StepsPerMillimetre, Title, TitleText};
 use crate::fixed::{Decimal, Millimetres, sin_cos_degrees};
 use crate::geometry::Precision;
 use crate::model::Positions;
-use crate::order::{self, Effort, Method, Pace, Shape};
+use crate::order::{self, Effort, Method, Shape, TimeModel};
 use crate::protocol::{CommandError, EscapedText, number};
 use crate::view::{Camera, Direction, Pose, View};
 use crate::visibility::{self, Crease};
@@ -131,13 +131,13 @@ impl PlotOptions {
     }
 
     /// The options of the ordering, with lengths in 1/256 step for a machine with `steps` per
-    /// millimetre, which travels and computes at this `pace`.
-    pub fn order(&self, steps: StepsPerMillimetre, pace: Pace) -> order::Options {
+    /// millimetre, which travels and computes at this `time_model`.
+    pub fn order(&self, steps: StepsPerMillimetre, time_model: TimeModel) -> order::Options {
         let lift_cost = self.lift_cost.wide_mul(steps[0]).saturating_mul_int(256);
         order::Options {
             method: self.method,
             shape: self.shape,
-            effort: self.effort.map_or(Effort::Auto(pace), Effort::Units),
+            effort: self.effort.map_or(Effort::Auto(time_model), Effort::Units),
             lift_cost: lift_cost.saturating_to_num(),
         }
     }

@@ -14,9 +14,9 @@ pub(super) enum Action {
     /// G10: sets a coordinate system.
     SetSystem,
     /// G28 or G30: goes to a kept position.
-    Go(Kept),
+    GoToStored(StoredPosition),
     /// G28.1 or G30.1: keeps the present position.
-    Keep(Kept),
+    StorePosition(StoredPosition),
     /// G53: coordinates are those of the machine.
     Machine,
     /// G92: shifts the coordinates.
@@ -35,7 +35,7 @@ pub(super) enum Action {
 
 /// A position that is kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::plotter) enum Kept {
+pub(in crate::plotter) enum StoredPosition {
     /// That of G28.
     Park,
     /// That of G30.
@@ -213,10 +213,10 @@ impl Block {
                 }
                 self.action = match (whole, part) {
                     (10, _) => Action::SetSystem,
-                    (28, 0) => Action::Go(Kept::Park),
-                    (28, 10) => Action::Keep(Kept::Park),
-                    (30, 0) => Action::Go(Kept::Second),
-                    (30, 10) => Action::Keep(Kept::Second),
+                    (28, 0) => Action::GoToStored(StoredPosition::Park),
+                    (28, 10) => Action::StorePosition(StoredPosition::Park),
+                    (30, 0) => Action::GoToStored(StoredPosition::Second),
+                    (30, 10) => Action::StorePosition(StoredPosition::Second),
                     (92, 0) => Action::Shift,
                     (92, 10) => Action::EndShift,
                     _ => return unknown,

@@ -1,6 +1,6 @@
 //! Coordinate systems, shifts and kept positions: G10, G28, G30, G43.1, G53 and G92.
 
-use super::block::{Action, Block, Kept};
+use super::block::{Action, Block, StoredPosition};
 use super::{Context, MachinePosition, Motion, Order, Parameters, Program, steps_at};
 use crate::array::MapEach;
 use crate::fixed::{Decimal, Millimetres};
@@ -38,16 +38,16 @@ impl Program {
                 self.shift = [x, y, z];
                 Order::Nothing
             }
-            Action::Keep(kept) => {
+            Action::StorePosition(kept) => {
                 if block.has_any(b"XYZ") {
                     return Err(BlockError::AxisConflict.into());
                 }
-                Order::Keep(kept, self.at)
+                Order::StorePosition(kept, self.at)
             }
-            Action::Go(kept) => {
+            Action::GoToStored(kept) => {
                 let to = match kept {
-                    Kept::Park => [context.park[0], context.park[1], Millimetres::ZERO],
-                    Kept::Second => context.parameters.second,
+                    StoredPosition::Park => [context.park[0], context.park[1], Millimetres::ZERO],
+                    StoredPosition::Second => context.parameters.second,
                 };
                 let via = self.destination(block, context)?;
                 // With coordinates, only the axes that are named go on.

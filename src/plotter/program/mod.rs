@@ -11,7 +11,7 @@ mod coordinates;
 mod parameters;
 mod pen;
 
-pub(super) use block::Kept;
+pub(super) use block::StoredPosition;
 pub(super) use parameters::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
 
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
@@ -129,7 +129,7 @@ pub(super) enum Order {
     /// A coordinate system gets a new origin.
     SetSystem(usize, MachinePosition),
     /// A position is kept.
-    Keep(Kept, MachinePosition),
+    StorePosition(StoredPosition, MachinePosition),
     /// The program ends.
     End,
     /// The position is reported.
@@ -216,7 +216,7 @@ impl Program {
         let settings = context.settings;
         let rule = PenRule::of(settings);
         self.begin_line();
-        let stood_down = self.stands_down(rule);
+        let was_down_at_rest = self.is_down_at_rest(rule);
         self.set_feed(&block)?;
         self.set_modes(&block, settings)?;
         let mut order = self.action(&block, context)?;
@@ -237,7 +237,7 @@ impl Program {
         }
         if matches!(order, Order::Nothing) {
             let has_dot = block.spindle == Some(5) && self.take_dot();
-            if has_dot || (self.stands_down(rule) && !stood_down) {
+            if has_dot || (self.is_down_at_rest(rule) && !was_down_at_rest) {
                 order = Order::Lower;
             }
         }

@@ -135,7 +135,7 @@ impl Program {
     }
 
     /// Whether the pen is down while the machine stands.
-    pub(super) fn stands_down(&self, rule: PenRule) -> bool {
+    pub(super) fn is_down_at_rest(&self, rule: PenRule) -> bool {
         let is_on = self.is_on() && !(self.pen.has_speed && self.speed == 0);
         match rule {
             PenRule::Auto => {
@@ -165,7 +165,7 @@ impl Program {
                 is_feed && self.pen.lines > 1
             }
             PenRule::Laser => is_feed && self.is_on() && self.speed > 0,
-            rule => self.stands_down(rule),
+            rule => self.is_down_at_rest(rule),
         };
         let count = if draws { &mut self.pen.inked } else { &mut self.pen.dry };
         if draws || is_feed {
@@ -231,7 +231,7 @@ impl Program {
         } else {
             None
         };
-        let stays = self.stands_down(rule);
+        let stays = self.is_down_at_rest(rule);
         let kept = if stays { self.pen } else { PenState::default() };
         self.pen = PenState {
             lines: 0,

@@ -11,7 +11,7 @@ use crate::plotter::job::{Collector, Job, PageSink, fit, move_to_front, union};
 use crate::plotter::options::{HiddenLines, PlotOptions};
 use crate::protocol::{CommandError, StoredModelError};
 use crate::stage::{Cancel, Scratch, Stage};
-use crate::tiles::{ProjectedStored, Sight, Tiles};
+use crate::tiles::{ProjectedStored, Tiles, ViewParameters};
 use crate::view::View;
 use crate::visibility::{SinkFull, Stretch, StretchSink, VisibilityError};
 use core::iter;
@@ -58,9 +58,9 @@ pub(super) fn prepare(
     }
     cancel.enter(Stage::Visibility);
     let source = ProjectedStored::new(model, &view);
-    let sight = Sight::new(&view, options.precision_of(model));
+    let parameters = ViewParameters::new(&view, options.precision_of(model));
     let mut scratch = Scratch::new(words);
-    let tiles = Tiles::new(&source, sight, options.visibility(&view), &mut scratch, cancel);
+    let tiles = Tiles::new(&source, parameters, options.visibility(&view), &mut scratch, cancel);
     let tiles = tiles.map_err(refused)?.ok_or(CommandError::NothingToPlot)?;
     let mut bounds = None;
     let around = &mut |vertex| {
@@ -170,7 +170,7 @@ fn find_lines(
     let lines_at = rest.len().saturating_sub(room);
     let (scratch, lines) = rest.split_at_mut(lines_at);
     let source = ProjectedStored::new(model, view);
-    let sight = Sight::new(view, options.precision_of(model));
+    let parameters = ViewParameters::new(view, options.precision_of(model));
     let options = &*options;
     let visibility = options.visibility(view);
     let collector = Collector::new(lines);
@@ -178,7 +178,7 @@ fn find_lines(
     let mut sink = PassSink { sink, pen: *pen };
     loop {
         let mut tiles =
-            Tiles::go_on(&source, sight, visibility, *paused, index).ok_or(too_dense)?;
+            Tiles::go_on(&source, parameters, visibility, *paused, index).ok_or(too_dense)?;
         let before = sink.sink.collector.count;
         let outcome = tiles.follow_next(Scratch::new(&mut *scratch), cancel, &mut sink);
         *paused = tiles.pause();

@@ -83,7 +83,7 @@ impl<I: Index> Inner<'_, I> {
     /// The options of the order of each part.
     fn order_of_parts(&self, search: &Search) -> order::Options {
         let settings = self.machine.settings();
-        search.options.order(settings.page_steps(), settings.pace(self.units_per_second()))
+        search.options.order(settings.page_steps(), settings.time_model(self.units_per_second()))
     }
 
     /// Notes what has been computed.

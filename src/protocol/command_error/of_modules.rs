@@ -280,7 +280,7 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
             error(151, "setting conflicts with another"),
             format_args!("a motor moves the pen at rest only: set $224=0 and $225=0, or $209=0"),
         ),
-        #[cfg(feature = "backlash-on-the-way")]
+        #[cfg(feature = "spread-backlash")]
         SettingError::Conflict(LimitsError::BacklashOfBelts) => row(
             error(151, "setting conflicts with another"),
             format_args!("belts take slack up at rest only: set $237=0, or $230=0 or 1"),

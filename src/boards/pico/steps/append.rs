@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{Ordering, compiler_fence};
 
-use penup::motion::{EventKind, EventQueue, StepEvent, StepTrain, StepWay};
+use penup::motion::{EventKind, EventQueue, StepDistances, StepEvent, StepTrain};
 
 use super::engine::{LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, TARGETS, WAIT_TICKS, target};
 use super::feed::{FEEDING, WRITTEN};
@@ -32,8 +32,8 @@ impl EventQueue for Steps {
                 self.moving = levels & StepEvent::AT_REST == 0;
                 let pins = (u32::from(levels) & LEVELS) ^ self.inverted_levels;
                 self.levels = pins & !PULSES;
-                if event.is_slack() {
-                    return self.push_slack(pins, event.ticks());
+                if event.takes_up_backlash() {
+                    return self.push_backlash(pins, event.ticks());
                 }
                 if pins & PULSES == 0 {
                     (pins | target::WAIT, WAIT_TICKS)
@@ -44,7 +44,7 @@ impl EventQueue for Steps {
         };
         // Without a braking rule, no lengths are passed on or counted.
         let is_counted = event.is_step() && STATE.brake().is_on();
-        let step = if is_counted { self.step_length.step() } else { StepWay::default() };
+        let step = if is_counted { self.step_length.step() } else { StepDistances::default() };
         if word & TARGETS == target::PULSE {
             self.put(word, event.ticks().saturating_sub(beyond), step);
         } else {
@@ -97,7 +97,7 @@ impl Steps {
     /// Appends a word that takes `beyond` ticks besides its count, followed by waits, so that it
     /// takes `ticks` in all.
     fn put_wait(&mut self, word: u32, beyond: u32, mut ticks: u32) {
-        let step = StepWay::default();
+        let step = StepDistances::default();
         if ticks <= BRAKED_TICKS {
             self.put(word, ticks.saturating_sub(beyond), step);
             return;
@@ -133,14 +133,14 @@ impl Steps {
         Ok(())
     }
 
-    /// Appends a pulse that takes up slack. For the state machine it is not a pulse, so that it is
-    /// counted separately: it is a wait while the pins are high and another while they are low.
-    fn push_slack(&mut self, pins: u32, ticks: u32) -> Result<(), StepEvent> {
+    /// Appends a pulse that takes up backlash. For the state machine it is not a pulse, so that it
+    /// is counted separately: it is a wait while the pins are high and another while they are low.
+    fn push_backlash(&mut self, pins: u32, ticks: u32) -> Result<(), StepEvent> {
         self.room = self.room.saturating_sub(1);
         let low = ticks.saturating_sub(self.pulse_ticks);
         for (levels, ticks) in [(pins, self.pulse_ticks), (self.levels, low)] {
             let count = ticks.saturating_sub(WAIT_TICKS);
-            self.put(levels | target::WAIT, count, StepWay::default());
+            self.put(levels | target::WAIT, count, StepDistances::default());
         }
         self.publish();
         Ok(())
@@ -170,7 +170,7 @@ impl Steps {
 
     /// Records the lengths of the next `count` words where all steps have the same length, in a few
     /// cycles per step.
-    fn record_equal_lengths(&self, step: StepWay, count: u32) {
+    fn record_equal_lengths(&self, step: StepDistances, count: u32) {
         let packed = pack(step);
         let first = (self.written % WORDS) as usize;
         let (around, behind) = LENGTHS.split_at(first);
@@ -191,7 +191,7 @@ impl Steps {
     }
 
     /// Writes one word with its count to the ring, and what its step adds to the path.
-    fn put(&mut self, word: u32, count: u32, step: StepWay) {
+    fn put(&mut self, word: u32, count: u32, step: StepDistances) {
         slot(self.written).store(word | count << 8, Ordering::Relaxed);
         lengths(self.written).store(pack(step), Ordering::Relaxed);
         self.written = self.written.wrapping_add(1);

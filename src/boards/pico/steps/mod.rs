@@ -89,8 +89,8 @@ pub struct Steps {
     taken: u32,
     /// The sum of the steps of the words counted so far, for x and y; it wraps.
     steps: (i32, i32),
-    /// The sum of the steps counted so far that took up slack; it wraps.
-    slack: (i32, i32),
+    /// The sum of the steps counted so far that took up backlash; it wraps.
+    backlash: (i32, i32),
     /// The sum of the ticks counted so far; it wraps.
     ticks: u32,
     /// Whether the machine is in motion after the last event.
@@ -134,7 +134,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         levels: RELEASED,
         taken: 0,
         steps: (0, 0),
-        slack: (0, 0),
+        backlash: (0, 0),
         ticks: 0,
         moving: false,
         rest_end: 0,
@@ -199,7 +199,7 @@ impl Steps {
             self.moving = false;
             self.resting = true;
         }
-        STATE.report_slack(self.slack);
+        STATE.report_backlash(self.backlash);
         STATE.report(self.steps, self.ticks, self.drained);
         let waiting = self.written.wrapping_sub(self.taken);
         let words = (WORDS - RESERVED).saturating_sub(waiting);
@@ -233,7 +233,7 @@ impl Steps {
             return;
         }
         let (mut counted, mut pulses) = (0, 0);
-        let (mut sums, mut slack) = ([0; 2], 0u32);
+        let (mut sums, mut backlash) = ([0; 2], 0u32);
         let (mut ticks, mut waits, mut pens) = (0u32, 0, 0);
         while counted < count {
             let row = row(self.taken.wrapping_add(counted), count - counted);
@@ -250,7 +250,7 @@ impl Steps {
             } else {
                 waits += 1;
                 if word & PULSES != 0 {
-                    slack = slack.wrapping_add(self.moves[(word & LEVELS) as usize]);
+                    backlash = backlash.wrapping_add(self.moves[(word & LEVELS) as usize]);
                 }
             }
         }
@@ -259,7 +259,7 @@ impl Steps {
             waits * WAIT_TICKS + pens * PEN_TICKS + pulses * (PULSE_TICKS + self.pulse_ticks);
         self.ticks = self.ticks.wrapping_add(ticks).wrapping_add(pulse_ticks).wrapping_add(beyond);
         add_packed(&mut self.steps, steps);
-        add_packed(&mut self.slack, slack);
+        add_packed(&mut self.backlash, backlash);
         self.taken = taken;
     }
 

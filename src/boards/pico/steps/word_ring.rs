@@ -2,7 +2,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use penup::motion::StepWay;
+use penup::motion::StepDistances;
 
 /// The number of words in the ring, a power of two.
 pub const WORDS: u32 = 2048;
@@ -18,8 +18,8 @@ const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 /// and nothing gives it a value before [`clear`].
 #[unsafe(link_section = ".ring")]
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
-/// For each word of the ring that is a step: `around` of [`StepWay`] in the lower half and `behind`
-/// in the upper one. For other words: 0.
+/// For each word of the ring that is a step: `around` of [`StepDistances`] in the lower half and
+/// `behind` in the upper one. For other words: 0.
 pub static LENGTHS: [AtomicU32; WORDS as usize] = [const { AtomicU32::new(0) }; WORDS as usize];
 
 /// For each group of words, the number of length units that were queued up to its end; it wraps.
@@ -60,11 +60,11 @@ pub fn sum(word: u32) -> &'static AtomicU32 {
 }
 
 /// Packs both lengths of a step into one word, so that they can be stored in an atomic.
-pub fn pack(step: StepWay) -> u32 {
+pub fn pack(step: StepDistances) -> u32 {
     step.around | step.behind << 16
 }
 
 /// Returns the way of a step that [`pack`] has packed.
-pub fn unpack(lengths: u32) -> StepWay {
-    StepWay { around: lengths & 0xFFFF, behind: lengths >> 16 }
+pub fn unpack(lengths: u32) -> StepDistances {
+    StepDistances { around: lengths & 0xFFFF, behind: lengths >> 16 }
 }

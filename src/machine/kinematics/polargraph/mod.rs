@@ -51,7 +51,7 @@ pub struct Anchors {
 /// # Errors
 /// [`LimitsError::Anchors`] if it reaches up to them.
 pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
-    #[cfg(feature = "backlash-on-the-way")]
+    #[cfg(feature = "spread-backlash")]
     if settings.is_on(Setting::BacklashDistance) {
         return Err(LimitsError::BacklashOfBelts);
     }

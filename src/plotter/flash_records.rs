@@ -1,7 +1,7 @@
 //! What a board with flash keeps through a loss of power: the records, and how far the job has
 //! come.
 //!
-//! A board owns a [`Kept`] and passes its calls of [`Board`](super::Board) on to it.
+//! A board owns a [`FlashRecords`] and passes its calls of [`Board`](super::Board) on to it.
 
 use super::{NotStored, Record, Stored};
 use crate::storage::{Log, Noted, Slots};
@@ -63,7 +63,7 @@ struct OpenLog {
 
 /// The records in the flash `F`.
 #[derive(Debug)]
-pub struct Kept<F> {
+pub struct FlashRecords<F> {
     /// The flash.
     pub flash: F,
     /// Where in it each record lies.
@@ -85,7 +85,7 @@ struct Ahead {
     log: Option<usize>,
 }
 
-impl<F: MultiwriteNorFlash> Kept<F> {
+impl<F: MultiwriteNorFlash> FlashRecords<F> {
     /// The records that lie in `flash` as `layout` says.
     pub const fn new(flash: F, layout: Layout) -> Self {
         Self {

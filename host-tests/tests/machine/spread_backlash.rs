@@ -1,4 +1,4 @@
-//! Slack that is taken up while the pen draws on: what a drive with that slack draws.
+//! Backlash that is taken up while the pen draws on: what a drive with that backlash draws.
 
 use crate::fixtures::{is_ready, point, with};
 use penup::boards::host::{Change, Stamped};
@@ -44,23 +44,23 @@ fn zigzags() -> Vec<Target> {
     targets
 }
 
-/// A machine with this slack of both drives, which is taken up within this distance; mm.
-fn settings(slack: f64, within: f64) -> Settings {
+/// A machine with this backlash of both drives, which is taken up within this distance; mm.
+fn settings(backlash: f64, within: f64) -> Settings {
     with(&[
-        (Setting::BacklashX, slack),
-        (Setting::BacklashY, slack),
+        (Setting::BacklashX, backlash),
+        (Setting::BacklashY, backlash),
         (Setting::BacklashDistance, within),
     ])
 }
 
-/// What a drive with slack made of the pins.
+/// What a drive with backlash made of the pins.
 struct Inked {
     /// Where the pen was on the paper, after each step that moved it.
     points: Vec<PagePoint>,
     end: PagePoint,
     /// From the first to the last step of the strokes, in seconds.
     seconds: f64,
-    /// The steps by which slack was taken up at rest.
+    /// The steps by which backlash was taken up at rest.
     at_rest: u32,
     /// The greatest acceleration of a motor over any 24 ms, in mm/s².
     acceleration: f64,
@@ -78,15 +78,15 @@ fn draw(
 ) -> Inked {
     let mut path = TargetList::new(targets);
     let mut seen = Vec::new();
-    let (mut at_rest, mut slack_before) = (0, point(0, 0));
+    let (mut at_rest, mut backlash_before) = (0, point(0, 0));
     let trace = pin_machine::run(settings, &mut path, 25_000, &mut |mut turn| {
         if turn.now == 0 {
             turn.machine.start(&mut TargetList::new(targets)).expect("within the travel");
         }
         seen.push((turn.now, turn.motors, turn.machine.position()));
-        let slack = point(turn.motors.x - turn.pins.x, turn.motors.y - turn.pins.y);
-        at_rest += slack.x.abs_diff(slack_before.x) + slack.y.abs_diff(slack_before.y);
-        slack_before = slack;
+        let backlash = point(turn.motors.x - turn.pins.x, turn.motors.y - turn.pins.y);
+        at_rest += backlash.x.abs_diff(backlash_before.x) + backlash.y.abs_diff(backlash_before.y);
+        backlash_before = backlash;
         visit(&mut turn)
     });
     let mut inked = follow(&trace, &settings, &seen);
@@ -94,7 +94,8 @@ fn draw(
     inked
 }
 
-/// Follows the pins with a drive that has slack, and compares where the machine said that it was.
+/// Follows the pins with a drive that has backlash, and compares where the machine said that it
+/// was.
 fn follow(trace: &[Stamped], settings: &Settings, seen: &[(u64, PagePoint, PagePoint)]) -> Inked {
     let mut drives = backlash_steps(settings).map(Backlash::new);
     let (mut up, mut height) = ([true; 2], 0);
@@ -198,11 +199,11 @@ fn deviation(inked: &Inked, targets: &[Target]) -> [f64; 2] {
 }
 
 #[test]
-fn slack_is_taken_up_without_a_stop_and_near_the_lines() {
+fn backlash_is_taken_up_without_a_stop_and_near_the_lines() {
     let draw = |settings, targets: &[Target]| {
         draw(settings, targets, &mut |turn| turn.now == 0 || !is_ready(turn.machine))
     };
-    // Of 0.1 mm of slack, the loops and the zigzags: how far the ink may be off, in mm.
+    // Of 0.1 mm of backlash, the loops and the zigzags: how far the ink may be off, in mm.
     for (targets, reversals, most) in [(loops(), 80, 0.045), (zigzags(), 24, 0.035)] {
         let end = targets.last().expect("a target").point;
         let tight = draw(settings(0.0, 0.0), &targets);
@@ -213,9 +214,9 @@ fn slack_is_taken_up_without_a_stop_and_near_the_lines() {
             let smooth = draw(settings(0.1, within), &targets);
             let [off, missed] = deviation(&smooth, &targets);
             println!(
-                "{reversals} turns: {:.2} s without slack, {:.2} s at rest, {:.2} s within \
+                "{reversals} turns: {:.2} s without backlash, {:.2} s at rest, {:.2} s within \
                  {within} mm; {} steps at rest; the ink is off by {off:.3} mm, and misses \
-                 {missed:.3} mm; {:.0} mm/s2, {:.0} without slack",
+                 {missed:.3} mm; {:.0} mm/s2, {:.0} without backlash",
                 tight.seconds,
                 at_rest.seconds,
                 smooth.seconds,
@@ -248,7 +249,7 @@ fn with_a_limit_on_jerk_it_is_the_same() {
 
 /// Wherever the machine is interrupted, it knows where the pen is: [`draw`] compares it.
 #[test]
-fn the_position_stays_known_whatever_interrupts_the_slack() {
+fn the_position_stays_known_whatever_interrupts_the_backlash() {
     let targets = zigzags();
     for case in 0..60u64 {
         let instant = 12_000_000 + 1_370_000 * case;
@@ -268,7 +269,7 @@ fn the_position_stays_known_whatever_interrupts_the_slack() {
                     let _ = turn.machine.unlock();
                 }
                 State::Idle if ordered && !begun_again && is_ready(turn.machine) => {
-                    // The slack goes on from where it is.
+                    // The backlash goes on from where it is.
                     begun_again = true;
                     if case % 3 > 0 {
                         let mut first = TargetList::new(&targets);
@@ -286,7 +287,7 @@ fn the_position_stays_known_whatever_interrupts_the_slack() {
 }
 
 #[test]
-fn belts_take_slack_up_at_rest_only() {
+fn belts_take_backlash_up_at_rest_only() {
     let refused = Err(SettingError::Conflict(LimitsError::BacklashOfBelts));
     let mut settings = settings(0.1, 0.5);
     assert_eq!(settings.set(Setting::Kinematics, Value::from_num(2)), refused);
