@@ -1,4 +1,4 @@
-//! The block in work: its moves, and how far they are.
+//! The current block: its moves, and how far they are carried out.
 
 use super::emitter::Train;
 use super::lookahead::{BlockKind, Chord, MOST_CHORDS};
@@ -7,52 +7,54 @@ use super::{Block, PathLength};
 use crate::drawing::LineType;
 use crate::step::{Line, Pattern};
 
-/// The block in work.
+/// The current block and the progress within it.
 #[derive(Debug, Clone)]
 pub(super) struct BlockCursor {
     pub(super) line: Line,
     pub(super) ink: Option<LineType>,
     kind: BlockKind,
     pub(super) pattern: Pattern,
+    /// The number of the current piece of a dotted line.
     pub(super) piece: u32,
     pub(super) length: PathLength,
     #[cfg(feature = "spread-backlash")]
     extra: PathLength,
     pub(super) curve_limit: PathLength,
-    /// mm per move, 2^-32.
+    /// The length of a move, in units of 2^-32 mm.
     pub(super) move_length: u64,
+    /// The number of moves of the block.
     pub(super) moves: u32,
     pub(super) moves_done: u32,
-    /// Moves at the end of the piece.
+    /// The number of moves up to the end of the current piece.
     pub(super) piece_moves: u32,
-    /// From the start of the block to where the plan is, 2^-32 mm.
+    /// The distance from the start of the block to the position of the plan, in units of 2^-32 mm.
     pub(super) position: u64,
-    /// From there to where the next move is due.
+    /// The distance from there to the position at which the next move is due.
     pub(super) to_next: u64,
-    /// Where it shall stand, if that is not the end: a position like the one above, and else the
-    /// greatest number.
+    /// The position at which the machine is to stop, counted like `position`; the greatest number
+    /// if it is to go on to the end.
     stop: u64,
-    /// The slice in work begins at `position`.
+    /// The moves of the current slice, which begins at `position`.
     pub(super) slice: Option<SliceMoves>,
-    /// What is left of a slice that the end of a chord cut.
+    /// The rest of a slice that was cut at the end of a chord.
     rest: Slice,
     chords: [Chord; MOST_CHORDS - 1],
     chord_count: u8,
-    /// How many of them are begun.
+    /// The number of chords that are begun.
     begun: u8,
-    /// From the start of the block to the end of the chord in work: 2^-32 mm. Without meaning in
-    /// the last one.
+    /// The distance from the start of the block to the end of the current chord, in units of 2^-32
+    /// mm. It has no meaning in the last chord.
     chord_end: u64,
 }
 
-/// The length of chords, and how many moves they are.
+/// Returns the total length of chords, and the number of their moves.
 #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
 fn sums(chords: &[Chord]) -> (PathLength, u32) {
     (chords.iter().map(Chord::length).sum(), chords.iter().map(Chord::moves).sum())
 }
 
 impl BlockCursor {
-    /// The beginning of a block, its dots about `dot_length` long.
+    /// Begins a block whose dots, if it is dotted, are about `dot_length` long.
     #[inline(always)] // A copy of what it returns costs as much as a plan.
     pub(super) fn new(block: &Block, dot_length: PathLength) -> Self {
         let line = Line::beside(block.dx, block.dy, block.offsets);
@@ -94,7 +96,7 @@ impl BlockCursor {
         }
     }
 
-    /// Whether the piece in work is drawn.
+    /// Whether the current piece is drawn.
     pub(super) fn is_inked(&self) -> bool {
         self.ink.is_some() && self.kind != BlockKind::Gap && Pattern::inked(self.piece)
     }
@@ -104,7 +106,7 @@ impl BlockCursor {
         self.kind == BlockKind::Backlash
     }
 
-    /// How much of the block the pen draws.
+    /// The length of what the pen draws in the block.
     pub(super) fn drawn(&self) -> PathLength {
         #[cfg(feature = "spread-backlash")]
         return self.length.saturating_sub(self.extra);
@@ -112,18 +114,19 @@ impl BlockCursor {
         self.length
     }
 
-    /// Whether a motor turns round that has backlash.
+    /// Whether a motor with backlash reverses in the block.
     #[cfg(feature = "spread-backlash")]
     pub(super) fn reverses(&self) -> bool {
         matches!(self.kind, BlockKind::Backlash | BlockKind::Reversal)
     }
 
-    /// Whether it is the last one.
+    /// Whether the current piece is the last one.
     pub(super) fn is_last_piece(&self) -> bool {
         self.piece_moves == self.moves
     }
 
-    /// From the plan's position to the end of the piece, 2^-32 mm.
+    /// The distance from the position of the plan to the end of the current piece, in units of
+    /// 2^-32 mm.
     pub(super) fn room(&self) -> u64 {
         let end = if self.is_last_piece() {
             u64::from(self.length.to_bits()) << 14
@@ -133,12 +136,13 @@ impl BlockCursor {
         end.saturating_sub(self.position)
     }
 
-    /// From the plan's position to the first where the machine can stand, which is half a move
-    /// behind one, not nearer than `least`: 2^-32 mm. No further than the end of the piece.
+    /// The distance from the position of the plan to the first position, not nearer than `least`,
+    /// at which the machine can be at rest: half a move after a step. It is in units of 2^-32 mm,
+    /// and does not exceed the distance to the end of the piece.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn to_whole_step(&self, least: u64) -> u64 {
         let length = self.move_length.max(1);
-        // The first such position, or the one before it.
+        // The first position of this kind, or the one before it.
         let behind = (self.to_next + length / 2) % length;
         let stand = behind + least.saturating_sub(behind).div_ceil(length) * length;
         let end = self.chord_end.saturating_sub(self.position);
@@ -148,7 +152,7 @@ impl BlockCursor {
         self.to_whole_step_behind(least, stand, end)
     }
 
-    /// As [`Self::to_whole_step`], from the `end` of the chord in work on.
+    /// Does the work of [`Self::to_whole_step`] from the `end` of the current chord on.
     #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
     fn to_whole_step_behind(&self, least: u64, mut stand: u64, mut end: u64) -> u64 {
         for chord in self.later_chords().iter().skip(self.begun.into()) {
@@ -164,8 +168,8 @@ impl BlockCursor {
         stand.min(self.room())
     }
 
-    /// Stands at the first such position that is not nearer than `least`, and stays with it: how
-    /// far that is, 2^-32 mm.
+    /// Chooses the first position not nearer than `least` at which the machine can be at rest, and
+    /// keeps this choice. Returns the distance to it, in units of 2^-32 mm.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     pub(super) fn stop_behind(&mut self, least: u64) -> u64 {
         if self.stop == u64::MAX {
@@ -174,19 +178,19 @@ impl BlockCursor {
         self.stop.saturating_sub(self.position)
     }
 
-    /// Goes on to the end.
+    /// Cancels the stop, so that the block is carried out to its end.
     pub(super) fn resume(&mut self) {
         self.stop = u64::MAX;
     }
 
-    /// The same as a length.
+    /// The distance from the position of the plan to the end of the current piece.
     pub(super) fn left(&self) -> PathLength {
         // Rounded by less than 2^-18 mm; a move is 2^-12 mm or longer and the last one is due half
         // a move before the end, so none is lost. A block is no longer than its length.
         PathLength::from_bits((self.room() >> 14) as u32)
     }
 
-    /// Takes what is left of the last slice into work. Whether there is anything.
+    /// Begins the rest of the last slice. Returns whether there is one.
     pub(super) fn begin_rest(&mut self) -> bool {
         let has_rest = self.rest.distance > 0;
         if has_rest {
@@ -201,18 +205,18 @@ impl BlockCursor {
         self.begin_slice(rest);
     }
 
-    /// Takes the next slice into work, up to the end of the chord in work.
+    /// Begins the next slice, up to the end of the current chord.
     pub(super) fn begin_slice(&mut self, mut slice: Slice) {
         if !self.is_last_chord() {
             slice = self.cut_slice(slice);
         }
         let mut moves = SliceMoves { slice, left: 0, due: 0, interval: 0 };
         if let Some(room) = u64::from(slice.distance).checked_sub(self.to_next + 1) {
-            // Below 1 mm, or 2^32: the settings allow no longer steps.
+            // The settings limit a step to less than 1 mm, which is 2^32 units.
             let move_length = (self.move_length as u32).max(1);
-            // Less than the slice.
+            // Both are less than the distance of the slice.
             let (room, first) = (room as u32, self.to_next as u32);
-            // The length of a move is rounded down, which leaves a rest of nothing behind the last.
+            // The length of a move is rounded down, so a rest without a move follows the last one.
             moves.left = (room / move_length + 1).min(self.line.remaining());
             let clock = SliceClock::new(slice);
             moves.due = clock.time_of(first);
@@ -221,24 +225,24 @@ impl BlockCursor {
         self.slice = Some(moves);
     }
 
-    /// Returns what a slice does within the chord in work, and keeps the rest.
+    /// Returns the part of a slice within the current chord, and keeps the rest.
     #[inline(never)] // Blocks without chords never come here: it would only fill the cache.
     fn cut_slice(&mut self, slice: Slice) -> Slice {
         let room = self.chord_end.saturating_sub(self.position);
         if u64::from(slice.distance) <= room {
             return slice;
         }
-        // Less than the distance, and so than the time.
+        // The room is less than the distance, so the result is less than the time.
         let time = (u64::from(slice.time) * room / u64::from(slice.distance)) as u32;
         let distance = room as u32;
         self.rest = Slice { distance: slice.distance - distance, time: slice.time - time };
         Slice { distance, time }
     }
 
-    /// The slice in work is done. Whether a new chord begins.
+    /// Ends the current slice. Returns whether a new chord begins.
     pub(super) fn end_slice(&mut self, slice: Slice) -> bool {
         self.position += u64::from(slice.distance);
-        // What is behind the last move is a rest of nothing.
+        // After the last move only a rest without a move is left.
         self.to_next = self.to_next.saturating_sub(slice.distance.into());
         self.slice = None;
         let ends = !self.is_last_chord() && self.position >= self.chord_end;
@@ -265,12 +269,12 @@ impl BlockCursor {
         self.chords.get(..usize::from(self.chord_count)).unwrap_or(&[])
     }
 
-    /// Whether no chord is behind the one in work.
+    /// Whether the current chord is the last one of the block.
     fn is_last_chord(&self) -> bool {
         self.begun == self.chord_count
     }
 
-    /// So many moves of the slice in work are made.
+    /// Records that `count` moves of the current slice were made.
     pub(super) fn advance(&mut self, count: usize) {
         self.moves_done += count as u32;
         self.to_next += self.move_length * count as u64;
@@ -280,8 +284,8 @@ impl BlockCursor {
         }
     }
 
-    /// When the next move of the slice in work is due after where that begins, in sixteenths of
-    /// ticks; `None` if it has no more.
+    /// The time from the beginning of the current slice to its next move, in sixteenths of ticks;
+    /// `None` if it has no more moves.
     #[cfg(feature = "pen-overlap")]
     pub(super) fn next_due(&self) -> Option<u32> {
         let moves = self.slice.as_ref().filter(|moves| moves.left > 0)?;
@@ -298,45 +302,47 @@ impl BlockCursor {
     }
 }
 
-/// A slice in work.
+/// The moves of the current slice.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SliceMoves {
     pub(super) slice: Slice,
-    /// Moves left.
+    /// The number of moves that are left.
     pub(super) left: u32,
-    /// When the next one is due after the slice's beginning, and how long it is from one to the
-    /// next: units of [`Train`], below 2^31.
+    /// The time from the beginning of the slice to the next move, in units of [`Train`], below
+    /// 2^31.
     due: u32,
+    /// The time from one move to the next, in the same units.
     interval: u32,
 }
 
 impl SliceMoves {
-    /// The next moves, at most `most`.
+    /// The next moves of the slice, at most `most`.
     pub(super) fn train(&self, most: usize) -> Train {
         let count = most.min(self.left as usize);
         Train { first: self.due, interval: self.interval, count }
     }
 }
 
-/// Tells when the places of a slice are reached.
+/// Converts distances within a slice to the times at which they are reached.
 struct SliceClock {
-    /// By which a distance is shifted so that it counts as a fraction of the slice's.
+    /// The shift that turns a distance into a fraction of that of the slice.
     zeros: u32,
-    /// Time over distance, 2^31 in all at most.
+    /// The time over the distance, at most 2^31.
     slowness: u32,
 }
 
 impl SliceClock {
     fn new(slice: Slice) -> Self {
         let zeros = slice.distance.leading_zeros();
-        // From 2^31 on, and up to 2^31, so that 2^31 is the greatest quotient.
+        // The distance is at least 2^31 and the time at most 2^31, so that 2^31 is the greatest
+        // quotient.
         let distance = u64::from(slice.distance << zeros).max(1);
         let time = u64::from(slice.time << Train::BITS_BELOW);
         Self { zeros, slowness: ((time << 31) / distance) as u32 }
     }
 
-    /// When a position within the slice is reached: below 2^31 units of [`Train`], and 2 units
-    /// early at most.
+    /// Returns the time at which a position within the slice is reached, in units of [`Train`]. It
+    /// is below 2^31, and at most 2 units early.
     fn time_of(&self, position: u32) -> u32 {
         ((u64::from(position << self.zeros) * u64::from(self.slowness)) >> 31) as u32
     }

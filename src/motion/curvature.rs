@@ -1,66 +1,68 @@
-//! How fast a curve that comes as many short blocks may be passed.
+//! Determines how fast a curve may be passed that consists of many short blocks.
 //!
-//! The points lie on the grid of steps, so two short blocks say nothing about the curve that they
-//! are part of: the angle between them is mostly rounding. Circles through three points further
-//! apart say more. So each level of [`Curvature`] looks at every 2nd, 4th, 8th … point. The height
-//! of the middle point over the chord of the outer two counts less what rounding can explain;
-//! the narrowest of the circles that remain is the curve's.
+//! The points lie on the grid of steps, so two short blocks tell nothing about the curve that they
+//! are part of: the angle between them is mostly rounding. Circles through three points that are
+//! further apart tell more. So each level of [`Curvature`] examines every 2nd, 4th, 8th … point.
+//! The height of the middle point over the chord of the outer two is reduced by what rounding can
+//! explain, and the narrowest of the circles that result is that of the curve.
 //!
-//! A tight bend is over before points are so far apart that rounding no longer matters. There the
-//! turn between the two chords, more than 21°, says that it is one, so no more than a quarter of
-//! what rounding can explain is counted less. Such a circle stands for all of its arc and for one
-//! more stride on both sides: wherever the bend begins, between its beginning and the first circle
-//! that lies in it are less points than that. Beside a line much longer than the chords, a curve
-//! begins or ends, so no circle joins the two ([`Curvature::restart`]).
+//! A tight bend ends before points are so far apart that rounding no longer matters. There the
+//! angle between the two chords, more than 21°, proves that it is a bend, so the height is reduced
+//! by only a quarter of what rounding can explain. Such a circle is valid for its whole arc and for
+//! one more stride on both sides, because there are fewer points than that between the beginning of
+//! the bend and the first circle that lies within it. Beside a line much longer than the chords, a
+//! curve begins or ends, so no circle joins the two ([`Curvature::restart`]).
 
 use super::{Limits, Lookahead, PathLength};
 use crate::drawing::PagePoint;
 
-/// The last level looks at every 64th point.
+/// The number of levels. The last one examines every 64th point.
 const LEVELS: usize = 6;
 
-/// Units of 2^-12 mm: a step is at least one, a page at most 2^26.
+/// Coordinates are in units of 2^-12 mm: a step is at least one unit, and a page at most 2^26.
 const FRACTION_BITS: u32 = 12;
 
-/// A bend is tight while the height of its middle over a chord is less than so many times what
-/// rounding can explain.
+/// A bend counts as tight while the height of its middle over a chord is less than this many times
+/// what rounding can explain.
 const TIGHT_HEIGHT: u64 = 24;
 
+/// A point of the path, in units of 2^-12 mm.
 #[derive(Debug, Clone, Copy, Default)]
 struct PathPoint {
     x: i32,
     y: i32,
 }
 
-/// Every so many points of the path.
+/// The points of the path at one stride.
 #[derive(Debug, Clone, Copy, Default)]
 struct Level {
-    /// The last two points looked at, the later first.
+    /// The last two points examined, the later one first.
     points: [PathPoint; 2],
     /// The last circle.
     circle: Circle,
 }
 
-/// What a circle through three points says of the curve.
+/// The limit that results from a circle through three points.
 #[derive(Debug, Clone, Copy, Default)]
 struct Circle {
-    /// Half its radius; 0 if it slows nothing.
+    /// Half the radius of the circle, which is the greatest stopping distance; 0 if it limits
+    /// nothing.
     limit: PathLength,
-    /// Whether it is that of a tight bend.
+    /// Whether the circle is that of a tight bend.
     is_tight: bool,
 }
 
-/// The path since the last sharp corner, as far as it matters.
+/// What must be known of the path since the last sharp corner to find circles through its points.
 #[derive(Debug, Default)]
 pub(super) struct Curvature {
     levels: [Level; LEVELS],
-    /// Points since the corner.
+    /// The number of points since the corner.
     count: u32,
 }
 
 impl Curvature {
-    /// The path stops, turns sharply, or passes from chords to a much longer line at `point`, the
-    /// end of the last block of `blocks`: the curve so far is complete, the next begins.
+    /// Ends the curve at `point`, the end of the last block of `blocks`, and begins the next one.
+    /// There the path stops, turns sharply, or passes from chords to a much longer line.
     pub(super) fn restart(
         &mut self,
         limits: &Limits,
@@ -79,10 +81,10 @@ impl Curvature {
         self.levels = [Level { points, circle: Circle::default() }; LEVELS];
     }
 
-    /// The path goes on to `point`, the end of the last block of `blocks`. Limits the blocks that
-    /// lie on too narrow a curve.
-    // Where each chord is pushed: elsewhere it would drive that out of the Pico's cache. The
-    // LM3S6965 has none, and no flash for two of it.
+    /// Extends the path to `point`, the end of the last block of `blocks`, and limits the blocks
+    /// that lie on a narrow curve.
+    // Inlined where each chord is pushed, because elsewhere it would drive that code out of the
+    // Pico's cache. The LM3S6965 has no cache, and no flash for two copies.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     #[cfg_attr(feature = "lm3s6965", inline(never))]
     pub(super) fn extend(&mut self, limits: &Limits, point: PagePoint, blocks: &mut Lookahead<'_>) {
@@ -108,8 +110,8 @@ impl Curvature {
             if is_tight {
                 most = (3 * stride).min(self.count);
             } else if !before.is_tight {
-                // The circle spans the last two strides. It stands for the middle half, and for the
-                // beginning of the curve.
+                // The circle spans the last two strides. It is valid for the middle half, and for
+                // the beginning of the curve.
                 let half = if self.count == 2 * stride { stride } else { stride / 2 };
                 (least, most) = (stride / 2 + 1, stride + half);
             }
@@ -120,6 +122,7 @@ impl Curvature {
     }
 }
 
+/// Converts a point from steps.
 fn path_point(limits: &Limits, point: PagePoint) -> PathPoint {
     let [step_x, step_y] = limits.step_length;
     let along = |steps: i32, step: u32| {
@@ -130,8 +133,8 @@ fn path_point(limits: &Limits, point: PagePoint) -> PathPoint {
     PathPoint { x: along(point.x, step_x.to_bits()), y: along(point.y, step_y.to_bits()) }
 }
 
-/// The circle through three points.
-#[inline(always)] // As above.
+/// Computes the limit that results from the circle through three points.
+#[inline(always)] // For the same reason as `extend`.
 fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint) -> Circle {
     // Within ±2^28, so products of two stay below 2^57.
     let (ax, ay) = (middle.x - first.x, middle.y - first.y);
@@ -139,8 +142,9 @@ fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint)
     let (cx, cy) = (last.x - first.x, last.y - first.y);
     let twice_area = (i64::from(ax) * i64::from(by) - i64::from(ay) * i64::from(bx)).unsigned_abs();
     let top = u64::from(limits.top.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
-    // r = abc / 2·(twice the area), and each length is at least its greater part, and 11/16 of
-    // both: most circles are wide, and known to be without a root.
+    // The radius is abc / 2·(twice the area). Each length is at least its greater component, and at
+    // least 11/16 of the sum of both. That suffices to recognize most circles as wide without a
+    // square root.
     let least = |x: i32, y: i32| {
         let (x, y) = (x.unsigned_abs(), y.unsigned_abs());
         let sum = x + y;
@@ -148,7 +152,7 @@ fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint)
     };
     let c = least(cx, cy);
     let rounding = u64::from(limits.rounding.to_bits() >> (PathLength::FRAC_NBITS - FRACTION_BITS));
-    // The height over the chord is that of rounding.
+    // Rounding alone can explain the height over the chord.
     if twice_area < (rounding + 1) * c {
         return Circle::default();
     }
@@ -163,7 +167,7 @@ fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint)
         square(x) + square(y)
     };
     let (a, b, c) = (squared(ax, ay), squared(bx, by), squared(cx, cy));
-    // Turned so far that the chord says nothing about one curve: c below 15/16 of a or b.
+    // The path turns so far (c below 15/16 of a or b) that the three points are not on one curve.
     if 256 * c < 225 * a.max(b) {
         return Circle::default();
     }
@@ -174,10 +178,10 @@ fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint)
     let height = twice_area.checked_div(c).unwrap_or(0);
     let is_low = height < TIGHT_HEIGHT * rounding;
     if !is_low && across > 2 * along {
-        // By more than 63°: points nearer to each other say what it is.
+        // The path turns by more than 63°, so points nearer to each other determine the curve.
         return Circle::default();
     }
-    // By more than 21°.
+    // The path turns by more than 21°.
     let is_tight = is_low && 8 * across >= 3 * along;
     let height = height.saturating_sub(if is_tight { rounding / 4 } else { rounding });
     let limit = match (a * b).checked_div(4 * height) {

@@ -1,29 +1,32 @@
-//! Puts moves and pen changes on the time line: least intervals, direction set-up, long waits.
+//! Converts moves and pen changes with their times to step events. It observes the least intervals
+//! and the set-up time of directions, and splits long waits.
 
 use super::lift::LiftStep;
 use super::profile::FRACTION_BITS;
 use super::{EventQueue, Limits, StepEvent, StepTrain};
 use crate::step::{Direction, Line};
 
-/// Builds events. The last one is kept back until the time of the next is known.
+/// Builds events. The last one is kept back until the time of the next is known, because it lasts
+/// until then.
 ///
-/// Times are sixteenths of ticks that wrap, cut to whole ticks here; two calls lie less than 2^31
-/// of them (5 s) apart.
+/// Times are in sixteenths of ticks and wrap; they are rounded down to whole ticks here. Two calls
+/// are less than 2^31 sixteenths (5 s) apart.
 #[derive(Debug)]
 pub struct Emitter {
-    /// Sixteenths of ticks.
+    /// The least time between two pulses, in sixteenths of ticks.
     least_interval: u32,
-    /// Sixteenths of ticks.
+    /// The time from a change of direction to the pulse, in sixteenths of ticks.
     setup: u32,
-    /// Level of the direction pins.
+    /// The levels of the direction pins.
     directions: u8,
+    /// The event that is kept back, and its time.
     pending: Option<(StepEvent, u32)>,
-    /// Of all events handed over; wraps.
+    /// The ticks of all events handed over; wraps.
     ticks: u32,
 }
 
 impl Emitter {
-    /// Room in the queue that one call may need.
+    /// The room in the queue that one call may need.
     pub const ROOM: usize = 4;
 
     pub(super) fn new(limits: &Limits) -> Self {
@@ -41,7 +44,7 @@ impl Emitter {
         self.setup = limits.setup_ticks << FRACTION_BITS;
     }
 
-    /// Ticks of all events handed over; wraps.
+    /// The ticks of all events handed over; wraps.
     pub fn ticks(&self) -> u32 {
         self.ticks
     }
@@ -51,12 +54,12 @@ impl Emitter {
         self.pending.is_some_and(|(event, _)| event.is_step())
     }
 
-    /// Whether an event waits for the time of the next.
+    /// Whether an event is kept back.
     pub(super) fn is_open(&self) -> bool {
         self.pending.is_some()
     }
 
-    /// One move at `time`, or later if the pins need longer. Returns when.
+    /// Makes a move at `time`, or later if the pins need longer. Returns the time of the move.
     #[inline]
     pub(super) fn step(
         &mut self,
@@ -83,9 +86,9 @@ impl Emitter {
         (self.directions ^ levels.directions) & levels.axes != 0
     }
 
-    /// Some moves of `line`, which do not [turn](Emitter::turns), after
-    /// [another](Emitter::has_stepped). They take place at the times of `train` after `start`, or
-    /// later if the pins need longer. They are no faster than [`Emitter::keeps_up`] says.
+    /// Makes some moves of `line` at the times of `train` after `start`, or later if the pins need
+    /// longer. The moves must not [reverse](Emitter::reverses) an axis, must follow [another
+    /// move](Emitter::has_stepped), and must not be faster than [`Emitter::keeps_up`] allows.
     pub(super) fn steps(
         &mut self,
         start: u32,
@@ -129,7 +132,8 @@ impl Emitter {
         Ok(TrainResult { late, diagonals })
     }
 
-    /// The same for moves of any kind, one by one.
+    /// Makes some moves of `line`, like [`Emitter::steps`], but one by one and without its
+    /// conditions.
     pub(super) fn single_steps(
         &mut self,
         start: u32,
@@ -150,19 +154,20 @@ impl Emitter {
         Ok(stepped)
     }
 
-    /// Whether the pins keep up with moves at such intervals.
+    /// Whether the pins keep up with the intervals of a train.
     pub(super) fn keeps_up(&self, train: &Train) -> bool {
-        // Cut to whole ticks, an interval may lose one.
+        // Rounded down to whole ticks, an interval may lose one.
         (train.interval >> Train::BITS_BELOW) & !((1 << FRACTION_BITS) - 1) >= self.least_interval
     }
 
-    /// Nothing changes at `time`: begins the time line, or splits a long wait.
+    /// Adds an event at `time` that changes nothing. It begins the sequence of events, or splits a
+    /// long wait.
     pub(super) fn hold(&mut self, time: u32, queue: &mut dyn EventQueue) -> Result<u32, StepEvent> {
         self.put(self.holding(), time, queue)
     }
 
-    /// Everything stands from `time` on, as for [`Emitter::hold`], and the queue may run dry before
-    /// the next event.
+    /// Adds an event like [`Emitter::hold`], from which on nothing moves, so that the queue may run
+    /// empty before the next one.
     pub(super) fn pause(
         &mut self,
         time: u32,
@@ -171,7 +176,7 @@ impl Emitter {
         self.put(StepEvent::levels(self.level_bits() | StepEvent::AT_REST, 0), time, queue)
     }
 
-    /// If the pending event is older than 2^22 ticks, splits the wait.
+    /// Splits the wait if the pending event is older than 2^22 ticks.
     #[inline]
     pub(super) fn split_long_wait(
         &mut self,
@@ -186,9 +191,9 @@ impl Emitter {
         }
     }
 
-    /// The middle between the last event and one at `time`, but not before `least`: far from both,
-    /// since the pen of a board may move some microseconds late. `None` if an event there would
-    /// delay the one at `time`.
+    /// Returns the middle between the last event and one at `time`, but not before `least`. The
+    /// middle is far from both, because the pen of a board may move some microseconds late. `None`
+    /// if an event there would delay the one at `time`.
     #[cfg(feature = "pen-overlap")]
     pub(super) fn midway(&self, least: u32, time: u32) -> Option<u32> {
         let (_, since) = self.pending?;
@@ -198,7 +203,7 @@ impl Emitter {
         is_free.then_some(at)
     }
 
-    /// The pen goes to `height` at `time`.
+    /// Sends the pen to `height` at `time`.
     pub(super) fn pen(
         &mut self,
         height: u8,
@@ -208,7 +213,7 @@ impl Emitter {
         self.put(StepEvent::pen(height, 0), time, queue)
     }
 
-    /// The pen's motor does this at `time`.
+    /// Carries out the next action of the pen's motor at `time`.
     pub(super) fn lift(
         &mut self,
         next: LiftStep,
@@ -218,7 +223,8 @@ impl Emitter {
         self.put(StepEvent::lift(next.step, next.down, 0), time, queue)
     }
 
-    /// Everything stands from `time` on and the queue may run dry.
+    /// Ends the sequence of events at `time`. From then on nothing moves and the queue may run
+    /// empty.
     pub(super) fn rest(
         &mut self,
         time: u32,
@@ -232,7 +238,8 @@ impl Emitter {
         Ok(after)
     }
 
-    /// Forgets the pending event: the queue was thrown away, after `ticks`.
+    /// Forgets the pending event after the queue was discarded. The events carried out lasted
+    /// `ticks`.
     pub(super) fn restart(&mut self, ticks: u32) {
         self.pending = None;
         self.ticks = ticks;
@@ -263,7 +270,7 @@ impl Emitter {
         Ok(time)
     }
 
-    /// Hands the pending event over; the next begins at `until`.
+    /// Hands over the pending event, which lasts `until` the next one.
     #[inline]
     fn hand_over(&mut self, until: u32, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
         if let Some((event, since)) = self.pending {
@@ -276,38 +283,38 @@ impl Emitter {
     }
 }
 
-/// Moves at even intervals.
+/// The times of moves at even intervals.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Train {
-    /// Until the first of them, 2^-15 ticks.
+    /// The time until the first move, in units of 2^-15 ticks.
     pub(super) first: u32,
-    /// From one to the next, 2^-15 ticks.
+    /// The time from one move to the next, in units of 2^-15 ticks.
     pub(super) interval: u32,
-    /// How many there are; the last is less than 2^17 ticks away.
+    /// The number of moves; the last one is less than 2^17 ticks away.
     pub(super) count: usize,
 }
 
 impl Train {
-    /// Below sixteenths.
+    /// The number of fractional bits of a time that are below sixteenths of ticks.
     pub(super) const BITS_BELOW: u32 = StepTrain::FRACTION_BITS - FRACTION_BITS;
 
-    /// When a move is due, in sixteenths of ticks, if the train begins at `start`.
+    /// The time at which a move is due, in sixteenths of ticks, if the train begins at `start`.
     pub(super) fn due(&self, start: u32, number: u32) -> u32 {
         let after = self.first.wrapping_add(self.interval.wrapping_mul(number));
         start.wrapping_add(after >> Self::BITS_BELOW)
     }
 }
 
-/// What became of a [`Train`].
+/// The result of making the moves of a [`Train`].
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TrainResult {
-    /// By how much later it took place, sixteenths of ticks.
+    /// By how much the moves were delayed, in sixteenths of ticks.
     pub(super) late: u32,
-    /// Diagonal moves in it.
+    /// The number of diagonal moves.
     pub(super) diagonals: usize,
 }
 
-/// Cuts the sixteenths.
+/// Rounds a time down to whole ticks.
 pub(super) const fn whole_ticks(time: u32) -> u32 {
     time >> FRACTION_BITS << FRACTION_BITS
 }
@@ -316,28 +323,28 @@ fn later(a: u32, b: u32) -> u32 {
     if (a.wrapping_sub(b)).cast_signed() < 0 { b } else { a }
 }
 
-/// What the two moves of a line do to the pins.
+/// The levels of the pins for the two kinds of moves of a line.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct LineLevels {
     pub(super) straight: MoveLevels,
     pub(super) diagonal: MoveLevels,
 }
 
-/// What a move does to the pins.
+/// The levels of the pins for a move.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct MoveLevels {
-    /// The axes that step, and whether they take up backlash.
+    /// The bits of the axes that step, and of whether they take up backlash.
     pulses: u8,
-    /// Their direction pins.
+    /// The direction pins of these axes.
     axes: u8,
-    /// Those of them that count down.
+    /// The direction pins of those axes that count down.
     directions: u8,
 }
 
 impl MoveLevels {
-    /// Those of a move in `direction`.
+    /// The levels for a move in `direction`.
     pub(super) fn of(direction: Direction) -> Self {
-        /// By the numbers of directions.
+        /// The levels for all directions, indexed by their numbers.
         const ALL: [MoveLevels; 9] = {
             let mut all = [MoveLevels { pulses: 0, axes: 0, directions: 0 }; 9];
             let mut index = 0;
@@ -371,7 +378,7 @@ impl MoveLevels {
         levels
     }
 
-    /// The same where the motors take up their backlash.
+    /// The levels for the same move if it takes up backlash.
     pub(super) const fn for_backlash(self) -> Self {
         Self { pulses: self.pulses | StepEvent::AT_REST, ..self }
     }

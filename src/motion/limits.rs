@@ -1,40 +1,40 @@
-//! The settings of motion in the units in which motion computes.
+//! The settings of motion, converted to the units in which motion is computed.
 
 use super::smooth::{JerkLimit, State};
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
 use core::ops::RangeInclusive;
 
-/// What the user sets, each positive.
+/// The settings of motion as the user chooses them. All are positive.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MotionSettings {
     /// Steps per millimetre of x and y of the page: 2 to 4000.
     pub steps_per_mm: [Millimetres; 2],
     /// The most steps that a motor makes in a millimetre of the path.
     pub motor_steps_per_mm: Millimetres,
-    /// Along the path with the pen down, mm/min, 1 to 32767.
+    /// The greatest speed along the path with the pen down, in mm/min, 1 to 32767.
     pub draw_mm_per_min: Millimetres,
-    /// Along the path with the pen up, mm/min, 1 to 32767.
+    /// The greatest speed along the path with the pen up, in mm/min, 1 to 32767.
     pub travel_mm_per_min: Millimetres,
-    /// Along the path, mm/s², 10 to 32767.
+    /// The greatest acceleration along the path, in mm/s², 10 to 32767.
     pub acceleration_mm_per_s2: Millimetres,
-    /// The most by which acceleration changes, m/s³, 0.1 to 1000; 0 for no limit.
+    /// The greatest rate at which the acceleration changes, in m/s³, 0.1 to 1000; 0 for no limit.
     pub jerk_m_per_s3: Millimetres,
-    /// How far a rounded corner would leave the true one, mm, 0 to 1.
+    /// How far an imagined arc would deviate from a corner, in mm, 0 to 1.
     pub junction_deviation_mm: Millimetres,
     /// Whether bends of dense polylines are passed no faster than acceleration allows on the circle
     /// through them.
     pub centripetal: bool,
-    /// Width of a step pulse, and the least time between two.
+    /// The width of a step pulse, which is also the least time between two pulses, in ticks.
     pub pulse_ticks: u32,
-    /// From a change of direction to the pulse.
+    /// The time from a change of direction to the pulse, in ticks.
     pub direction_setup_ticks: u32,
-    /// How many steps can be counted on to wait for the interrupt. Speeds are lowered so that the
-    /// machine can stop within them, should no more come.
+    /// The number of steps that are sure to wait for the interrupt. Speeds are limited so that the
+    /// machine can stop within these steps if no more come.
     pub queue_steps: u32,
 }
 
-/// A setting that motion cannot keep.
+/// The settings that motion cannot honour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum LimitsError {
@@ -52,42 +52,46 @@ pub enum LimitsError {
     Anchors,
     /// Pulses of 1 ms or longer.
     Pulse,
-    /// A stepper motor lifts the pen, which moves only while the machine stands.
+    /// The pen is to move while the machine does, but a stepper motor lifts it, which moves only at
+    /// rest.
     #[cfg(feature = "pen-overlap")]
     PenByMotor,
-    /// Backlash is to be taken up on the way, and the motors draw no straight line together.
+    /// Backlash is to be taken up while the pen draws, but the motors draw no straight line
+    /// together.
     #[cfg(feature = "spread-backlash")]
     BacklashOfBelts,
-    /// So many steps per second that the pulses would run together: lower the speed or the pulse.
+    /// So many steps per second are asked for that the pulses would merge: lower the speed or the
+    /// width of the pulse.
     TooManySteps {
-        /// Steps per second asked for.
+        /// The steps per second that are asked for.
         asked: u32,
-        /// Steps per second that pulse and direction set-up leave room for.
+        /// The steps per second for which the width of the pulses leaves room.
         possible: u32,
     },
 }
 
-/// The settings as the planner needs them. Whoever has one has valid settings.
+/// The settings as the planner needs them. A value of this type guarantees that they are valid.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Limits {
-    /// mm per step of x and y.
+    /// The lengths of a step of x and y, in mm.
     pub(super) step_length: [SliceSpeed; 2],
-    /// The least mm that a move is long.
+    /// The least length of a move, in mm.
     pub(super) least_move: SliceSpeed,
     pub(super) draw_speed: SliceSpeed,
     pub(super) travel_speed: SliceSpeed,
-    /// Stopping distance of the greater speed.
+    /// The stopping distance of the greater of the two speeds.
     pub(super) top: PathLength,
-    /// How far it is to rest from that speed, with the limit on jerk if there is one; at most what
-    /// a length can hold.
+    /// The distance from that speed to rest, observing the limit on jerk if there is one. It is
+    /// limited to the greatest value of its type.
     pub(super) longest_stop: PathLength,
-    /// Added to the speed by one slice.
+    /// What one slice adds to the speed.
     pub(super) acceleration: SliceSpeed,
-    /// `None` for speeds with kinks.
+    /// The limit on jerk; `None` if there is none.
     pub(super) jerk: Option<JerkLimit>,
     pub(super) junction_deviation: PathLength,
     pub(super) centripetal: bool,
-    /// How far rounding of three points to steps can lift one over the line through the others.
+    /// The greatest distance by which rounding three points to steps moves one of them off the line
+    /// through the others.
     pub(super) rounding: PathLength,
     pub(super) pulse_ticks: u32,
     pub(super) setup_ticks: u32,
@@ -116,12 +120,12 @@ impl Default for Limits {
     }
 }
 
-/// The most steps in a millimetre; a constant, for reading it from text when the device runs takes
-/// 4 KB of flash.
+/// The most steps in a millimetre. It is a constant because parsing it from text at run time would
+/// take 4 KB of flash.
 const MOST_STEPS: Millimetres = Millimetres::lit("4000");
 
 impl Limits {
-    /// The settings, checked.
+    /// Checks and converts the settings.
     ///
     /// # Errors
     /// See [`LimitsError`].
@@ -203,33 +207,34 @@ impl Limits {
         Ok(())
     }
 
-    /// The most steps a second at a speed.
+    /// The greatest number of steps a second at this speed.
     pub(super) fn step_rate(&self, speed: SliceSpeed) -> u64 {
         let slices_per_second = u64::from(TICKS_PER_SECOND / SLICE_TICKS);
         let rate = u64::from(speed.to_bits()) * slices_per_second;
         rate.checked_div(self.least_move.to_bits().into()).unwrap_or(u64::MAX)
     }
 
-    /// The least time between two events that pulse the same axis: the pulse and as long a pause.
+    /// The least time between two pulses of the same axis, which is the width of the pulse and a
+    /// pause of the same length.
     pub fn least_interval(&self) -> u32 {
         (2 * self.pulse_ticks).min(StepEvent::MAX_TICKS)
     }
 
     /// The greatest speed from which the machine can stop within 13/16 of `queue` steps. The rest
-    /// is for a main loop that is a little late, so that it need not slow down at once, and for
-    /// what waits between steps.
+    /// is a reserve for a main loop that is a little late, so that the machine does not slow down
+    /// at once, and for events between the steps.
     fn held_by(&self, queue: u32) -> SliceSpeed {
         // A step is below 2^31.
         let held = (u64::from(self.least_move.to_bits()) * u64::from(queue) / 16 * 13) >> 14;
         self.speed(PathLength::from_bits(u32::try_from(held).unwrap_or(u32::MAX)))
     }
 
-    /// The greater speed, in mm/min.
+    /// The greater of the two speeds, in mm/min.
     pub fn greatest_rate(&self) -> Millimetres {
         mm_per_min(self.draw_speed.max(self.travel_speed))
     }
 
-    /// The stopping distance of `speed`, v²/2a; at most what a length can hold.
+    /// The stopping distance of `speed`, v²/2a, limited to the greatest value of its type.
     pub(super) fn stopping_distance(&self, speed: SliceSpeed) -> PathLength {
         let squared = u64::from(speed.to_bits()) * u64::from(speed.to_bits());
         // 2^-64 mm² over 2^-32 mm is 2^-32 mm; 14 bits more than a length has.
@@ -238,13 +243,14 @@ impl Limits {
         PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
     }
 
-    /// The speed with that stopping distance, √2as.
+    /// The speed with this stopping distance, √2as.
     pub(super) fn speed(&self, stopping_distance: PathLength) -> SliceSpeed {
         // The root of 64 bits has 32.
         SliceSpeed::from_bits(self.squared_speed(stopping_distance).isqrt() as u32)
     }
 
-    /// Its square, 2^-64 (mm per slice)²; at most what 64 bits hold.
+    /// The square of the speed with this stopping distance, in units of 2^-64 (mm per slice)²,
+    /// limited to 64 bits.
     pub(super) fn squared_speed(&self, stopping_distance: PathLength) -> u64 {
         let twice = 2 * u64::from(self.acceleration.to_bits());
         (twice * u64::from(stopping_distance.to_bits())).saturating_mul(1 << 14)
@@ -258,8 +264,8 @@ impl Limits {
         PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
     }
 
-    /// The stopping distance of a speed in mm/min: what bounds a block to it. Not less than can be
-    /// told from standing (at 800 mm/s², 5 mm/min).
+    /// The stopping distance by which a block is limited to a speed in mm/min. It is at least the
+    /// smallest value above 0, which at 800 mm/s² is the speed of 5 mm/min.
     pub fn feed(&self, mm_per_min: Millimetres) -> PathLength {
         let speed = slice_speed(mm_per_min.max(Millimetres::DELTA)).unwrap_or(SliceSpeed::DELTA);
         self.stopping_distance(speed).max(PathLength::DELTA)
@@ -276,13 +282,14 @@ impl Limits {
     }
 }
 
-/// 23/16 of the longer step. Each of three points is off by up to half a diagonal and the outer two
-/// count half, which is at most √2 steps; a little more, so that no corner is exactly as sharp.
+/// Returns 23/16 of the longer step. Each of three points is off by up to half a diagonal, and the
+/// outer two count half, which makes at most √2 steps. The result is slightly greater, so that no
+/// corner of single steps is exactly as sharp.
 fn rounding([x, y]: [SliceSpeed; 2]) -> PathLength {
     PathLength::from_bits(((x.max(y).to_bits() >> 14) * 23).div_ceil(16))
 }
 
-/// The square of a number below 2^32. `pow` would be a call, with a loop.
+/// The square of a number below 2^32. `pow` would be a call of a function with a loop.
 #[inline(always)]
 pub(super) fn square(number: u64) -> u64 {
     number * number
@@ -298,7 +305,7 @@ pub(super) fn hypotenuse(x: u64, y: u64) -> u64 {
     (x * x + y * y).isqrt() << shift
 }
 
-/// mm/min to mm per slice, at most 0.09.
+/// Converts mm/min to mm per slice, at most 0.09.
 fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
     if mm_per_min <= 0 {
         return Err(LimitsError::Speed);
@@ -309,7 +316,7 @@ fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
     Ok(SliceSpeed::from_bits((speed as u32).max(1)))
 }
 
-/// mm per slice to mm/min.
+/// Converts mm per slice to mm/min.
 pub(super) fn mm_per_min(speed: SliceSpeed) -> Millimetres {
     // 2^-32 mm/slice to 2^-16 mm/min: below 2^32 * 2^31, and then shifted down.
     let bits = (u64::from(speed.to_bits()) * (60 * u64::from(TICKS_PER_SECOND))) >> 16;
@@ -317,7 +324,7 @@ pub(super) fn mm_per_min(speed: SliceSpeed) -> Millimetres {
     Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
 }
 
-/// mm/s² to mm per slice per slice.
+/// Converts mm/s² to mm per slice per slice.
 fn slice_acceleration(mm_per_s2: Millimetres) -> SliceSpeed {
     // 2^-16 mm/s² to 2^-32 mm/slice²: bits * 2^16 * 2^24 / (2^6 * 5^8)², the twos cancelled.
     let bits = u64::from(mm_per_s2.to_bits().unsigned_abs());

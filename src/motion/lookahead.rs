@@ -1,45 +1,49 @@
-//! The blocks that are known but not yet begun, and how fast the first of them may end.
+//! The blocks that are known but not yet begun, and the speed with which the first of them may be
+//! entered.
 
 use super::{Limits, PathLength};
 use crate::drawing::LineType;
 
-/// 9·24 times what rounding lifts a point, ρ: 2^-18 mm.
+/// Returns 9·24 ρ in units of 2^-18 mm, where ρ is the greatest distance by which rounding moves a
+/// point off its chord.
 ///
-/// A bend of radius R is known to 1/24 once ρ explains no more than that of the height of its
-/// middle over a chord. The circle through three points √(2·24·ρR) apart says so, and it stands for
-/// its middle half: 3/2 of that before its end. So at a distance D before the end of what is known,
-/// R/2 is at least D²/(9·24·ρ).
+/// A bend of radius R is known with an error of 1/24 once ρ is no more than 1/24 of the height of
+/// its middle over a chord. That takes a circle through three points that are √(2·24·ρR) apart,
+/// which is valid for its middle half, and so up to 3/2 of that distance before its end. So at a
+/// distance D before the end of the known path, R/2 is at least D²/(9·24·ρ).
 fn surely_known(limits: &Limits) -> u32 {
     limits.rounding.to_bits().saturating_mul(9 * 24)
 }
 
-/// A straight move that waits, or up to six short ones that need no plan of their own: 48 bytes,
+/// A straight move that waits, or up to six short ones that are planned as one. It takes 48 bytes,
 /// or 52 with the feature `spread-backlash`.
 ///
 /// The LM3S6965 lends 16 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
-/// far as the stopping distance asks for it (`Lookahead::join`). With fewer blocks than hold
-/// that distance the machine is slower, never wrong.
+/// far as the stopping distance requires it (`Lookahead::join`). If the blocks cannot hold that
+/// distance, the machine is slower, but never wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Block {
     pub(super) dx: i32,
     pub(super) dy: i32,
     pub(super) length: PathLength,
-    /// Stopping distance with which the block may be entered; see [`Lookahead::passes_limits_on`].
+    /// The greatest stopping distance with which the block may be entered; see
+    /// [`Lookahead::passes_limits_on`].
     pub(super) entry_limit: PathLength,
-    /// Greatest stopping distance within the block, as it is part of a curve.
+    /// The greatest stopping distance within the block, which may be part of a curve.
     pub(super) curve_limit: PathLength,
     pub(super) ink: Option<LineType>,
     /// See [`Move`](super::Move).
     pub(super) offsets: [i16; 2],
     pub(super) kind: BlockKind,
-    /// How many chords are behind the first one, of which `dx` and `dy` tell.
+    /// The number of chords behind the first one, which is given by `dx` and `dy`.
     pub(super) chord_count: u8,
-    /// How many points of the path it leads to, those on a straight line included: how many moves
-    /// it was joined of.
+    /// The number of moves that were joined to this block, including those that continue a straight
+    /// line.
     pub(super) points: u8,
-    /// Those chords, in front. What is behind them has no meaning.
+    /// The chords behind the first one. Entries beyond `chord_count` have no meaning.
     pub(super) chords: [Chord; MOST_CHORDS - 1],
-    /// How much longer its steps are than what the pen draws: they take up backlash besides.
+    /// By how much the path of the motors is longer than what the pen draws, because it takes up
+    /// backlash as well.
     #[cfg(feature = "spread-backlash")]
     pub(super) extra: PathLength,
 }
@@ -50,7 +54,8 @@ pub struct Block {
 pub(super) struct Chord {
     pub(super) dx: i8,
     pub(super) dy: i8,
-    /// 2^-18 mm, so up to 1/4 mm; the first chord has the rest of the block's length.
+    /// The length in units of 2^-18 mm, so up to 1/4 mm. The first chord has the rest of the
+    /// block's length.
     length: u16,
 }
 
@@ -59,7 +64,7 @@ impl Chord {
         PathLength::from_bits(self.length.into())
     }
 
-    /// How many moves it is.
+    /// The number of single moves of the chord.
     pub(super) fn moves(&self) -> u32 {
         u32::from(self.dx.unsigned_abs().max(self.dy.unsigned_abs()))
     }
@@ -68,7 +73,7 @@ impl Chord {
 /// The most chords that are one block.
 pub(super) const MOST_CHORDS: usize = 6;
 
-/// What a block is for.
+/// The purpose of a block.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum BlockKind {
     /// A line.
@@ -77,7 +82,7 @@ pub(super) enum BlockKind {
     Gap,
     /// The motors only take up their backlash: the pen stays where it is.
     Backlash,
-    /// A line with which a motor turns round that takes up its backlash on the way.
+    /// A line at whose beginning a motor reverses, which takes up its backlash while the pen draws.
     #[cfg(feature = "spread-backlash")]
     Reversal,
 }
@@ -130,27 +135,27 @@ pub struct Lookahead<'m> {
     blocks: &'m mut [Block],
     first: usize,
     count: usize,
-    /// Of all blocks, 2^-18 mm.
+    /// The total length of all blocks, in units of 2^-18 mm.
     length: u64,
-    /// Of the last blocks, of which more points may show that they bend.
+    /// The total length of the last blocks, which later points may show to be part of a bend.
     open: PathLength,
-    /// How many of the blocks were joined of more than one move.
+    /// The number of blocks that consist of more than one move.
     joined: usize,
-    /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow and to its
-    /// `curve_limit`, so that none has to be looked for when the block before it begins.
+    /// Whether each block's `entry_limit` is lowered to what the blocks behind it allow, and to its
+    /// `curve_limit`, so that nothing has to be searched when the block before it begins.
     passes_limits_on: bool,
-    /// The lowest limit of all blocks, and which of them is the last to have it: known only if
-    /// limits are not passed on.
+    /// The lowest limit of all blocks, known only if limits are not passed on.
     lowest: PathLength,
+    /// The index of the last block that has this limit.
     lowest_at: usize,
-    /// The lowest limit that was set to blocks which waited, since it was asked for.
+    /// The lowest limit that was imposed on waiting blocks since [`Lookahead::take_lowered`].
     lowered: PathLength,
-    /// The lowest that came too late for the block taken last, since then.
+    /// The lowest limit that came too late for the block taken last.
     late: PathLength,
 }
 
 impl<'m> Lookahead<'m> {
-    /// A ring in the memory lent; its length is the capacity.
+    /// Creates a ring in this memory, whose length is the capacity.
     pub fn new(blocks: &'m mut [Block]) -> Self {
         Self {
             blocks,
@@ -167,28 +172,28 @@ impl<'m> Lookahead<'m> {
         }
     }
 
-    /// Blocks that fit.
+    /// The number of blocks that fit.
     pub fn capacity(&self) -> usize {
         self.blocks.len()
     }
 
-    /// Blocks waiting.
+    /// The number of blocks that wait.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// Whether none wait.
+    /// Whether no block waits.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
 
-    /// Whether no more fit.
+    /// Whether no more blocks fit.
     pub fn is_full(&self) -> bool {
         self.count == self.blocks.len()
     }
 
-    /// Whether limits are known at each block at once, as if speed might change by the acceleration
-    /// without a limit on jerk; while none wait.
+    /// Chooses whether limits are passed on to earlier blocks, which is exact only without a limit
+    /// on jerk. No block may wait.
     pub(super) fn pass_limits_on(&mut self, on: bool) {
         self.passes_limits_on = on;
         self.find_lowest();
@@ -201,8 +206,7 @@ impl<'m> Lookahead<'m> {
 
     /// Appends a block.
     ///
-    /// # Errors
-    /// Hands it back if the ring is full.
+    /// # Errors Hands the block back if the ring is full.
     #[inline(always)] // So that the caller makes no whole block either.
     pub(super) fn push(&mut self, block: Block) -> Result<(), Block> {
         if self.is_full() {
@@ -212,8 +216,8 @@ impl<'m> Lookahead<'m> {
         let Some(slot) = self.blocks.get_mut(at) else {
             return Err(block);
         };
-        // One by one: what is behind the first chord is not copied, which would cost as much as a
-        // plan.
+        // The fields are copied one by one, without the chords behind the first one, because
+        // copying these would cost as much as a plan.
         slot.dx = block.dx;
         slot.dy = block.dy;
         slot.length = block.length;
@@ -239,12 +243,13 @@ impl<'m> Lookahead<'m> {
         Ok(())
     }
 
-    /// Makes a line a part of the last block, if that is a line of the same ink and the blocks
-    /// might not hold the machine's stopping distance otherwise. Nothing may bind the speed between
-    /// the two.
+    /// Joins a line to the last block, if that is a line of the same ink, and if the blocks might
+    /// otherwise not hold the machine's stopping distance. Nothing may limit the speed between the
+    /// two. Returns whether it was joined.
     ///
-    /// The limits of a bend are those of whole blocks, so none is made longer that has its part of
-    /// 5/4 of that distance, nor while so much is known or less than half of the memory is in use.
+    /// The limits of a bend apply to whole blocks. So a block is not made longer once it has its
+    /// share of 5/4 of that distance, nor while the whole path has that length or less than half of
+    /// the memory is in use.
     #[inline(always)]
     pub(super) fn join(&mut self, line: &Block, limits: &Limits) -> bool {
         let needed = limits.longest_stop.to_bits().saturating_add(surely_known(limits) / 4);
@@ -255,7 +260,8 @@ impl<'m> Lookahead<'m> {
         self.join_to_last(line, enough / self.blocks.len().max(1) as u32)
     }
 
-    /// As [`Self::join`], with a block that is shorter than `longest`.
+    /// Joins a line to the last block if that is shorter than `longest`. Returns whether it was
+    /// joined.
     #[inline(never)] // Long paths never come here: it would only fill the cache.
     fn join_to_last(&mut self, line: &Block, longest: u32) -> bool {
         let Some(at) = self.count.checked_sub(1).map(|last| self.wrapped(last)) else {
@@ -295,8 +301,8 @@ impl<'m> Lookahead<'m> {
         true
     }
 
-    /// Takes the block to be drawn next, once it is read in its place: a copy costs as much as a
-    /// plan.
+    /// Removes the block to be drawn next after `read` has read it in place, because a copy costs
+    /// as much as a plan.
     pub(super) fn pop<T>(&mut self, read: impl FnOnce(&Block) -> T) -> Option<T> {
         let block = self.front()?;
         let (length, is_joined) = (block.length, block.points > 1);
@@ -326,8 +332,7 @@ impl<'m> Lookahead<'m> {
         self.find_lowest();
     }
 
-    /// The lowest limit of all blocks, of which the one before the first may be the last to have
-    /// had it.
+    /// Determines the lowest limit anew, because the block that had it may have been removed.
     fn find_lowest(&mut self) {
         (self.lowest, self.lowest_at) = (PathLength::MAX, 0);
         if !self.passes_limits_on {
@@ -338,47 +343,46 @@ impl<'m> Lookahead<'m> {
         }
     }
 
-    /// A block has, or had a higher limit and now has, this one.
+    /// Takes account of the limit of a block that is new, or whose limit was lowered.
     fn note(&mut self, index: usize, limit: PathLength) {
         if limit < self.lowest || (limit == self.lowest && index > self.lowest_at) {
             (self.lowest, self.lowest_at) = (limit, index);
         }
     }
 
-    /// The lowest limit of all blocks; while limits are not passed on.
+    /// The lowest limit of all blocks. It is known only if limits are not passed on.
     pub(super) fn lowest_limit(&self) -> PathLength {
         debug_assert!(!self.passes_limits_on);
         self.lowest
     }
 
-    /// The lowest limit that was set to blocks which waited, since this was asked last.
+    /// Returns the lowest limit that was imposed on waiting blocks since the last call.
     pub(super) fn take_lowered(&mut self) -> PathLength {
         core::mem::replace(&mut self.lowered, PathLength::MAX)
     }
 
-    /// The length of all blocks, 2^-32 mm.
+    /// The total length of all blocks, in units of 2^-32 mm.
     pub(super) fn known(&self) -> u64 {
         self.length << 14
     }
 
-    /// All bends of the blocks so far are known.
+    /// Records that all bends of the blocks so far are known.
     pub(super) fn end_curve(&mut self) {
         self.open = PathLength::ZERO;
     }
 
-    /// The lowest limit of the block taken last that was found behind it, since that block was
-    /// taken.
+    /// The lowest limit for the block taken last that was found only after it was taken.
     pub(super) fn late_limit(&self) -> PathLength {
         self.late
     }
 
-    /// The greatest stopping distance, so far before the end of all blocks (2^-18 mm), from which
-    /// the machine can come to rest, and can keep the limits of the bends that points behind them
-    /// may show.
+    /// The greatest stopping distance, at a distance `to_end` before the end of all blocks (2^-18
+    /// mm), with which the machine can still come to rest there, and can still keep the limits of
+    /// bends that later points may reveal.
     ///
-    /// At a distance D before the end, the radius of a bend that is known only by points behind is
-    /// such that the stopping distance may be D² over [`surely_known`]. Further away the machine
-    /// can brake to that.
+    /// At a distance D before the end, a bend that only later points reveal is so wide that the
+    /// stopping distance may be D² over [`surely_known`]. From further away the machine can brake
+    /// to that.
     pub(super) fn stopping_distance_at(&self, to_end: u64, limits: &Limits) -> u64 {
         if !limits.centripetal || self.is_empty() {
             return to_end;
@@ -398,13 +402,13 @@ impl<'m> Lookahead<'m> {
         if index >= self.blocks.len() { index - self.blocks.len() } else { index }
     }
 
-    /// All in their order, one by one.
+    /// The blocks in their order, one by one.
     #[cfg(feature = "pen-overlap")]
     pub(super) fn in_order(&self) -> impl Iterator<Item = &Block> {
         (0..self.count).filter_map(|index| self.blocks.get(self.wrapped(index)))
     }
 
-    /// All in their order, in two parts.
+    /// The blocks in their order, in two parts.
     pub(super) fn blocks(&self) -> [&[Block]; 2] {
         let (wrapped, straight) = self.blocks.split_at(self.first.min(self.blocks.len()));
         let count = self.count.min(straight.len());
@@ -412,15 +416,17 @@ impl<'m> Lookahead<'m> {
         [&straight[..count], &wrapped[..rest]]
     }
 
-    /// The last points, from the `least`th to the `most`th counted from 1 at the end, end blocks
-    /// that are part of a curve.
+    /// Limits the blocks that end at certain points of a curve: from the `least`th to the `most`th
+    /// of the last points, counted from 1 at the end.
     ///
-    /// What one block allows is passed on to those before it, each of which may be entered with its
-    /// own length more, as far as that is less than they had: on smooth paths, not far.
+    /// What a block allows is passed on to the blocks before it, each of which may be entered with
+    /// a stopping distance that is greater by its own length. This ends where a block already has a
+    /// lower limit, which on smooth paths is not far.
     pub(super) fn limit_curve(&mut self, least: u32, most: u32, limit: PathLength) {
         self.lowered = self.lowered.min(limit);
         let mut allowed = PathLength::MAX;
-        // While none are joined each block ends at one point, and the first need not be counted.
+        // If no blocks are joined, each block ends at one point, and the first points need not be
+        // counted.
         let mut points = if self.joined == 0 { least.saturating_sub(1) } else { 0 };
         for back in points as usize + 1.. {
             let Some(index) = self.count.checked_sub(back) else {
@@ -461,20 +467,21 @@ impl<'m> Lookahead<'m> {
     }
 
     /// The greatest stopping distance with which the first block may be entered, such that every
-    /// junction known is passed within its limit and the path known is not overrun. At most `top`.
+    /// known junction is passed within its limit and the machine can stop at the end of the known
+    /// path. At most `top`.
     pub(super) fn entry_allowed(&self, top: PathLength, limits: &Limits) -> PathLength {
         debug_assert!(self.passes_limits_on);
         let Some(front) = self.front() else {
             return PathLength::ZERO;
         };
-        // At the end of what is known the machine must be able to stand.
+        // At the end of the known path the machine must be able to be at rest.
         let length = self.stopping_distance_at(self.length, limits);
         let length = u32::try_from(length).map_or(PathLength::MAX, PathLength::from_bits);
         top.min(front.entry_limit).min(length)
     }
 }
 
-/// Whether one vector leads on in the direction of the other, so that both together are one line.
+/// Whether two vectors have the same direction, so that both together are one line.
 fn is_in_line([dx, dy]: [i32; 2], [more_x, more_y]: [i32; 2]) -> bool {
     let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
     product(dx, more_y) == product(dy, more_x) && product(dx, more_x) + product(dy, more_y) > 0

@@ -500,7 +500,8 @@ impl PathLimits<'_, '_> {
         let exceeds =
             |speed: u64, limit: PathLength| speed * speed > self.limits.squared_speed(limit);
         let passes = |place: u64, limit: PathLength| {
-            // Speed as if it were linear along the distance: too much where braking fades.
+            // The speed as if it were linear in the distance, which is too high where braking
+            // fades.
             let change = i64::from(after.speed) - i64::from(from.speed);
             let part = change * (place >> 12).cast_signed() / (distance >> 12).max(1).cast_signed();
             let speed = (i64::from(from.speed) + part).unsigned_abs();
