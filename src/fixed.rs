@@ -447,7 +447,7 @@ impl fmt::Display for Length {
     }
 }
 
-/// How many units with so many decimals, at most 9, there are in 1.
+/// How many units with this many decimals, at most 9, there are in 1.
 fn units_in_one(decimals: u32) -> u64 {
     (0..decimals).fold(1, |units, _| units * 10)
 }

@@ -64,7 +64,7 @@ impl<'a> Scratch<'a> {
         Ok(items_mut(words, count).unwrap_or(&mut [])) // It has the length asked for.
     }
 
-    /// Takes so many bytes, rounded up to whole words, off the front of the memory.
+    /// Takes this many bytes, rounded up to whole words, off the front of the memory.
     #[inline(never)] // All types share one copy of the code.
     fn take_words(&mut self, bytes: usize) -> Result<&'a mut [u64], OutOfScratch> {
         let out_of_scratch = OutOfScratch { needed: bytes, available: self.available_bytes() };

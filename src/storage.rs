@@ -150,7 +150,7 @@ impl Slots {
         self.write_into_erased(flash, 0)
     }
 
-    /// Does the same where so many bytes of the slot that is to be written, whole sectors from its
+    /// Does the same where this many bytes of the slot that is to be written, whole sectors from its
     /// beginning on, have been erased by [`Slots::erase_ahead`] and not been written since.
     ///
     /// # Errors
@@ -176,7 +176,7 @@ impl Slots {
         Ok(writer)
     }
 
-    /// Erases a sector of the slot that is written next, which begins so many bytes behind the
+    /// Erases a sector of the slot that is written next, which begins this many bytes behind the
     /// slot's beginning. Returns which slot that is, 0 or 1.
     ///
     /// # Errors

@@ -354,7 +354,7 @@ pub fn relooped<I: Index>(
     plotter.streamed(Form::Strokes, 0)
 }
 
-/// Sends a whole job, and draws all of it so many times.
+/// Sends a whole job, and draws all of it this many times.
 fn draw_by(
     sender: &mut Sender<'_>,
     job: &dyn Lines,

@@ -95,7 +95,7 @@ mod tests {
     use penup::drawing::{LineType, PagePoint};
     use penup::machine::TargetList;
 
-    /// A closed stroke of so many sides around a place, of which every other one is dashed.
+    /// A closed stroke of this many sides around a place, of which every other one is dashed.
     fn loop_at(x: i32, sides: i32) -> Vec<Target> {
         let point = |side: i32| PagePoint { x: x + side % sides, y: (side % sides).pow(2) };
         let ink = |side: i32| Some(if side % 2 == 1 { LineType::Full } else { LineType::Dashed });

@@ -79,7 +79,7 @@ impl Room {
         Self { vertices, corners, words: bytes / 8, blocks, steps: Self::STEPS, early_ink: false }
     }
 
-    /// The same with so many times the memory to work in, for numbers that are so much wider.
+    /// The same with this many times the memory to work in, for numbers that are so much wider.
     #[must_use]
     pub fn with_words(self, times: usize) -> Self {
         Self { words: times * self.words, ..self }

@@ -32,7 +32,7 @@ pub enum Event {
     Failed { text: String },
     /// The user has given the drawing up; the pen is up.
     Stopped,
-    /// The drawing is done, and so many strokes and mm were drawn.
+    /// The drawing is done, and this many strokes and mm were drawn.
     Drawn { report: Option<String> },
     /// The answer to a question, such as a list of settings.
     Reply { text: String },

@@ -185,7 +185,7 @@ impl Session {
         Ok(())
     }
 
-    /// Draws a square with sides of so many `mm` to the right of the pen and above it.
+    /// Draws a square with sides of this many `mm` to the right of the pen and above it.
     ///
     /// # Errors
     /// A sentence for the user: the session is doing something else, or does not know where the

@@ -47,7 +47,7 @@ pub fn lend_memory() -> MemorySlices<'static> {
     lend_memory_of(<Corner>::VERTEX_NUMBER_LIMIT, 1 << 16, 1 << 19, EMPTY_LOOKAHEAD.len())
 }
 
-/// Allocates memory for a plotter: for so many vertices, corners, words to work in and moves
+/// Allocates memory for a plotter: for this many vertices, corners, words to work in and moves
 /// planned ahead. It is leaked, so it lasts as long as the process.
 pub fn lend_memory_of<I: Index>(
     vertices: usize,

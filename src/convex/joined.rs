@@ -34,7 +34,7 @@ pub(super) struct Joining<'s, I> {
 }
 
 impl<'s, I: Index> Joining<'s, I> {
-    /// The working memory in bytes for a solid with so many vertices and faces.
+    /// The working memory in bytes for a solid with this many vertices and faces.
     pub(super) const fn scratch_bytes(vertices: usize, faces: usize) -> usize {
         Scratch::bytes_for::<I>(faces)
             + Scratch::bytes_for::<I>(vertices)

@@ -50,7 +50,7 @@ impl Point {
         (square(self.x) + square(self.y)).isqrt() as i64
     }
 
-    /// Turned by so many quarters, counterclockwise.
+    /// Turned by this many quarters, counterclockwise.
     pub(super) fn turned(self, quarters: u8) -> Self {
         match quarters & 3 {
             0 => self,
@@ -291,7 +291,7 @@ impl Frame {
             [] => None,
             [x1, x2, y1, y2] if x1 != x2 && y1 != y2 => Some([x1, x2, y1, y2]),
             // HP-GL/2 knows two more kinds: units of the same length on both axes, and units of
-            // which so many plotter units are one.
+            // which this many plotter units are one.
             [x1, x2, y1, y2, kind, ..] if kind == UNIT && x1 != x2 && y1 != y2 => {
                 isotropic([x1, x2, y1, y2], width, height)
             }

@@ -508,7 +508,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Goes by so many letters and lines, without drawing.
+    /// Goes by this many letters and lines, without drawing.
     fn space(&mut self, columns_and_lines: [i64; 2]) {
         let [columns, lines] = columns_and_lines;
         let along = self.text.spaces(&self.frame, [columns, 0]);

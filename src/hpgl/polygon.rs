@@ -17,7 +17,7 @@ use crate::fixed::{divide_rounding, product};
 
 /// The most points of a polygon on a plotter, with those that close its parts. Each takes 8 bytes.
 pub const VERTICES: usize = 256;
-/// Coordinates of a vertex are kept without so many of their lowest bits: in 2^-6 plotter units.
+/// Coordinates of a vertex are kept without this many of their lowest bits: in 2^-6 plotter units.
 const DROPPED_BITS: u32 = 10;
 /// The angle of the chords of arcs in a polygon, if none is given: 5 degrees.
 const CHORD: i64 = 5 * UNIT;

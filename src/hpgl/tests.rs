@@ -402,7 +402,7 @@ impl Line {
         heard
     }
 
-    /// Carries out at most so many orders. Returns them and the answers.
+    /// Carries out at most this many orders. Returns them and the answers.
     fn work(&mut self, most: usize) -> String {
         let mut orders = Vec::new();
         while !self.session.is_idle() && orders.len() < most {

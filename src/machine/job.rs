@@ -413,7 +413,7 @@ impl Machine<'_> {
         self.progress.set_size(size);
     }
 
-    /// Lets the job that has begun be longer than what was measured of it, by so many strokes of
+    /// Lets the job that has begun be longer than what was measured of it, by this many strokes of
     /// this length together in 2^-18 mm, until [`Machine::set_job_size`] tells its true size. They
     /// are assumed to lie and to take as long as those before.
     #[cfg(feature = "early-ink")]

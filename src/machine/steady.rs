@@ -2,7 +2,7 @@
 //!
 //! A line is what lies between two ends or sharp corners of a stroke. Before its first move is
 //! planned, all of it is looked at, up to [`MOST_MOVES`] moves of it; a longer line has a speed for
-//! every so many moves.
+//! every this many moves.
 
 use super::{Machine, Path, Setting, Target};
 use crate::motion::{PathLength, SteadySpeed};

@@ -43,7 +43,7 @@ impl StrokeLog {
 #[cfg(feature = "resume")]
 impl Machine<'_> {
     /// Lets the machine wait after each stroke of the job that has just begun until it is noted,
-    /// and at each of its points, of which so many were passed before. Call it after
+    /// and at each of its points, of which this many were passed before. Call it after
     /// [`Machine::start`] or [`Machine::start_rest`].
     pub fn log_strokes(&mut self, points: u32) {
         self.begin_points(points);

@@ -23,7 +23,7 @@ pub struct StrokePoints {
 }
 
 impl StrokePoints {
-    /// Begins where so many points have been passed. There is one after each `distance` of a
+    /// Begins where this many points have been passed. There is one after each `distance` of a
     /// stroke, in 2^-18 mm; 0 for none.
     pub const fn new(passed: u32, distance: u64) -> Self {
         Self { passed, drawn: 0, distance }

@@ -96,7 +96,7 @@ fn circle(radius: f64, chords: u32) -> Vec<[f64; 2]> {
         .collect()
 }
 
-/// Checks that a stroke takes so many seconds, but for the parts of steps at both ends.
+/// Checks that a stroke takes this many seconds, but for the parts of steps at both ends.
 fn assert_takes(stroke: &Stroke, seconds: f64, what: &str) {
     let off = stroke.seconds / seconds - 1.0;
     assert!(off.abs() < 0.025, "{what}: {} s, expected {seconds}", stroke.seconds);

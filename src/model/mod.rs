@@ -468,7 +468,7 @@ fn truncated(coordinates: [Decimal; 3], fraction_bits: u32) -> Result<(Position,
     Ok((Position { x, y, z }, fraction_bits))
 }
 
-/// Returns how many numbers there are, if each names one of so many vertices and differs from the
+/// Returns how many numbers there are, if each names one of this many vertices and differs from the
 /// one before. Where three are `needed`, for a face, the last must also differ from the first.
 #[inline(always)] // On a board with little flash it has one caller.
 fn check_numbers<I: Index>(
@@ -537,7 +537,7 @@ impl<I: Index> Positions for Model<'_, I> {
     }
 }
 
-/// Returns the vertex that an OBJ number names in a model with so many vertices.
+/// Returns the vertex that an OBJ number names in a model with this many vertices.
 fn resolve<I: Index>(number: i32, vertices: usize) -> Option<I> {
     let count = vertices as i64; // at most the limit of a corner
     let index = if number < 0 { count + i64::from(number) } else { i64::from(number) - 1 };

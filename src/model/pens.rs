@@ -95,7 +95,7 @@ pub struct PenWriter<'a, I = u16> {
 }
 
 impl<'a, I: Index> PenWriter<'a, I> {
-    /// Makes a writer for at most so many changes of the pen.
+    /// Makes a writer for at most this many changes of the pen.
     ///
     /// # Errors
     /// [`OutOfScratch`] if there is no room for them.

@@ -58,7 +58,7 @@ impl<'m, I: Index> Store<'m, I> {
         self.bounds[REGIONS]
     }
 
-    /// Refuses to go on unless so many half-words are free.
+    /// Refuses to go on unless this many half-words are free.
     ///
     /// # Errors
     /// [`ModelError::TooManyCorners`].

@@ -137,13 +137,13 @@ impl Figures {
     }
 }
 
-/// Makes a coordinate coarser by so many bits, rounded towards zero. As it may be done in several
+/// Makes a coordinate coarser by this many bits, rounded towards zero. As it may be done in several
 /// steps, it is the same as when a model in memory does it.
 fn coarser(coordinate: i32, bits: u32) -> i32 {
     coordinate / (1 << bits)
 }
 
-/// Makes a position coarser by so many bits.
+/// Makes a position coarser by this many bits.
 pub(super) fn coarser_position(Position { x, y, z }: Position, bits: u32) -> Position {
     Position { x: coarser(x, bits), y: coarser(y, bits), z: coarser(z, bits) }
 }

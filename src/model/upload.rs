@@ -237,7 +237,7 @@ impl Upload {
         Ok(())
     }
 
-    /// Writes an element with so many corners, at these vertices.
+    /// Writes an element with this many corners, at these vertices.
     fn put_element(
         &mut self,
         vertices: impl Iterator<Item = u32>,

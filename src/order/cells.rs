@@ -85,12 +85,12 @@ impl<'s, I: Index> Cells<'s, I> {
         Ok(sorted)
     }
 
-    /// Returns the greatest number of cells for so many points.
+    /// Returns the greatest number of cells for this many points.
     pub const fn most_cells(count: usize) -> usize {
         if count < 2 { 1 } else { count / 2 }
     }
 
-    /// Returns the most scratch memory that so many points need, in bytes.
+    /// Returns the most scratch memory that this many points need, in bytes.
     pub const fn bytes(count: usize) -> usize {
         Scratch::bytes_for::<I>(Self::most_cells(count) + 1) + Scratch::bytes_for::<I>(count)
     }

@@ -39,7 +39,7 @@ const GREEDY_MICROSECONDS: u64 = 600;
 /// The microseconds of everything else in the order, for each odd point.
 const POINT_MICROSECONDS: u64 = 1500;
 
-/// The pen is busy for so many milliseconds longer than the order is estimated to take. The order
+/// The pen is busy for this many milliseconds longer than the order is estimated to take. The order
 /// is improved meanwhile, which costs no time.
 const SPARE_MILLISECONDS: u64 = 4000;
 
@@ -62,7 +62,7 @@ pub struct First {
 
 /// How long the pen is busy.
 pub trait StrokeDurations {
-    /// Returns the milliseconds that so many strokes take, of this length together in 1/256 steps,
+    /// Returns the milliseconds that this many strokes take, of this length together in 1/256 steps,
     /// without the moves between them.
     fn milliseconds(&self, strokes: u32, length: u64) -> u64;
 }
@@ -359,7 +359,7 @@ mod tests {
     use crate::stage::{Aborted, NeverCancel};
     use std::vec::Vec;
 
-    /// A pen for which each stroke takes so many milliseconds.
+    /// A pen for which each stroke takes this many milliseconds.
     struct Pen(u64);
 
     impl StrokeDurations for Pen {
@@ -368,7 +368,7 @@ mod tests {
         }
     }
 
-    /// Cancels after so many calls.
+    /// Cancels after this many calls.
     struct CancelAfter(u32);
 
     impl Cancel for CancelAfter {

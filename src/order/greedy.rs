@@ -428,7 +428,7 @@ mod tests {
     use std::vec;
     use std::vec::Vec;
 
-    /// Calls `test` with the ends of so many strokes within a square as odd points.
+    /// Calls `test` with the ends of this many strokes within a square as odd points.
     fn with_strokes(
         strokes: u16,
         size: i32,

@@ -37,13 +37,13 @@ const NEIGHBOURS: [usize; 2] = [8, 4];
 const KICK_REACH: u32 = 6;
 /// The search ends after this many kicks (random changes) in vain for each move of the tour.
 const PATIENCE: u32 = 50;
-/// The directions of the strokes are improved after each so many kicks.
+/// The directions of the strokes are improved after each this many kicks.
 const KICKS_BETWEEN_TURNS: u32 = 64;
 /// Percentage of a fixed budget that is spent on the first tours, of which the best gets the rest.
 const FIRST_TOURS_PERCENT: u64 = 48;
 /// With [`Effort::Auto`], the gain is compared with the work after each such part of a second.
 const WINDOWS_PER_SECOND: u64 = 8;
-/// Where a tour has few moves, the gain is compared with the work as soon as each move had so many
+/// Where a tour has few moves, the gain is compared with the work as soon as each move had this many
 /// units of work.
 const WINDOW_UNITS_PER_MOVE: u64 = 800;
 /// With [`Effort::Auto`], another first tour is made if the last one took at most this part of the
@@ -148,7 +148,7 @@ pub(super) fn improve<I: Index>(
 /// When the work on a tour ends.
 #[derive(Clone, Copy)]
 enum Until {
-    /// When so many units of work are spent.
+    /// When this many units of work are spent.
     Spent(u64),
     /// When exchanges alone find nothing better any more. No kick is made.
     Exchanged(TimeModel),

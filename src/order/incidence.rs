@@ -29,7 +29,7 @@ impl<'s, I: Index> Incidence<'s, I> {
         Ok(Self { first, next })
     }
 
-    /// Returns the scratch memory needed for so many stations and chains, in bytes.
+    /// Returns the scratch memory needed for this many stations and chains, in bytes.
     pub const fn bytes(stations: usize, chains: usize) -> usize {
         Scratch::bytes_for::<I>(stations) + Scratch::bytes_for::<I>(2 * chains)
     }

@@ -146,7 +146,7 @@ pub struct TimeModel {
 impl TimeModel {
     /// The units of work that count as one second on every board, and wherever a board's order is
     /// shown. The Pico's core, which takes 417 cycles for a unit on text300 and 534 on lattice7
-    /// (`cargo xtask bench --board pico`), does so many at 125 MHz.
+    /// (`cargo xtask bench --board pico`), does this many at 125 MHz.
     pub const BOARD: u32 = 250_000;
     /// The units that count as one second where a computer computes for a plotter. They are more
     /// than it does in that time, because the plotter draws meanwhile.

@@ -43,12 +43,12 @@ impl<'a, I: Index> Neighbours<'a, I> {
         Ok(Self { stations, per_station })
     }
 
-    /// Returns the scratch memory that the result occupies for so many stations, in bytes.
+    /// Returns the scratch memory that the result occupies for this many stations, in bytes.
     pub const fn bytes(stations: usize, per_station: usize) -> usize {
         Scratch::bytes_for::<I>(stations * per_station)
     }
 
-    /// Returns the further scratch memory that the search needs for so many stations, in bytes.
+    /// Returns the further scratch memory that the search needs for this many stations, in bytes.
     pub const fn bytes_to_find(stations: usize) -> usize {
         Cells::<I>::bytes(stations)
     }

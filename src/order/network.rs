@@ -73,7 +73,7 @@ pub(super) struct Anchor {
 }
 
 impl Anchor {
-    /// The path begins at `place`, and so many units of work are done while the strokes before are
+    /// The path begins at `place`, and this many units of work are done while the strokes before are
     /// drawn.
     #[cfg(feature = "early-ink")]
     pub const fn new(place: PagePoint, free_units: u64) -> Self {
@@ -147,7 +147,7 @@ impl<'a, I: Index> Network<'a, I> {
     }
 
     /// The units of work for which the pen does not wait, because it draws meanwhile.
-    #[inline(always)] // As above.
+    #[inline(always)] // Without the feature `early-ink`, what depends on it is left out.
     pub fn free_units(&self) -> u64 {
         self.anchor.free_units()
     }

@@ -36,7 +36,7 @@ impl<'s, I: Index> Remaining<'s, I> {
         Ok(Self { cells, end })
     }
 
-    /// Returns the most scratch memory that so many points need, in bytes.
+    /// Returns the most scratch memory that this many points need, in bytes.
     pub const fn bytes(count: usize) -> usize {
         Cells::<I>::bytes(count) + Scratch::bytes_for::<I>(Cells::<I>::most_cells(count))
     }

@@ -98,7 +98,7 @@ pub trait Board {
         let _ = room;
         self.save(record, parts)
     }
-    /// Erases one more sector of what the next job will take if it is saved with so many `bytes`,
+    /// Erases one more sector of what the next job will take if it is saved with this many `bytes`,
     /// its header and its room included, and at last its log. Returns whether more may be left. The
     /// call may block, so it is only made while the machine is stopped; between two calls the user
     /// is listened to. What was erased ahead is not erased again.
@@ -147,7 +147,7 @@ pub trait Board {
         let _ = (notes, strokes);
         Err(NotStored)
     }
-    /// Keeps that so many strokes of the job have been drawn. The call may block for a few
+    /// Keeps that this many strokes of the job have been drawn. The call may block for a few
     /// milliseconds, so it is only made while the machine stands with the pen raised and no
     /// step waits.
     ///
@@ -157,7 +157,7 @@ pub trait Board {
         let _ = strokes;
         Err(NotStored)
     }
-    /// Keeps that so many points within strokes of the job have been passed. The call may block
+    /// Keeps that this many points within strokes of the job have been passed. The call may block
     /// for a few milliseconds, so it is only made while the machine stands and no step waits.
     ///
     /// # Errors

@@ -195,7 +195,7 @@ impl<F: MultiwriteNorFlash> FlashRecords<F> {
     /// Carries out [`Board::begin_progress`](super::Board::begin_progress).
     ///
     /// # Errors
-    /// [`NotStored`] if no job is kept, if the log cannot hold so many strokes, or if the flash
+    /// [`NotStored`] if no job is kept, if the log cannot hold this many strokes, or if the flash
     /// does not take it.
     pub fn begin_progress(&mut self, notes: &[u8], strokes: u32) -> Result<(), NotStored> {
         self.open = None;

@@ -18,7 +18,7 @@ use crate::protocol::{BlockError, CommandError, GCode, Significant};
 /// The idleness that ends a program, in microseconds.
 const IDLE_MICROSECONDS: u32 = 1_000_000;
 
-/// Work on the flash that takes less than so many microseconds has kept nobody waiting.
+/// Work on the flash that takes less than this many microseconds has kept nobody waiting.
 #[cfg(feature = "early-ink")]
 const UNNOTICED_MICROSECONDS: u32 = 2_000;
 

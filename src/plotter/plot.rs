@@ -30,7 +30,7 @@ pub(super) enum Drawing {
     },
 }
 
-/// For so many microseconds the user is listened to between two erasures of the flash: what is
+/// For this many microseconds the user is listened to between two erasures of the flash: what is
 /// answered has left before the next one begins.
 #[cfg(feature = "early-ink")]
 pub(super) const ANSWER_MICROSECONDS: u32 = 10_000;

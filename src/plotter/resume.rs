@@ -109,7 +109,7 @@ mod with_feature {
         notes.get(index).map_or(0, |word| u32::from_le_bytes(*word))
     }
 
-    /// The notes of a job of so many strokes, with a mark and the three words that tell more of it.
+    /// The notes of a job of this many strokes, with a mark and the three words that tell more of it.
     #[inline(never)] // It is called in several places, and its loop is unrolled.
     fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
         let [first, second, third] = more;
@@ -223,7 +223,7 @@ mod with_feature {
             }
         }
 
-        /// Keeps that so many strokes have been drawn.
+        /// Keeps that this many strokes have been drawn.
         #[inline(never)] // Inlined, it would take room in the main loop.
         fn note_stroke<B: Board>(&mut self, strokes: u32, board: &mut B) {
             let at_once = self.resumption.more_at_once.saturating_add(1);
@@ -242,7 +242,7 @@ mod with_feature {
             }
         }
 
-        /// Keeps that so many points within strokes have been passed.
+        /// Keeps that this many points within strokes have been passed.
         #[inline(never)] // Inlined, it would take room in the main loop.
         fn note_point<B: Board>(&mut self, points: u32, board: &mut B) {
             let kept = board.note_point(points);

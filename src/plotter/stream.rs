@@ -21,7 +21,7 @@ use core::fmt;
 pub(super) enum Task {
     /// The rest of an arc, from the point reached so far.
     Arc(PagePoint, Arc),
-    /// A dwell of so many ticks, which begins once the machine has stopped.
+    /// A dwell of this many ticks, which begins once the machine has stopped.
     Dwell(u64),
     /// Waits until the machine has stopped, then for the user, to change the pen if `for_pen`.
     Pause {

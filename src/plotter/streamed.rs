@@ -60,7 +60,7 @@ impl Streamed {
         self.taken < self.header.targets
     }
 
-    /// The number of targets for which a ring of `length` has room once so many have been `read`.
+    /// The number of targets for which a ring of `length` has room once this many have been `read`.
     pub(super) fn room(&self, length: usize, read: usize) -> usize {
         length.saturating_sub((self.taken as usize).saturating_sub(read))
     }
@@ -102,7 +102,7 @@ impl<I: Index> Strokes<'_, I> {
     }
 
     /// Whether the next target has not come yet, or not all of its stroke.
-    #[inline(never)] // As above.
+    #[inline(never)] // Other jobs come here once, at their end.
     pub(super) fn lateness(&self) -> Option<PendingTarget> {
         let (streamed, read) = (self.streamed?, self.cursor.leg);
         if read < streamed.released as usize || read >= streamed.header.targets as usize {

@@ -474,7 +474,7 @@ mod tests {
             let arc = |far: i32| Arc::new(at(0, 0), point(far), point(-far), Turn::Clockwise);
             assert!(arc(MOST).is_ok());
             assert_eq!(arc(MOST + 1).err(), Some(ArcError::TooWide));
-            // Steps of x and y count as so many units.
+            // Steps of x and y count as this many units.
             let weighted = |weight: u16| {
                 let turn = Turn::Clockwise;
                 Arc::weighted([weight; 2], at(0, 0), point(MOST), point(-MOST), turn)

@@ -97,7 +97,7 @@ impl<'f> Area<'f> {
     /// The index of the word at which the low contents begin.
     pub const LOW: usize = PAGE_WORDS;
 
-    /// Three bytes of the high contents: those that came so many bytes after the first, in the
+    /// Three bytes of the high contents: those that came this many bytes after the first, in the
     /// order in which they came.
     #[inline]
     pub fn high_3(self, after: usize) -> [u8; 3] {
@@ -236,7 +236,7 @@ impl AreaWriter {
         Ok(Self { low: End { erased: 1, ..End::NEW }, high: End::NEW })
     }
 
-    /// Whether so many more bytes of both contents fit.
+    /// Whether this many more bytes of both contents fit.
     pub fn has_room(&self, area: Area<'_>, low: usize, high: usize) -> bool {
         let lengths = [self.low.length.saturating_add(low), self.high.length.saturating_add(high)];
         pages(lengths) < area.bytes() / PAGE_BYTES

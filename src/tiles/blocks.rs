@@ -7,7 +7,7 @@ use crate::stage::{Cancel, Scratch, items};
 use crate::visibility::VisibilityError;
 use bytemuck::{Pod, Zeroable};
 
-/// The part of the working memory that the index takes at most is one in so many bytes.
+/// The part of the working memory that the index takes at most is one in this many bytes.
 const SHARE: usize = 16;
 /// The fewest corners in a block: the index gains little from fewer.
 const FEWEST_CORNERS: usize = 24;
@@ -44,7 +44,7 @@ impl Block {
     }
 }
 
-/// The page is divided into so many rows and columns to count the elements on it.
+/// The page is divided into this many rows and columns to count the elements on it.
 const DIVISIONS: u16 = 16;
 
 /// The number of parts that this makes.

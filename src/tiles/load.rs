@@ -320,7 +320,7 @@ fn sort_without_repeats(numbers: &mut [u32], cancel: &mut dyn Cancel) -> Result<
     Ok(kept)
 }
 
-/// The error that there is room for so many numbers and not for one more.
+/// The error that there is room for this many numbers and not for one more.
 fn out_of(room: usize) -> VisibilityError {
     let available = room * size_of::<u32>();
     OutOfScratch { needed: available + size_of::<u32>(), available }.into()

@@ -96,11 +96,11 @@ const LOOK: usize = 3000;
 /// The number of instructions for placing an element on the page.
 const PLACE: usize = 8000;
 
-/// A region has a margin of one in so many points of its shorter side: the next tiles also need the
+/// A region has a margin of one in this many points of its shorter side: the next tiles also need the
 /// elements beside them.
 const REGION_MARGIN: u16 = 16;
 
-/// For each element of a tile so many bytes are needed in most models, for what lies beside the
+/// For each element of a tile this many bytes are needed in most models, for what lies beside the
 /// tile and for the search, too. A tile with more elements than that is divided before it is
 /// loaded.
 const LIKELY_BYTES: usize = 72;

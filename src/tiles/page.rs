@@ -217,7 +217,7 @@ impl Survey {
         }
     }
 
-    /// Returns how far on the grid a point may be off whose view coordinates may be off by so many
+    /// Returns how far on the grid a point may be off whose view coordinates may be off by this many
     /// halves of a unit.
     pub(super) fn error_bound(&self, halves: u32) -> u16 {
         self.error_bound.saturating_mul(halves.into()).min(u16::MAX.into()) as u16
@@ -290,7 +290,7 @@ impl Tile {
         self.depth
     }
 
-    /// Returns the part of the page that is divided so many times and has this tile in it. `None`
+    /// Returns the part of the page that is divided this many times and has this tile in it. `None`
     /// if the tile is larger than that.
     pub fn part_of(self, depth: u32) -> Option<Self> {
         let more = self.depth.checked_sub(depth)?;

@@ -8,10 +8,10 @@ use super::page::Rectangle;
 use crate::stage::{OutOfScratch, Scratch};
 use core::slice;
 
-/// The part of the working memory that the list takes is one in so many bytes.
+/// The part of the working memory that the list takes is one in this many bytes.
 const SHARE: usize = 16;
 
-/// A region with fewer elements than one in so many for which there is room is small: the next one
+/// A region with fewer elements than one in this many for which there is room is small: the next one
 /// may be twice as large.
 const SMALL: usize = 4;
 

@@ -191,7 +191,7 @@ impl Mapping {
     }
 
     /// Returns how far a point may lie beside its true place on the coarse grid if its view
-    /// coordinates are off by so many units.
+    /// coordinates are off by this many units.
     fn error_bound(&self, units: u32) -> i32 {
         // The unit is below 2^41.
         let fine = self.unit * i64::from(units.min(1 << 20));

@@ -2,7 +2,7 @@
 //!
 //! It has one bit for each face. Which of its words hold bits is recorded, so that clearing a set
 //! of many words takes as long as filling it did. Where no more can be recorded, all words are
-//! cleared, and all are looked through. With the numbers of a board there are never so many faces
+//! cleared, and all are looked through. With the numbers of a board there are never this many faces
 //! that recording would be faster.
 
 use super::VisibilityError;
@@ -36,7 +36,7 @@ impl<'a, I: Index> FaceSet<'a, I> {
     /// A set with fewer words than this is cleared as a whole, because recording takes longer.
     const MANY_WORDS: usize = 64;
 
-    /// Returns how many words of a set of so many are recorded.
+    /// Returns how many words of a set of this many are recorded.
     const fn used(words: usize) -> usize {
         if Self::IS_RECORDED && words >= Self::MANY_WORDS { Self::MOST_USED } else { 0 }
     }
@@ -47,13 +47,13 @@ impl<'a, I: Index> FaceSet<'a, I> {
         if Self::IS_RECORDED && !used.is_empty() { used.get_mut(..count) } else { None }
     }
 
-    /// Returns the most bytes that a set of so many faces takes.
+    /// Returns the most bytes that a set of this many faces takes.
     pub const fn bytes(faces: usize) -> usize {
         let words = faces.div_ceil(32);
         Scratch::bytes_for::<u32>(words) + Scratch::bytes_for::<u32>(Self::used(words))
     }
 
-    /// Makes an empty set for so many faces.
+    /// Makes an empty set for this many faces.
     ///
     /// # Errors
     /// Returns an error if the memory is too small.

@@ -21,7 +21,7 @@ const ABORT_WORD: &str = "^X";
 /// The longest pause in which the plotter is asked for nothing.
 const PAUSE: Duration = Duration::from_millis(20);
 
-/// After the end of the input, so many pauses in which nothing comes are the end.
+/// After the end of the input, this many pauses in which nothing comes are the end.
 const LAST_SILENCES: u32 = 25;
 
 /// What the user of a terminal is told first.

@@ -74,7 +74,7 @@ pub(super) fn reads(keyword: &str) -> bool {
         || matches!(keyword, "f" | "fo" | "l" | "cstype" | "deg" | "curv" | "parm" | "end")
 }
 
-/// Whether a plotter that holds so many vertices takes the corners of a face or polyline as they
+/// Whether a plotter that holds this many vertices takes the corners of a face or polyline as they
 /// are.
 pub(super) fn is_regular(line: &str, vertices: usize) -> bool {
     let mut words = line.split(' ');
@@ -95,7 +95,7 @@ pub(super) fn is_regular(line: &str, vertices: usize) -> bool {
     count > 1 && (line.starts_with('l') || first != last)
 }
 
-/// The number of the vertex of a corner such as `3/1/2` or `-1`, where so many came before. `None`
+/// The number of the vertex of a corner such as `3/1/2` or `-1`, where this many came before. `None`
 /// if it is no number. It may be 0 or too large.
 fn corner(word: &str, vertices: usize) -> Option<usize> {
     let number: i64 = word.split('/').next()?.parse().ok()?;

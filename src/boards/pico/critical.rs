@@ -79,7 +79,7 @@ pub fn move_vectors_to_ram() {
     unsafe extern "C" {
         static __vector_table: [u32; VECTORS];
     }
-    // SAFETY: the linker puts the table of so many vectors there (`cortex-m-rt`), and nothing
+    // SAFETY: the linker puts the table of this many vectors there (`cortex-m-rt`), and nothing
     // writes flash now.
     let in_flash = unsafe { &__vector_table };
     for (slot, vector) in IN_RAM.0.iter().zip(in_flash) {

@@ -299,7 +299,7 @@ impl MultiwriteNorFlash for Flash {}
 pub fn model_area() -> Area<'static> {
     const WORDS: usize = (RECORDS - START) as usize / size_of::<AtomicU32>();
     let address = (MAPPED_AT + START as usize) as *const AtomicU32;
-    // SAFETY: so many words are mapped to flash there, for ever. They change while the flash is
+    // SAFETY: this many words are mapped to flash there, for ever. They change while the flash is
     // erased or written, which atomic words may; nothing writes them through this slice.
     Area::new(unsafe { core::slice::from_raw_parts(address, WORDS) })
 }

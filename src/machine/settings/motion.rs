@@ -17,7 +17,7 @@ impl Settings {
         Limits::new(&self.motion_settings()).map(|_| ())
     }
 
-    /// The limits that the motion planner needs if so many steps can be counted on to wait in the
+    /// The limits that the motion planner needs if this many steps can be counted on to wait in the
     /// `queue`.
     ///
     /// Speed and acceleration are measured along the path, so the slower axis determines both.
@@ -41,7 +41,7 @@ impl Settings {
         Limits::new(&settings).unwrap_or_default()
     }
 
-    /// The rule by which the interrupt brakes if its `queue` of so many steps runs empty. The
+    /// The rule by which the interrupt brakes if its `queue` of this many steps runs empty. The
     /// second value is the greatest speed in mm/min if the settings ask for more than the queue can
     /// hold.
     pub(in crate::machine) fn brake(&self, queue: u32) -> (BrakeRule, Option<Value>) {
@@ -70,7 +70,7 @@ impl Settings {
         }
     }
 
-    /// Returns how fast the pen travels on the page, for an order that is improved by so many units
+    /// Returns how fast the pen travels on the page, for an order that is improved by this many units
     /// of work in a second. It does not depend on the board.
     pub fn time_model(&self, units_per_second: u32) -> TimeModel {
         let MotionSettings { steps_per_mm, travel_mm_per_min, acceleration_mm_per_s2, .. } =

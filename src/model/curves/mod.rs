@@ -122,7 +122,7 @@ const PEN: usize = 3;
 /// How many bytes a knot takes.
 const KNOT: usize = 4;
 
-/// Returns how many numbers of the store so many bytes take.
+/// Returns how many numbers of the store this many bytes take.
 const fn units_of<I>(bytes: usize) -> usize {
     bytes / size_of::<I>()
 }

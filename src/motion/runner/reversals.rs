@@ -8,7 +8,7 @@ use crate::drawing::PagePoint;
 use crate::motion::PathLength;
 use heapless::Deque;
 
-/// The most reversals that may wait for the pins. When so many wait, the planner waits, too.
+/// The most reversals that may wait for the pins. When this many wait, the planner waits, too.
 const MAX_REVERSALS: usize = 16;
 
 /// The part of a move that takes up backlash while the pen draws.

@@ -162,14 +162,14 @@ impl<I: Index> Job<I> {
         })
     }
 
-    /// The job of a drawing that lies at the front of the working memory, with so many segments in
+    /// The job of a drawing that lies at the front of the working memory, with this many segments in
     /// the tour behind it.
     #[cfg(feature = "tiles")]
     pub(super) fn of(stored: Stored<I>, legs: usize, report: order::Report) -> Self {
         Self { stored, legs, report, ..Self::default() }
     }
 
-    /// A job without strokes, from which so many faces were left out.
+    /// A job without strokes, from which this many faces were left out.
     #[cfg(feature = "tiles")]
     pub(super) fn left_out(degenerate_faces: u32) -> Self {
         Self { degenerate_faces, ..Self::default() }

@@ -116,7 +116,7 @@ impl<'a, I: Index> Strokes<'a, I> {
 
     /// Where this segment of the tour ends: late, if an open stroke ends with it. Behind a closed
     /// one, its beginning follows.
-    #[inline(never)] // As above.
+    #[inline(never)] // Without such settings, this is never called.
     fn late(&mut self, ends: &StrokeEnds, index: usize) -> Option<PagePoint> {
         let (segment, numbers) = self.leg(index)?;
         let [from, to] = self.points(numbers)?;
@@ -134,7 +134,7 @@ impl<'a, I: Index> Strokes<'a, I> {
     }
 
     /// The next target along the beginning of a closed stroke, behind its end.
-    #[inline(never)] // As above.
+    #[inline(never)] // Without such settings, this is never called.
     fn next_beyond(&mut self, ends: &StrokeEnds) -> Option<Target> {
         let left = core::mem::take(&mut self.cursor.beyond);
         // What comes next begins with a move with the pen up.

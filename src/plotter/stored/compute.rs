@@ -16,7 +16,7 @@ use crate::view::View;
 use crate::visibility::{SinkFull, Stretch, StretchSink, VisibilityError};
 use core::iter;
 
-/// The part of the working memory that holds the lines of a part is one in so many words.
+/// The part of the working memory that holds the lines of a part is one in this many words.
 const LINE_SHARE: usize = 8;
 
 /// A part has lines of more than one tile until it has so many. Fewer would make the way between
@@ -155,7 +155,7 @@ pub(super) fn next_part<I: Index>(
 
 /// Finds lines of the present pen, in as many tiles as it takes to find some, and moves them to the
 /// front of the memory behind the index. Returns their number.
-#[inline(never)] // As above.
+#[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
 fn find_lines(
     model: &StoredModel<'_>,
     search: &mut Search,
@@ -205,7 +205,7 @@ fn find_lines(
 
 /// Makes one drawing of the lines at the front of `words` and orders its strokes. Returns `None` if
 /// nothing is left to draw.
-#[inline(never)] // As above.
+#[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
 fn order_lines<I: Index>(
     words: &mut [u64],
     count: usize,

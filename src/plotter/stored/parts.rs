@@ -82,7 +82,7 @@ impl<I> Parts<I> {
     }
 
     /// Hands as much of the computed part to the ring as there is room for once the machine has
-    /// `read` so many targets: all of it, or, if it is longer than the ring, as much as the ring
+    /// `read` this many targets: all of it, or, if it is longer than the ring, as much as the ring
     /// holds. Returns its size.
     pub(super) fn feed(
         &mut self,

@@ -134,7 +134,7 @@ fn feed() {
     // and the compiler does not know of this reader.
     fence(Ordering::Release);
     // SAFETY: the address is in the ring, at whose end the channel wraps, or that of the block,
-    // which has so many words. Both are atomics.
+    // which has this many words. Both are atomics.
     let dma = unsafe { DMA.registers() };
     dma.ch(0).ch_read_addr().put(address);
     // Writing the count here starts the channel.
