@@ -34,7 +34,7 @@ const SCENES: [(&str, &str, &str); 9] = [
 ];
 
 /// A board that receives `text` and prints only refusals.
-struct Line<'t> {
+struct BenchBoard<'t> {
     /// The bytes that the plotter has still to read.
     text: &'t [u8],
     /// Where step events would go. No job is drawn, so none comes.
@@ -53,7 +53,7 @@ impl EventQueue for NoSteps {
     }
 }
 
-impl Board for Line<'_> {
+impl Board for BenchBoard<'_> {
     const NAME: &'static str = "mps2";
 
     fn read_byte(&mut self) -> Option<(usize, u8)> {
@@ -126,7 +126,7 @@ fn main() -> ! {
     let mut counter = Counter::start();
     for (name, scene, eye) in SCENES {
         for text in ["$clear\n$view=auto\n", eye, scene] {
-            let mut line = Line { text: text.as_bytes(), queue: NoSteps };
+            let mut line = BenchBoard { text: text.as_bytes(), queue: NoSteps };
             while !line.text.is_empty() {
                 plotter.poll(&mut line);
             }

@@ -41,7 +41,7 @@ pub trait Index:
     + Shl<u32, Output = Self>
     + Shr<u32, Output = Self>
 {
-    /// Two numbers in one, which sorts by the first and then by the second.
+    /// A pair of numbers in one, which sorts by the first number and then by the second.
     type Pair: Pod + Send + Sync + Ord + Debug + From<u32> + Into<u64>;
 
     /// The number 0.
@@ -131,7 +131,7 @@ impl<I: Index> Numbers<I> {
         self.end.get().saturating_sub(self.start.get())
     }
 
-    /// Whether there are none.
+    /// Whether the range contains no numbers.
     pub fn is_empty(&self) -> bool {
         self.end <= self.start
     }

@@ -26,7 +26,7 @@
 pub mod area;
 mod log;
 
-pub use log::{Log, NOTE_BYTES, Noted};
+pub use log::{Log, LogProgress, NOTE_BYTES};
 
 use crate::checksum::Crc32;
 #[cfg(feature = "early-ink")]
@@ -49,7 +49,7 @@ const HEADER_BYTES: usize = 16;
 pub enum StorageError<E> {
     /// The state is longer than a slot.
     TooLong,
-    /// Something else was added to the state before.
+    /// Something else has been added to the state before.
     #[cfg(feature = "early-ink")]
     Changed,
     /// The flash reported an error.
@@ -342,7 +342,7 @@ fn total(digest: Crc32, sequence: u32, length: u32) -> u32 {
     total_of(MARK, digest, sequence, length)
 }
 
-/// The same for a header with this mark.
+/// Returns the checksum of a header with this mark and of the payload whose `digest` is given.
 fn total_of(mark: u32, mut digest: Crc32, sequence: u32, length: u32) -> u32 {
     for word in [mark, sequence, length] {
         digest.update(&word.to_le_bytes());

@@ -30,9 +30,10 @@ use tungstenite::{Error as SocketError, Message, WebSocket};
 
 /// The most bytes of a message of the page. It sends a few lines at a time.
 const LONGEST_MESSAGE: usize = 4096;
-/// How many messages of the page wait for the plotter; then the page waits.
+/// The number of messages of the page that may wait for the plotter. When so many wait, the page
+/// waits, too.
 const WAITING_MESSAGES: usize = 64;
-/// How long each side is waited for before the other is looked at.
+/// The time for which each side is waited for before the other one is served.
 const TURN: Duration = Duration::from_millis(5);
 /// The code with which a page is closed that came while another held the plotter. Codes from 4000
 /// on are for programs to choose.
@@ -40,15 +41,15 @@ const TAKEN: u16 = 4000;
 /// The code with which a page is closed because the line to the plotter broke.
 const BROKEN: u16 = 4001;
 
-/// What stands at the far end of the bridge.
-pub enum Far {
+/// The plotter at the far end of the bridge.
+pub enum FarEnd {
     /// A plotter at a serial port.
     Port(Box<dyn Link>),
     /// An emulated board.
     Board(Box<dyn WatchedPlotter>),
 }
 
-impl Far {
+impl FarEnd {
     fn link(&mut self) -> &mut dyn Link {
         match self {
             Self::Port(link) => link.as_mut(),
@@ -58,7 +59,7 @@ impl Far {
 }
 
 /// Opens what stands at the far end.
-pub type Open = Box<dyn Fn() -> Result<Far, Error> + Send + Sync>;
+pub type Open = Box<dyn Fn() -> Result<FarEnd, Error> + Send + Sync>;
 
 /// What a page asks of an emulated board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
@@ -70,14 +71,14 @@ pub enum Order {
     Begin,
 }
 
-/// What the page sends.
+/// The messages from the page to the plotter.
 #[derive(Debug, PartialEq, Eq)]
 enum ToPlotter {
     Bytes(Vec<u8>),
     Order(Order),
 }
 
-/// What the page is told.
+/// The messages from the plotter to the page.
 #[derive(Debug)]
 enum ToPage {
     Bytes(Vec<u8>),
@@ -145,7 +146,7 @@ impl Bridge {
     fn converse(&self, socket: &mut WebSocket<TcpStream>) -> Result<(), (CloseCode, String)> {
         let refused = |code: u16, reason: &str| Err((code.into(), reason.to_owned()));
         let taken = "Another page holds the plotter: close that page, then connect again.";
-        let Some(_seat) = Seat::take(self) else { return refused(TAKEN, taken) };
+        let Some(_seat) = PageLock::take(self) else { return refused(TAKEN, taken) };
         let (to_plotter, from_plotter) = match self.line() {
             Ok(line) => line,
             Err(error) => return refused(BROKEN, &shortened(&error.to_string())),
@@ -244,7 +245,7 @@ impl Line {
 }
 
 /// Carries bytes in both directions until the line breaks. Returns why it broke.
-fn carry(far: &mut Far, orders: &Receiver<ToPlotter>, listener: &Listener) -> String {
+fn carry(far: &mut FarEnd, orders: &Receiver<ToPlotter>, listener: &Listener) -> String {
     let mut buffer = [0; 4096];
     loop {
         let mut turn = || -> Result<bool, Error> {
@@ -254,7 +255,7 @@ fn carry(far: &mut Far, orders: &Receiver<ToPlotter>, listener: &Listener) -> St
                         far.link().send(&bytes).map_err(Error::Link)?;
                     }
                     Ok(ToPlotter::Order(order)) => {
-                        if let Far::Board(board) = far {
+                        if let FarEnd::Board(board) = far {
                             match order {
                                 Order::Pen(pen) => {
                                     board.change_pen(pen).map_err(Error::Link)?;
@@ -268,7 +269,7 @@ fn carry(far: &mut Far, orders: &Receiver<ToPlotter>, listener: &Listener) -> St
                 }
             }
             let count = far.link().receive(&mut buffer, TURN).map_err(Error::Link)?;
-            if let Far::Board(board) = far {
+            if let FarEnd::Board(board) = far {
                 let path = board.take_path()?;
                 if !path.is_empty() {
                     tell(listener, ToPage::Path(path));
@@ -284,8 +285,8 @@ fn carry(far: &mut Far, orders: &Receiver<ToPlotter>, listener: &Listener) -> St
             Ok(false) => return "The bridge is closed.".to_owned(),
             Err(error) => {
                 let error = match far {
-                    Far::Board(board) => board.explain(error),
-                    Far::Port(_) => error,
+                    FarEnd::Board(board) => board.explain(error),
+                    FarEnd::Port(_) => error,
                 };
                 return error.to_string();
             }
@@ -293,25 +294,26 @@ fn carry(far: &mut Far, orders: &Receiver<ToPlotter>, listener: &Listener) -> St
     }
 }
 
-/// Tells the page that holds the plotter; without one, nobody misses it.
+/// Sends news to the page that holds the plotter. Without a page, they are dropped.
 fn tell(listener: &Listener, news: ToPage) {
     if let Some(page) = locked(listener).as_ref() {
         let _ = page.send(news);
     }
 }
 
-/// The place of the page that holds the plotter, which is free again when this is dropped.
-struct Seat<'a>(&'a Bridge);
+/// Marks the plotter as held by a page. Dropping it releases the plotter.
+struct PageLock<'a>(&'a Bridge);
 
-impl<'a> Seat<'a> {
+impl<'a> PageLock<'a> {
     fn take(bridge: &'a Bridge) -> Option<Self> {
         let was_taken = bridge.is_taken.swap(true, Ordering::SeqCst);
-        // Not `then_some`: a seat that is not taken must not be dropped.
+        // This must not be `then_some`, which would drop the lock, and so release the plotter, if
+        // another page holds it.
         (!was_taken).then(|| Self(bridge))
     }
 }
 
-impl Drop for Seat<'_> {
+impl Drop for PageLock<'_> {
     fn drop(&mut self) {
         *locked(&self.0.listener) = None;
         self.0.is_taken.store(false, Ordering::SeqCst);

@@ -25,7 +25,7 @@ pub enum Compute {
     Host,
 }
 
-/// How much a plotter holds.
+/// The capacity of a plotter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Capacity {
     /// The number of vertices.
@@ -55,11 +55,12 @@ impl Capacity {
 /// What is known of a plotter before a drawing is sent to it.
 #[derive(Debug, Clone)]
 pub struct Known {
-    /// How much it holds.
+    /// The capacity of the plotter.
     pub capacity: Capacity,
-    /// Its board, if this program knows it.
+    /// The board of the plotter, if this program knows it.
     pub board: Option<&'static BoardRow>,
-    /// Its settings. `None` if its firmware has settings that this program does not know.
+    /// The settings of the plotter. `None` if its firmware has settings that this program does not
+    /// know.
     pub settings: Option<Settings>,
     /// The number of vertices of the model that its flash keeps; 0 if there is none.
     pub kept: usize,
@@ -69,7 +70,7 @@ pub struct Known {
 pub struct Choice {
     /// The plotter in memory that is to compute it, with the file; `None` if the real one does.
     pub host: Option<InMemory<u32>>,
-    /// What the file and the drawing have, for the user.
+    /// A summary of the file and the drawing, for the user.
     pub totals: String,
     /// A sentence for the user, if this program has chosen.
     pub reason: Option<String>,

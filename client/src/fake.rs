@@ -20,7 +20,7 @@ use std::time::{Duration, Instant};
 /// The way in which a fake plotter misbehaves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fault {
-    /// It behaves correctly.
+    /// The plotter behaves correctly.
     #[default]
     None,
     /// Never sends anything.
@@ -59,7 +59,7 @@ pub enum Fault {
 /// The state of a simulated plotter; see the [module](self).
 #[derive(Debug, Default)]
 pub struct FakePlotter {
-    /// The way in which it misbehaves.
+    /// The way in which the plotter misbehaves.
     pub fault: Fault,
     /// The lines of a job that it accepted, in order, since the last clearing.
     pub lines: Vec<String>,

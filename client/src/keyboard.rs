@@ -139,7 +139,7 @@ mod terminal {
         }
     }
 
-    /// The byte of the key that an event tells of.
+    /// Returns the byte of the key that was pressed, if the event is a key press.
     fn pressed(event: &Event) -> Option<u8> {
         let Event::Key(key) = event else { return None };
         match key.code {

@@ -138,7 +138,7 @@ impl SerialLink {
         })
     }
 
-    /// The same link, whose plotter is also looked for at other ports when it is gone.
+    /// Returns the same link, but if the plotter is lost, it is also searched for at other ports.
     #[must_use]
     pub fn found_again_by_search(mut self) -> Self {
         self.port.also_open(Box::new(|| ports::find().ok()?.port.into_wire()));
@@ -213,7 +213,7 @@ impl SerialLink {
         if self.keyboard.is_some() {
             self.read_keys();
             if first {
-                // A progress bar stands in this line.
+                // This line of the terminal shows a progress bar.
                 eprintln!("\r\x1b[2K{question}");
                 self.is_answered = false;
             }

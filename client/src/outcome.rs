@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 pub struct Outcome {
     /// The text for a person; may have several lines or none.
     pub text: String,
-    /// The same for `--json`.
+    /// The answer for `--json`.
     pub json: Value,
     /// Whether the user asked for the text itself. Otherwise it only tells what was done, and
     /// `--quiet` leaves it out.

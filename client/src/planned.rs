@@ -9,14 +9,14 @@ use penup::machine::{Contacts, EventRing, PulserState, Setting, Settings};
 use penup::motion::{EventKind, EventQueue, StepEvent, StepTrain, TICKS_PER_SECOND};
 use penup::plotter::{Board, NotStored, Record, Replies, Stored};
 use penup::protocol::RealTime;
-use penup::storage::Noted;
+use penup::storage::LogProgress;
 use penup_job::path::Run;
 use penup_job::watch::PenPath;
 
 /// A board in memory without pins.
 pub struct PlannedBoard {
     board: HostBoard<'static>,
-    /// What happens when the planned events are carried out.
+    /// The effects of carrying out the planned events.
     pub steps: Steps,
     /// The state that the machine shares with the pins.
     pub pins: &'static PulserState,
@@ -139,7 +139,7 @@ impl Board for PlannedBoard {
         self.board.note_point(points)
     }
 
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, LogProgress)> {
         self.board.progress(notes)
     }
 
@@ -162,7 +162,7 @@ impl Board for PlannedBoard {
     }
 }
 
-/// The path of the pen, in time, and what else a preview tells of the steps.
+/// The path of the pen over time, and the other results that a preview reports of the steps.
 pub struct Steps {
     pins: &'static PulserState,
     /// The time, in ticks, and how much of it passes in one turn of the main loop.
@@ -185,7 +185,7 @@ pub struct Steps {
     job: Option<JobSteps>,
 }
 
-/// What is told of the steps of a job.
+/// The results that are reported of the steps of a job.
 struct JobSteps {
     path: PenPath,
     /// The number of motor steps. A simultaneous step of both axes counts once.

@@ -119,7 +119,7 @@ impl Plot<'_> {
         }
     }
 
-    /// Draws it by a plotter that is idle and of which so much is `known`.
+    /// Draws the file with a plotter that is idle, according to what is `known` of it.
     fn draw(
         &self,
         sender: &mut Sender<'_>,
@@ -227,7 +227,7 @@ impl Plot<'_> {
         streamed: &StreamedJob,
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
-        let mut followed = Followed { progress, begun: 0 };
+        let mut followed = StrokeCounter { progress, begun: 0 };
         let sent = sender.draw_streamed(streamed, &mut followed);
         let begun = followed.begun;
         if sent.is_err() && begun > 0 {
@@ -286,13 +286,13 @@ impl Plot<'_> {
     }
 }
 
-/// Notes how many strokes were begun while it passes reports on.
-struct Followed<'p> {
+/// Passes reports of progress on, and notes how many strokes were begun.
+struct StrokeCounter<'p> {
     progress: &'p mut dyn Progress,
     begun: u64,
 }
 
-impl Progress for Followed<'_> {
+impl Progress for StrokeCounter<'_> {
     fn lines_sent(&mut self, done: usize, all: usize) {
         self.progress.lines_sent(done, all);
     }

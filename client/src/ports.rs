@@ -33,7 +33,7 @@ pub struct Port {
     pub device: String,
     /// The product at the port, if the system knows it.
     pub product: Option<String>,
-    /// What answers there.
+    /// What answers at the port.
     #[serde(flatten)]
     pub found: Found,
 }
@@ -49,7 +49,7 @@ pub enum Found {
     },
     /// Something else that sends text.
     Other {
-        /// What it sent, or a part of it.
+        /// The bytes that it sent, or a part of them.
         said: String,
     },
     /// Nothing answers.

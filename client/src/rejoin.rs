@@ -14,7 +14,7 @@ const SILENCE: Duration = Duration::from_secs(3);
 /// The time between two attempts to reach the plotter.
 const PAUSE: Duration = Duration::from_millis(250);
 
-/// A wait that takes so much longer than it should was a sleep of the computer.
+/// If a wait takes this much longer than it should, the computer was asleep.
 const SLEEP: Duration = Duration::from_secs(2);
 
 /// The stream of bytes of an open port.
@@ -35,16 +35,16 @@ impl Wire for Box<dyn serialport::SerialPort> {
 /// Opens the port of the plotter again; `None` while it is not there.
 pub type Open<W> = Box<dyn FnMut() -> Option<W> + Send>;
 
-/// Why a plotter is gone.
+/// The reasons why a plotter is lost.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Why {
     Port,
     Silence,
 }
 
-/// The time since which a plotter is gone, and why.
+/// The time since which the plotter is lost, and why.
 #[derive(Debug, Clone, Copy)]
-struct Gone {
+struct LostPlotter {
     since: Instant,
     why: Why,
     last_attempt: Instant,
@@ -58,7 +58,7 @@ pub struct Rejoining<W> {
     /// it.
     limit: Option<Duration>,
     is_quiet: bool,
-    gone: Option<Gone>,
+    gone: Option<LostPlotter>,
     /// How long the plotter was gone in all.
     lost: Duration,
     /// When the last byte came; `None` before the first.
@@ -83,7 +83,7 @@ impl<W: Wire> Rejoining<W> {
         }
     }
 
-    /// Opens the port by `other` where it is not there any more.
+    /// Adds another way to open the port, which is used if the port is no longer there.
     pub fn also_open(&mut self, mut other: Open<W>)
     where
         W: 'static,
@@ -200,7 +200,7 @@ impl<W: Wire> Rejoining<W> {
         let now = Instant::now();
         let since = self.gone.map_or(now, |gone| gone.since);
         let is_new = self.gone.is_none();
-        self.gone = Some(Gone { since, why, last_attempt: now });
+        self.gone = Some(LostPlotter { since, why, last_attempt: now });
         if why == Why::Port {
             // An open port keeps its name from the plotter that comes back.
             self.wire = None;
@@ -254,7 +254,8 @@ impl<W: Wire> Rejoining<W> {
 
     fn say(&self, text: &str) {
         if !self.is_quiet {
-            // A progress bar stands in this line. A closed standard error is no reason to fail.
+            // This line of the terminal shows a progress bar. A closed standard error is no reason
+            // to fail.
             let _ = writeln!(io::stderr(), "\r\x1b[2Kpenup: {text}");
         }
     }

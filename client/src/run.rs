@@ -354,7 +354,7 @@ fn idle_on_plan(options: &PlotOptions, changed: &[String]) -> Option<String> {
 
 /// A file that was read, with its settings.
 pub struct Source {
-    /// What is sent.
+    /// The job that is sent.
     pub job: Job<SourceFile>,
     /// The settings of the drawing.
     pub settings: Settings,

@@ -53,7 +53,7 @@ pub struct PageServer {
     bridge: Option<Bridge>,
 }
 
-/// What a request asks for, and the headers that say where it comes from.
+/// A request of a browser: its path, and the headers that say where it comes from.
 #[derive(Debug, Clone, Copy, Default)]
 struct Request<'a> {
     method: &'a str,

@@ -34,7 +34,7 @@ pub type Shown = Vec<String>;
 
 /// A point of a record at which the power goes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cut {
+pub enum PowerCut {
     /// Between two operations: so many are done.
     Between(u32),
     /// When so many bytes of an operation have changed, and those bits of the next one that are in
@@ -45,7 +45,7 @@ pub enum Cut {
     Scattered(u32, u8, u32),
 }
 
-impl Cut {
+impl PowerCut {
     /// The number of operations that are done.
     fn done(self) -> u32 {
         let (Self::Between(done) | Self::Within(done, ..) | Self::Scattered(done, ..)) = self;
@@ -241,19 +241,21 @@ impl RecordedPico {
 
     /// When the power goes at a cut: at the beginning of the operation, because the machine stands
     /// while it lasts.
-    fn instant(&self, cut: Cut) -> Duration {
+    fn instant(&self, cut: PowerCut) -> Duration {
         let operation = self.operations.get(cut.done() as usize);
         operation.map_or(Duration::MAX, |operation| operation.began)
     }
 
     /// Starts the board behind a cut, and returns what it shows.
-    fn boot(&mut self, cut: Cut, questions: &[&str]) -> Result<Shown> {
+    fn boot(&mut self, cut: PowerCut, questions: &[&str]) -> Result<Shown> {
         self.line.forget();
         let emulator = &mut self.line.emulator;
         match cut {
-            Cut::Between(done) => emulator.boot_within(done, 0, 0)?,
-            Cut::Within(number, bytes, mask) => emulator.boot_within(number, bytes, mask)?,
-            Cut::Scattered(number, share, seed) => emulator.boot_scattered(number, share, seed)?,
+            PowerCut::Between(done) => emulator.boot_within(done, 0, 0)?,
+            PowerCut::Within(number, bytes, mask) => emulator.boot_within(number, bytes, mask)?,
+            PowerCut::Scattered(number, share, seed) => {
+                emulator.boot_scattered(number, share, seed)?
+            }
         }
         self.line.hear_greeting()?;
         self.line.emulator.send(b"?")?;
@@ -297,7 +299,7 @@ impl RecordedPico {
         let questions: Vec<&str> = questions.iter().map(String::as_str).collect();
         let mut states: Vec<Shown> = Vec::new();
         for done in 0..=operations.len() as u32 {
-            states.push(self.boot(Cut::Between(done), &questions)?);
+            states.push(self.boot(PowerCut::Between(done), &questions)?);
             let last = operations.len() - 1;
             let place = operations.get(done as usize).unwrap_or(&operations[last]);
             *self.tally.cuts.entry(name_of(place)).or_default() += 1;
@@ -312,7 +314,7 @@ impl RecordedPico {
             }
         }
         // What was done before the last operation, and behind it.
-        for cut in [Cut::Between(0), Cut::Between(operations.len() as u32)] {
+        for cut in [PowerCut::Between(0), PowerCut::Between(operations.len() as u32)] {
             self.try_one(scenario, cut, &states, &mut seen, effort, random)?;
         }
         Ok(())
@@ -395,16 +397,16 @@ impl RecordedPico {
                 let passed = (instant - last.began).as_micros();
                 if passed < lasts {
                     let share = (256 * passed / lasts) as u8;
-                    Cut::Scattered(number, share, random.below(1 << 24) as u32)
+                    PowerCut::Scattered(number, share, random.below(1 << 24) as u32)
                 } else {
-                    Cut::Between(number + 1)
+                    PowerCut::Between(number + 1)
                 }
             }
-            None => Cut::Between(0),
+            None => PowerCut::Between(0),
         };
         for done in [cut.done(), (cut.done() + 1).min(self.operations.len() as u32)] {
             if states[done as usize].is_none() {
-                let state = self.boot(Cut::Between(done), questions)?;
+                let state = self.boot(PowerCut::Between(done), questions)?;
                 states[done as usize] = Some(state);
             }
         }
@@ -427,7 +429,7 @@ impl RecordedPico {
     fn try_one(
         &mut self,
         scenario: &mut dyn Scenario,
-        cut: Cut,
+        cut: PowerCut,
         states: &[Shown],
         seen: &mut BTreeSet<(u32, Shown)>,
         effort: Effort,
@@ -456,9 +458,9 @@ impl RecordedPico {
 ///
 /// # Panics
 /// Panics if it shows another one.
-fn assert_shown<'s>(cut: Cut, shown: &Shown, state: impl Fn(u32) -> Option<&'s Shown>) {
+fn assert_shown<'s>(cut: PowerCut, shown: &Shown, state: impl Fn(u32) -> Option<&'s Shown>) {
     let before = state(cut.done());
-    let behind = if matches!(cut, Cut::Between(_)) { None } else { state(cut.done() + 1) };
+    let behind = if matches!(cut, PowerCut::Between(_)) { None } else { state(cut.done() + 1) };
     assert!(
         Some(shown) == before || Some(shown) == behind,
         "behind {cut:?}: {shown:#?}, neither {before:#?} nor {behind:#?}"
@@ -480,7 +482,7 @@ fn cuts_within(
     front: u32,
     effort: Effort,
     random: &mut Random,
-) -> Vec<Cut> {
+) -> Vec<PowerCut> {
     /// In a sector one byte is like the others.
     const SELDOM: u32 = 97;
     let is_content = operation.offset < RECORDS && operation.offset != front;
@@ -498,14 +500,14 @@ fn cuts_within(
     bytes.dedup();
     let mut cuts = Vec::new();
     for byte in bytes {
-        cuts.push(Cut::Within(number, byte, 0));
+        cuts.push(PowerCut::Within(number, byte, 0));
         if random.once_in(8) {
-            cuts.push(Cut::Within(number, byte, 1 + random.below(255) as u8));
+            cuts.push(PowerCut::Within(number, byte, 1 + random.below(255) as u8));
         }
     }
     let scattered = if is_content { effort.scattered.min(1) } else { effort.scattered };
     for share in [128, 4, 252, 64, 192].into_iter().take(scattered) {
-        cuts.push(Cut::Scattered(number, share, random.below(1 << 24) as u32));
+        cuts.push(PowerCut::Scattered(number, share, random.below(1 << 24) as u32));
     }
     cuts
 }

@@ -72,7 +72,7 @@ impl Job {
 
 /// How the board is stopped.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cut {
+enum PowerCut {
     At(Duration),
     InFlash(u64),
     Reset(Duration),
@@ -171,7 +171,7 @@ impl CutPico {
     fn run(
         &mut self,
         trigger: &str,
-        cut: Option<Cut>,
+        cut: Option<PowerCut>,
         random: &mut Random,
     ) -> Result<bool, Box<dyn Error>> {
         let resets = self.line.emulator.resets();
@@ -181,9 +181,9 @@ impl CutPico {
         }
         match cut {
             None => {}
-            Some(Cut::At(after)) => self.line.emulator.cut_power_after(after)?,
-            Some(Cut::InFlash(bytes)) => self.line.emulator.cut_power_in_flash(bytes)?,
-            Some(Cut::Reset(after)) => self.line.emulator.pull_run_low_after(after)?,
+            Some(PowerCut::At(after)) => self.line.emulator.cut_power_after(after)?,
+            Some(PowerCut::InFlash(bytes)) => self.line.emulator.cut_power_in_flash(bytes)?,
+            Some(PowerCut::Reset(after)) => self.line.emulator.pull_run_low_after(after)?,
         }
         let mut answer = self.line.ask(trigger)?;
         let mut is_over = false;
@@ -211,7 +211,7 @@ impl CutPico {
         if is_over {
             // What was to cut the power does not any more, or has just done so.
             self.line.emulator.cut_power_in_flash(NEVER)?;
-            if let Some(Cut::At(_) | Cut::Reset(_)) = cut {
+            if let Some(PowerCut::At(_) | PowerCut::Reset(_)) = cut {
                 self.line.hear_greeting()?;
             } else {
                 return Ok(false);
@@ -224,8 +224,8 @@ impl CutPico {
             return Err("the board started again by itself".into());
         }
         match cut {
-            Some(Cut::At(_)) => self.counts.instants += 1,
-            Some(Cut::InFlash(_)) => self.counts.in_flash += 1,
+            Some(PowerCut::At(_)) => self.counts.instants += 1,
+            Some(PowerCut::InFlash(_)) => self.counts.in_flash += 1,
             _ => self.counts.resets += 1,
         }
         // Nobody has said yet where the pen is.
@@ -238,17 +238,17 @@ impl CutPico {
 }
 
 /// A cut, most of which leave enough for the rest.
-fn some_cut(job: &Job, cuts: u32, random: &mut Random) -> Cut {
+fn some_cut(job: &Job, cuts: u32, random: &mut Random) -> PowerCut {
     let share = 2 * job.time / (cuts + 1);
     let after = SOONEST + Duration::from_micros(random.below(share.as_micros() as u64 + 1));
     match random.below(5) {
-        0 | 1 => Cut::At(after),
-        2 => Cut::Reset(after),
+        0 | 1 => PowerCut::At(after),
+        2 => PowerCut::Reset(after),
         _ => {
             let strokes = job.whole.len() as u64;
             // Saving a small job erases two sectors and writes some pages; each stroke writes one.
             let most = 256 * (2 * strokes / (u64::from(cuts) + 1) + 40);
-            Cut::InFlash(random.below(most))
+            PowerCut::InFlash(random.below(most))
         }
     }
 }

@@ -19,7 +19,7 @@ type Run = Vec<Vec<Point>>;
 
 /// How the board is stopped in the middle of a job.
 #[derive(Debug, Clone, Copy)]
-enum Cut {
+enum PowerCut {
     /// The power is cut at any time.
     Power,
     /// The power is cut while a page of the log is written.
@@ -86,7 +86,7 @@ fn wait_for(line: &mut Line<Pico>, stroke: u32) -> Result<bool, Box<dyn Error>> 
 
 /// Draws a job on the emulated board, which is stopped in each of these ways, and returns what the
 /// pins draw in each run.
-fn draw_with_cuts(lines: &[String], cuts: &[Cut]) -> Result<Vec<Run>, Box<dyn Error>> {
+fn draw_with_cuts(lines: &[String], cuts: &[PowerCut]) -> Result<Vec<Run>, Box<dyn Error>> {
     let mut random = Random::new(1801);
     let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     for text in lines {
@@ -98,22 +98,22 @@ fn draw_with_cuts(lines: &[String], cuts: &[Cut]) -> Result<Vec<Run>, Box<dyn Er
         let stroke = all * number / (cuts.len() as u32 + 1);
         assert!(!wait_for(&mut line, stroke)?, "the job is over before cut {number}");
         match cut {
-            Cut::Power => {
+            PowerCut::Power => {
                 line.emulator.cut_power_after(Duration::from_micros(random.below(300_000)))?;
             }
-            Cut::InFlash => line.emulator.cut_power_in_flash(1 + random.below(254))?,
-            Cut::Reset => line.emulator.pull_run_low()?,
-            Cut::Hang => line.emulator.hang()?,
+            PowerCut::InFlash => line.emulator.cut_power_in_flash(1 + random.below(254))?,
+            PowerCut::Reset => line.emulator.pull_run_low()?,
+            PowerCut::Hang => line.emulator.hang()?,
         }
         line.hear_greeting()?;
         let mut message = line.hear()?;
-        if matches!(cut, Cut::Hang) {
+        if matches!(cut, PowerCut::Hang) {
             assert!(message.contains("the program hung"), "{message}");
             message = line.hear()?;
         }
         let expected = "[MSG:a job stopped at stroke ";
         assert!(message.starts_with(expected), "after {cut:?}: {message}");
-        if matches!(cut, Cut::Hang) {
+        if matches!(cut, PowerCut::Hang) {
             while !line.hear()?.starts_with("ALARM:101") {}
             assert_eq!(ask(&mut line, "$resume")?, "error:9");
             while !line.unlock()? {}
@@ -137,7 +137,8 @@ fn draw_with_cuts(lines: &[String], cuts: &[Cut]) -> Result<Vec<Run>, Box<dyn Er
 fn a_job_goes_on_after_a_cut_a_reset_and_a_fault() -> TestResult {
     let lines = job("30");
     let whole = strokes_of(on_the_host(&lines));
-    let cuts = [Cut::Power, Cut::InFlash, Cut::Reset, Cut::Hang, Cut::Power];
+    let cuts =
+        [PowerCut::Power, PowerCut::InFlash, PowerCut::Reset, PowerCut::Hang, PowerCut::Power];
     let runs = draw_with_cuts(&lines, &cuts)?;
     let twice = assert_one_drawing(&whole, &runs);
     assert!(twice <= cuts.len());

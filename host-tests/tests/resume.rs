@@ -5,7 +5,7 @@
 use penup::boards::host::{CutFlash, LAYOUT};
 use penup::machine::Contacts;
 use penup::plotter::Board as _;
-use penup::storage::{NOTE_BYTES, Noted};
+use penup::storage::{LogProgress, NOTE_BYTES};
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on,
 };
@@ -285,7 +285,7 @@ fn another_version_of_the_firmware_does_not_go_on() {
     let (slot, sum) = LAYOUT.job.identify(&mut flash).expect("a job");
     let log = LAYOUT.logs[slot];
     let mut notes = [0; NOTE_BYTES];
-    let (length, Noted { parts: strokes, .. }) =
+    let (length, LogProgress { parts: strokes, .. }) =
         log.read(&mut flash, sum, &mut notes).expect("a log");
     notes[4] ^= 1;
     log.begin(&mut flash, sum, &notes[..length]).expect("it is taken");

@@ -3,8 +3,8 @@
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
 };
-use penup::boards::host::{Cut, CutFlash};
-use penup::storage::{Log, NOTE_BYTES, Noted, Slots, StorageError};
+use penup::boards::host::{CutFlash, PowerCut};
+use penup::storage::{Log, LogProgress, NOTE_BYTES, Slots, StorageError};
 use penup_host_tests::cut_jobs::{empty_flash, switch_on};
 
 /// The slots are not at the beginning of the flash, and each has more than one sector.
@@ -16,7 +16,7 @@ fn state(number: u8, length: usize) -> Vec<u8> {
     (0..length).map(|at| (at as u8).wrapping_mul(7) ^ number).collect()
 }
 
-fn save(flash: &mut CutFlash, state: &[u8]) -> Result<(), StorageError<Cut>> {
+fn save(flash: &mut CutFlash, state: &[u8]) -> Result<(), StorageError<PowerCut>> {
     let mut writer = SLOTS.write(flash)?;
     // In pieces that are no pages.
     for piece in state.chunks(100) {
@@ -91,7 +91,7 @@ const LOG: Log = Log { start: 5 * 4096, bytes: 2 * 4096 };
 /// Reads the notes and the bits of the log of the state with this checksum.
 fn log_of(flash: &mut CutFlash, of: u32) -> Option<(Vec<u8>, u32)> {
     let mut notes = [0; NOTE_BYTES];
-    let (length, Noted { parts, .. }) = LOG.read(flash, of, &mut notes)?;
+    let (length, LogProgress { parts, .. }) = LOG.read(flash, of, &mut notes)?;
     Some((notes[..length].to_vec(), parts))
 }
 
@@ -125,11 +125,11 @@ fn points_are_counted_beside_the_parts() {
     let read = |flash: &mut CutFlash| LOG.read(flash, 7, &mut [0; NOTE_BYTES]).expect("the log").1;
     let (most, limit) = (LOG.limit(), LOG.points_limit());
     assert_eq!(most + limit, (2 * 4096 - 256) * 8);
-    let mut noted = Noted::default();
+    let mut noted = LogProgress::default();
     for (parts, points) in [(0, 1), (5, 9), (5, 2048), (2050, 2049), (most, 3000), (most, limit)] {
         LOG.note(&mut flash, noted.parts, parts).expect("it is taken");
         LOG.note_points(&mut flash, noted.points, points).expect("it is taken");
-        noted = Noted { parts, points };
+        noted = LogProgress { parts, points };
         assert_eq!(read(&mut flash), noted);
     }
     LOG.note(&mut flash, most, most + 9).expect("what is beyond is left out");
@@ -189,7 +189,7 @@ fn a_flipped_bit_makes_a_state_invalid() {
 }
 
 /// A flash with a cell that can no longer be erased, and that verifies what it has written.
-struct Worn {
+struct VerifyError {
     bytes: Vec<u8>,
     /// The offset of the byte, and the bits that stay low.
     worn: (usize, u8),
@@ -204,11 +204,11 @@ impl NorFlashError for NotHeld {
     }
 }
 
-impl ErrorType for Worn {
+impl ErrorType for VerifyError {
     type Error = NotHeld;
 }
 
-impl ReadNorFlash for Worn {
+impl ReadNorFlash for VerifyError {
     const READ_SIZE: usize = 1;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), NotHeld> {
@@ -221,7 +221,7 @@ impl ReadNorFlash for Worn {
     }
 }
 
-impl NorFlash for Worn {
+impl NorFlash for VerifyError {
     const WRITE_SIZE: usize = 256;
     const ERASE_SIZE: usize = 4096;
 
@@ -244,7 +244,8 @@ impl NorFlash for Worn {
 /// does not count as saved, because an error was reported.
 #[test]
 fn a_state_that_is_said_not_to_be_kept_is_not() {
-    let mut flash = Worn { bytes: vec![0xFF; FLASH_BYTES], worn: (SLOTS.start as usize + 200, 1) };
+    let mut flash =
+        VerifyError { bytes: vec![0xFF; FLASH_BYTES], worn: (SLOTS.start as usize + 200, 1) };
     let mut writer = SLOTS.write(&mut flash).expect("it is erased");
     writer.write(b"lost").expect("the page of the payload is sound");
     assert_eq!(writer.finish(), Err(StorageError::Flash(NotHeld)));

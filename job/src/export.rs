@@ -7,10 +7,10 @@
 use crate::path::{PagePoint, Run};
 use std::fmt::Write as _;
 
-/// What is done with each line of a drawing.
+/// How often, and how, each line of a drawing is traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Retracing {
-    /// How often each line is drawn, 1 or more.
+    /// The number of times that each line is drawn, 1 or more.
     pub passes: u32,
     /// Whether closed lines begin at random points, so that the marks which a pen leaves there do
     /// not stand in a row.
@@ -39,7 +39,7 @@ pub struct Line {
 /// assert_eq!(lines(&[run], twice), [Line { pen: 1, points }]);
 /// ```
 pub fn lines(runs: &[Run], retracing: Retracing) -> Vec<Line> {
-    let mut dice = Dice(0x9E37_79B9_7F4A_7C15);
+    let mut dice = Random(0x9E37_79B9_7F4A_7C15);
     let drawn = runs.iter().filter(|run| run.pen_down && !run.points.is_empty());
     drawn
         .map(|run| {
@@ -57,7 +57,7 @@ fn is_closed(points: &[PagePoint]) -> bool {
 }
 
 /// Begins a closed line at another of its points.
-fn relooped(points: &mut Vec<PagePoint>, dice: &mut Dice) {
+fn relooped(points: &mut Vec<PagePoint>, dice: &mut Random) {
     if is_closed(points) {
         points.pop();
         let begin = dice.below(points.len());
@@ -80,9 +80,9 @@ fn retraced(points: Vec<PagePoint>, passes: u32) -> Vec<PagePoint> {
 }
 
 /// Random numbers that are the same in each run, so that a file can be made again (Marsaglia 2003).
-struct Dice(u64);
+struct Random(u64);
 
-impl Dice {
+impl Random {
     /// A number from 0 to `limit - 1`; 0 if the limit is 0.
     fn below(&mut self, limit: usize) -> usize {
         self.0 ^= self.0 << 13;

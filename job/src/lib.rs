@@ -33,6 +33,6 @@ pub mod strokes;
 pub mod twin;
 pub mod view;
 pub mod watch;
-pub mod wishes;
+pub mod user_choices;
 
 pub use job::{Job, Settings};

@@ -29,8 +29,7 @@ pub struct NoSuchMachine {
 impl AssignedSetting {
     /// Parses `NUMBER=VALUE`; a `$` before the number does no harm.
     ///
-    /// # Errors
-    /// The reason why it is none, for the user.
+    /// # Errors The reason why the text is no assignment, for the user.
     ///
     /// ```
     /// use penup_job::machine_settings::AssignedSetting;
@@ -86,8 +85,8 @@ pub fn simulated(assigned: &[AssignedSetting]) -> Result<Settings, NoSuchMachine
     Ok(settings)
 }
 
-/// Whether each motor moves one axis, both by the same way in a step, so that the pins tell where
-/// the pen is.
+/// Whether each motor moves one axis, and both make steps of the same length, so that the pins tell
+/// where the pen is.
 pub fn is_grid(settings: &Settings) -> bool {
     let [x, y] = settings.page_steps();
     settings.get(Setting::Kinematics) == 0 && x == y

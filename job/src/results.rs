@@ -141,7 +141,7 @@ impl JobReport {
         Some(Self { strokes, pen_down_mm, pen_up_mm, efficiency })
     }
 
-    /// The same drawing with other moves between its strokes, as `lengths` says.
+    /// Returns the same results with the lengths of other moves between the strokes.
     #[must_use]
     pub fn with_moves_of(self, lengths: Lengths) -> Self {
         let pen_up_mm = format!("{:.1}", lengths.pen_up_mm);

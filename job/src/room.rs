@@ -23,7 +23,8 @@ pub struct Room {
     /// The number of steps that wait. The machine is never faster than it could stop within 13/16
     /// of them.
     pub steps: u32,
-    /// Whether the pen begins while the order is computed. Where no board is named it does not.
+    /// Whether the pen begins to draw while the order is computed. Without a named board it does
+    /// not.
     #[serde(default)]
     pub early_ink: bool,
 }
@@ -79,7 +80,8 @@ impl Room {
         Self { vertices, corners, words: bytes / 8, blocks, steps: Self::STEPS, early_ink: false }
     }
 
-    /// The same with this many times the memory to work in, for numbers that are so much wider.
+    /// Returns the same capacities with this many times the working memory, for numbers that are
+    /// wider by this factor.
     #[must_use]
     pub fn with_words(self, times: usize) -> Self {
         Self { words: times * self.words, ..self }

@@ -110,7 +110,8 @@ impl SampledPath {
     }
 }
 
-/// The straight lines from a position that pass every later one within a step.
+/// The directions of the straight lines from a position that pass within a step of every later
+/// position.
 #[derive(Debug)]
 struct Course {
     from: (i32, i32),

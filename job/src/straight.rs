@@ -17,9 +17,9 @@ pub struct Straightener {
     tolerance: f64,
     /// The points that stay. The last one is where the line that is being looked for begins.
     kept: Vec<PagePoint>,
-    /// The points behind them.
+    /// The points after those that stay.
     ahead: Vec<PagePoint>,
-    /// How many of the points ahead were looked at.
+    /// The number of points ahead that were tested.
     seen: usize,
     reach: Reach,
 }
@@ -51,7 +51,7 @@ impl Straightener {
         self.kept
     }
 
-    /// Looks at the points that were not seen yet, and keeps those at which a line must end.
+    /// Tests the points ahead that were not tested yet, and keeps those at which a line must end.
     fn test_points(&mut self) {
         while let (Some(&point), Some(start)) = (self.ahead.get(self.seen), self.kept.last()) {
             let place = [point[0] - start[0], point[1] - start[1]];
@@ -97,7 +97,7 @@ struct Directions {
 
 impl Reach {
     /// Takes the point with this number, which lies at `place` as seen from the start of the line.
-    /// Returns whether the line may still go on behind it.
+    /// Returns whether the line may extend beyond it.
     fn goes_on(&mut self, place: [f64; 2], number: usize, tolerance: f64) -> bool {
         let square = dot(place, place);
         let is_near = square <= tolerance * tolerance;

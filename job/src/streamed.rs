@@ -19,7 +19,7 @@ use std::fmt::Write as _;
 /// fit in the receive window, so that one arrives while the other is carried out.
 const LINE_BYTES: usize = 92;
 
-/// How strokes are written.
+/// The format in which strokes are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Form {
     /// As lines of strokes.
@@ -31,18 +31,18 @@ pub enum Form {
 /// Why a drawing cannot be sent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StreamError {
-    /// The machine refuses it.
+    /// The machine refuses the drawing.
     Machine(MachineError),
     /// G-code has no dotted or dashed lines.
     LineType,
-    /// It has more targets than lines can be numbered.
+    /// The drawing has more targets than lines can be numbered.
     TooLong,
 }
 
 /// A drawing as lines, of which the first begins it.
 #[derive(Debug)]
 pub struct StreamedJob {
-    /// How the strokes are written.
+    /// The format in which the strokes are written.
     form: Form,
     /// All lines, one behind the other.
     text: String,
@@ -52,9 +52,10 @@ pub struct StreamedJob {
     pen_lines: Vec<usize>,
     /// These pens, counted from 1.
     pens: Vec<u8>,
-    /// What is known of the drawing before its strokes come.
+    /// The header that is sent before the strokes.
     header: StreamHeader,
-    /// The number of lines that are not sent, behind the first one, because the plotter has them.
+    /// The number of lines after the first one that are not sent, because the plotter already has
+    /// them.
     skipped: usize,
 }
 
@@ -173,7 +174,7 @@ impl StreamedJob {
         failure.map_or(Ok(()), Err)
     }
 
-    /// How the strokes are written.
+    /// The format in which the strokes are written.
     pub fn form(&self) -> Form {
         self.form
     }
@@ -217,7 +218,7 @@ impl StreamedJob {
         self.pens.get(..count).unwrap_or_default()
     }
 
-    /// How much of the drawing the first `lines` lines that are sent bring, as strokes of all.
+    /// Returns the share of the strokes that the first `lines` lines contain, 0 to 1.
     pub fn share(&self, lines: usize) -> f64 {
         let targets = self.begins.get(lines + self.skipped).map_or(self.targets(), |(_, n)| *n);
         f64::from(targets) / f64::from(self.targets().max(1))
@@ -255,7 +256,7 @@ impl Lines for StreamedJob {
     }
 }
 
-/// Measures a path that begins at the page's origin, and checks all of it.
+/// Measures a path that begins at the origin of the page, and checks all of its targets.
 fn measure(settings: &Settings, path: &mut dyn Path) -> Result<JobSize, MachineError> {
     let (pins, mut blocks) = (PulserState::new(), [Block::EMPTY; 4]);
     let mut machine = Machine::new(*settings, &mut blocks, &pins, u32::MAX);

@@ -30,9 +30,9 @@ pub const NAMED_VIEWS: [(&str, Viewpoint); 6] = [
 pub struct ViewOption {
     /// The name of the option, as in `--name`.
     pub name: &'static str,
-    /// What stands for the value in the help; empty if the option takes none.
+    /// The placeholder for the value in the help; empty if the option takes none.
     pub value: &'static str,
-    /// What the help says.
+    /// The text of the help.
     pub help: &'static str,
 }
 
@@ -101,8 +101,8 @@ impl Viewpoint {
         [cos_azimuth * cos_elevation, sin_azimuth * cos_elevation, sin_elevation]
     }
 
-    /// What is up in the picture where z is up: z, but seen from above or below what is behind or
-    /// in front.
+    /// Returns the upward direction of the picture for a model with z up. It is z, except if the
+    /// model is seen from above or below; then it is the direction to the back or to the front.
     pub fn up(self) -> Vector {
         let (sine, cosine) = sine_cosine(self.azimuth);
         match self.elevation {

@@ -8,10 +8,10 @@ use penup::protocol::Escape;
 use penup_job::Settings;
 use penup_job::export::Retracing;
 use penup_job::machine_settings::{AssignedSetting, is_grid, simulated};
+use penup_job::user_choices::{UserChoices, page_value};
 use penup_job::view::{
     AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
 };
-use penup_job::wishes::{Wishes, page_value};
 use penup_readers::PLAN_OPTIONS;
 use penup_readers::page::{A4, NAMED_PAGES, Page};
 use serde::Serialize;
@@ -255,7 +255,7 @@ impl NamedValues {
     }
 
     /// What the user wishes.
-    fn wishes(&self) -> Result<Wishes, String> {
+    fn wishes(&self) -> Result<UserChoices, String> {
         let flags = OPTIONS.iter().filter(|option| option.flag.get().is_some());
         let mut values: Vec<_> = flags
             .filter_map(|option| {
@@ -298,7 +298,7 @@ impl NamedValues {
             values.push(("up", "0,1,0".to_owned()));
         }
         let settings = Settings { page: A4, values };
-        Ok(Wishes { settings, viewpoint, has_margin: self.given("margin").is_some() })
+        Ok(UserChoices { settings, viewpoint, has_margin: self.given("margin").is_some() })
     }
 
     /// The page that the user has named; `None` if there is none.

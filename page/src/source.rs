@@ -3,7 +3,7 @@
 
 use crate::options::is_of_plans;
 use crate::words::for_page;
-use penup_job::wishes::FilePage;
+use penup_job::user_choices::FilePage;
 use penup_page_files::Reading;
 use penup_readers::SourceFile;
 use penup_readers::lines::Lines;

@@ -55,7 +55,7 @@ const UNITS: [(i64, f64); 11] = [
     (14, 100.0),
 ];
 
-/// What is drawn, and what is not.
+/// The strokes of a drawing, and what of it is not drawn.
 struct Drawing<'d, 'a> {
     document: &'d Document<'a>,
     /// The strokes with their entities' lines and kinds, and their layers.
@@ -70,20 +70,21 @@ struct Drawing<'d, 'a> {
     /// The number of texts, and of their letters that are not in the plotter's font.
     texts: usize,
     unknown_letters: usize,
-    /// What the blocks around the entity show of it.
+    /// The regions to which the blocks around the current entity limit it.
     within: Regions,
     /// The work that is left for clipping, see [`Regions::cut`].
     work: usize,
 }
 
-/// Where entities are drawn.
+/// The context in which entities are drawn.
 #[derive(Debug, Clone, Copy)]
 struct Placement<'a> {
     to_page: Affine,
-    /// What layer and line type those have that take them from the block in which they are.
+    /// The layer and the line type of entities that take these from the block that contains them.
     layer: &'a str,
+    /// The line type of such entities.
     line_type: &'a str,
-    /// The number of blocks around them.
+    /// The number of nested blocks that contain the entities.
     depth: usize,
 }
 
@@ -307,7 +308,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         Ok(())
     }
 
-    /// Draws a block where it is inserted, in rows and columns if it is.
+    /// Draws a block at the position where it is inserted, or several times in rows and columns.
     fn insert(
         &mut self,
         entity: &'d Entity<'a>,
@@ -373,7 +374,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
     }
 }
 
-/// The refusal of a file at the entity that makes it too large.
+/// Returns the error of a file that becomes too large at this entity.
 fn too_many(entity: &Entity<'_>) -> LineError {
     (entity.line, "the file has too many points to be drawn".to_owned())
 }
@@ -466,7 +467,8 @@ impl Format for Dxf {
         }
         let text = match std::str::from_utf8(&bytes) {
             Ok(text) => text.trim_start_matches('\u{FEFF}').to_owned(),
-            // Files of before 2007 are written in the letters of a country; only names have them.
+            // Files from before 2007 use the character set of a country. Only names contain letters
+            // that differ.
             Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
         };
         let in_line = |(number, reason): LineError| {

@@ -11,7 +11,7 @@ use std::fmt::Debug;
 /// days to send.
 pub const SIZE_LIMIT: u64 = 1 << 32;
 
-/// What is drawn.
+/// The drawing in a file.
 #[derive(Debug)]
 pub(super) enum Body {
     /// The lines that are sent.
@@ -20,14 +20,15 @@ pub(super) enum Body {
     Plan(Plan),
 }
 
-/// What a file holds.
+/// The contents of a file.
 #[derive(Debug)]
 pub(super) struct Contents {
     /// What is drawn.
     pub(super) body: Body,
     /// The page on which the file lays its plan; `None` if the file has no page.
     pub(super) page: Option<Page>,
-    /// The least and the greatest x and y of lines that are a plan, in mm; `None` if they are none.
+    /// The least and the greatest x and y, in mm, of lines that form a plan; `None` if they form
+    /// none.
     pub(super) bounds: Option<[[f64; 2]; 2]>,
     /// Sentences for the user about what is not drawn as the file says, without a full stop.
     pub(super) notes: Vec<String>,

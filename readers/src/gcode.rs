@@ -26,7 +26,7 @@ const CHORD_ERROR: f64 = 0.005;
 /// The most points of a program. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
 
-/// The signals that may lift the pen, as they are during a move.
+/// The values of the signals that may lift the pen during a move.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Signals {
     servo: Option<f64>,
@@ -57,7 +57,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// The modes of a program, and its moves so far.
+/// The modes of a program, and the moves that it has made so far.
 #[derive(Debug)]
 struct Interpreter {
     /// The number of the mode G0 to G3.
@@ -68,7 +68,7 @@ struct Interpreter {
     /// The length of the unit in mm.
     unit: f64,
     at: [f64; 2],
-    /// What is added to coordinates: the origin that G92 has set.
+    /// The origin that G92 has set, which is added to coordinates.
     origin: [f64; 3],
     height: f64,
     signals: Signals,
@@ -80,7 +80,7 @@ struct Interpreter {
     unknown: BTreeMap<String, (usize, usize)>,
 }
 
-/// The reason why a line is refused.
+/// The reason why a line is refused, as text.
 type RefusalText = String;
 
 impl Interpreter {
@@ -105,7 +105,7 @@ impl Interpreter {
         self.unknown.entry(word).or_insert((0, line)).0 += 1;
     }
 
-    /// Carries out a line. Returns whether the program goes on after it.
+    /// Carries out a line. Returns whether the program continues after it.
     fn line(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
         let text = without_comments(text);
         let text = text.trim();
@@ -306,7 +306,7 @@ impl Format for GCode {
         &["gcode", "nc", "ngc", "gc"]
     }
 
-    /// The first lines are G-code, and one of them moves.
+    /// Whether the first lines are G-code and at least one of them moves.
     fn recognises(&self, beginning: &[u8]) -> bool {
         let Ok(text) = std::str::from_utf8(&beginning[..beginning.len().min(4096)]) else {
             return false;

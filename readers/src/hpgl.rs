@@ -31,7 +31,7 @@ const LIMITS: Rectangle = Rectangle {
 /// The most points of a file. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
 
-/// The byte that stands for lost ones at a plotter's port.
+/// The byte that stands for lost bytes at the port of a plotter.
 const DAMAGED: u8 = 0xFF;
 
 /// Instructions that choose the pen, the speed, and how lines, letters and fills look. If their
@@ -41,7 +41,7 @@ const STYLES: [&str; 22] = [
     "SR", "SS", "TL", "VS", "WU", "AS",
 ];
 
-/// What a file has drawn so far.
+/// The state of reading a file: the interpreter, and the strokes drawn so far.
 #[derive(Debug)]
 struct Reader {
     interpreter: Box<Interpreter<Vertices>>,
@@ -97,8 +97,8 @@ impl Reader {
         self.at = at;
     }
 
-    /// Takes a byte of the instruction that begins at the byte `begin` of the file, with all that
-    /// comes of it.
+    /// Takes a byte of the instruction that begins at the byte `begin` of the file, and draws what
+    /// results from it.
     fn push(&mut self, byte: u8, begin: usize) -> Result<(), String> {
         self.interpreter.push(byte);
         while let Some(order) = self.interpreter.next_order() {
@@ -133,7 +133,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Refuses what went wrong with the instruction, or counts it.
+    /// Refuses the file because of an error in the instruction, or counts the error.
     fn judge(&mut self, error: ErrorNumber, name: &str) -> Result<(), String> {
         let name = if name.is_empty() { "without a name" } else { name };
         match error {
@@ -159,7 +159,7 @@ impl Reader {
     }
 }
 
-/// The instruction that the present byte belongs to.
+/// The instruction to which the current byte belongs.
 #[derive(Debug, Default)]
 struct Instruction {
     /// The first letter of the next instruction, and its byte of the file, if the second letter has
@@ -196,7 +196,7 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
     }
     let mut instruction = Instruction::default();
     for (at, &byte) in bytes.iter().chain(b";").enumerate() {
-        // What ends the file ends its last instruction, but is no letter of a label.
+        // The end of the file ends its last instruction, but is not a letter of a label.
         if at == bytes.len() && dialect.is_in_text() && !dialect.is_in_data() {
             reader.endless = Some(instruction.begin);
             break;

@@ -41,7 +41,7 @@ impl Format for Obj {
         &["obj"]
     }
 
-    /// The file begins with lines of OBJ, at least one of which is a vertex.
+    /// Whether the file begins with lines of OBJ, at least one of which is a vertex.
     fn recognises(&self, beginning: &[u8]) -> bool {
         // The last line may be cut.
         let last_end = beginning.iter().rposition(|byte| is_line_end(*byte)).unwrap_or(0);
@@ -93,7 +93,7 @@ pub(super) struct ObjLines {
     /// The position of every line whose number is a multiple of [`CURSOR_EVERY`].
     cursors: Vec<Cursor>,
     count: usize,
-    /// Where the plan lies, if the file is one.
+    /// The bounds of the plan, if the file is a plan.
     flat: Flat,
 }
 
@@ -102,7 +102,7 @@ pub(super) struct ObjLines {
 struct Flat {
     /// The least and the greatest x, y and z; `None` before the first vertex.
     bounds: Option<[[f64; 3]; 2]>,
-    /// Whether there is a face, or a curve, whose control points are no bounds.
+    /// Whether there is a face, or a curve, whose control points do not bound it.
     has_others: bool,
     has_lines: bool,
 }
@@ -139,9 +139,9 @@ impl Flat {
 /// A position of the reader in the bytes of a file.
 #[derive(Debug, Clone, Copy, Default)]
 struct Cursor {
-    /// The number of bytes before it, less than 2^32.
+    /// The number of bytes before the position, less than 2^32.
     at: u32,
-    /// The number of line ends before it.
+    /// The number of line ends before the position.
     line: u32,
     /// Whether it is inside a polyline of which an earlier part was already generated. The position
     /// is then before the vertex that both parts share.
@@ -171,8 +171,8 @@ impl ObjLines {
         }
     }
 
-    /// Checks the lines of `bytes`, up to the first that [`irregular`] must read, if that
-    /// `reads_irregular` ones.
+    /// Checks the lines of `bytes`. If `reads_irregular`, the check ends at the first line that
+    /// [`irregular`] must read.
     fn checked(name: String, bytes: Vec<u8>, reads_irregular: bool) -> Result<Checked, ReadError> {
         if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
             return Err(ReadError::Utf16 { file: name });

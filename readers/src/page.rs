@@ -9,7 +9,7 @@ pub struct Page {
     pub height: f64,
 }
 
-/// The page that is taken where nobody names one.
+/// The page that is used if none is named.
 pub const A4: Page = Page { width: 210.0, height: 297.0 };
 
 /// The pages that have names, in lower case.

@@ -11,7 +11,8 @@ use std::fmt::Write as _;
 /// A point of a plan in mm: x to the right, y upward.
 pub(crate) type Point = [f64; 2];
 
-/// The number of thousandths of a millimetre in one, in which coordinates are written.
+/// The number of thousandths of a millimetre in a millimetre. Coordinates are written with this
+/// resolution.
 const PER_MM: f64 = 1000.0;
 
 /// The length in mm of the line that is drawn for a dot: more than a motor step.
@@ -21,7 +22,7 @@ const DOT: f64 = 0.02;
 /// A polyline that the pen draws.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Stroke {
-    /// Its points, two or more. The last is the first if it is closed.
+    /// The points of the polyline, two or more. If it is closed, the last point equals the first.
     pub(crate) points: Vec<Point>,
     /// The pen that draws it, counted from 1.
     pub(crate) pen: u32,
@@ -32,7 +33,7 @@ pub(crate) struct Stroke {
 }
 
 impl Stroke {
-    /// Whether it ends where it begins.
+    /// Whether the polyline ends where it begins.
     pub(crate) fn is_closed(&self) -> bool {
         self.points.len() > 2 && self.points.first() == self.points.last()
     }
@@ -43,7 +44,7 @@ impl Stroke {
 pub(crate) struct Area {
     /// The outlines. The side from the last point to the first belongs to each.
     pub(crate) outlines: Vec<Vec<Point>>,
-    /// What cuts its lines off.
+    /// The regions to which the hatching is limited.
     pub(crate) within: Regions,
     /// The pen that hatches it, counted from 1.
     pub(crate) pen: u32,
@@ -53,7 +54,7 @@ pub(crate) struct Area {
     pub(crate) element: u32,
 }
 
-/// What a file draws at one height.
+/// A drawing at one height.
 #[derive(Debug, Default)]
 pub(crate) struct Plan {
     pub(crate) file: String,
@@ -201,7 +202,7 @@ pub(crate) fn number_in(name: &str) -> Option<u32> {
 /// Reads the lines of OBJ as a plan.
 ///
 /// # Errors
-/// The reason why they are none, as the end of a sentence about the file.
+/// The reason why they are not a plan, as the end of a sentence about the file.
 pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
     let mut plan = Plan::new(file.to_owned());
     let mut vertices: Vec<[f64; 3]> = Vec::new();

@@ -22,7 +22,7 @@ const SHORTEST: f64 = 0.002;
 /// The most rows in which the sides of a part are found.
 const MOST_ROWS: usize = 4096;
 
-/// How many tests of a side take as long as a point of a curve.
+/// The number of tests of a side that take as long as a point of a curve.
 const TESTS: usize = 64;
 
 /// The least part of the light that comes through a mask where it hides nothing: a half, less what
@@ -36,26 +36,26 @@ pub(crate) struct TooMuch;
 /// What a part of a mask adds to those below it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Shade {
-    /// How much light comes through where it is opaque, 0 to 1.
+    /// The light that comes through where the part is opaque, 0 to 1.
     pub(crate) light: f64,
-    /// How much of what lies below it covers, 0 to 1.
+    /// How much of the parts below it the part covers, 0 to 1.
     pub(crate) alpha: f64,
 }
 
 impl Shade {
-    /// It lets all light through, whatever lies below.
+    /// A part that lets all light through, whatever lies below.
     pub(crate) const CLEAR: Self = Self { light: 1.0, alpha: 1.0 };
 }
 
 /// The union of some parts, or what some parts of a mask let through.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Region {
-    parts: Vec<Part>,
+    parts: Vec<ShadedArea>,
 }
 
-/// What some outlines surround within other regions.
+/// The area that some outlines surround within other regions, and its shade in a mask.
 #[derive(Debug, Clone, PartialEq)]
-struct Part {
+struct ShadedArea {
     outlines: Vec<Vec<Point>>,
     is_even_odd: bool,
     within: Vec<Arc<Region>>,
@@ -89,10 +89,10 @@ impl Region {
         within: Vec<Arc<Region>>,
         shade: Shade,
     ) {
-        self.parts.push(Part { shade, ..Part::new(outlines, is_even_odd, within) });
+        self.parts.push(ShadedArea { shade, ..ShadedArea::new(outlines, is_even_odd, within) });
     }
 
-    /// Whether a point is inside; one on the border may be or not.
+    /// Whether a point is inside. On the border the result may be either.
     pub(crate) fn contains(&self, point: Point) -> bool {
         let (mut light, mut uncovered) = (0.0, 1.0);
         for part in self.parts.iter().rev().filter(|part| part.contains(point)) {
@@ -129,7 +129,7 @@ impl Region {
     }
 }
 
-impl Part {
+impl ShadedArea {
     fn new(mut outlines: Vec<Vec<Point>>, is_even_odd: bool, within: Vec<Arc<Region>>) -> Self {
         for outline in &mut outlines {
             if outline.first() != outline.last() {
@@ -204,23 +204,23 @@ impl Part {
         if from[0].max(to[0]) < self.width[0] || from[0].min(to[0]) > self.width[1] {
             return Some(());
         }
-        let way = minus(to, from);
-        let square = dot(way, way);
+        let direction = minus(to, from);
+        let square = dot(direction, direction);
         let (low, high) = (from[1].min(to[1]) - TOLERANCE, from[1].max(to[1]) + TOLERANCE);
         for row in self.rows.get(self.rows_between(low, high, self.rows.len()))? {
             *budget = budget.checked_sub(1 + row.len() / TESTS)?;
             for &[begin, end] in row.iter().filter_map(|number| self.sides.get(*number as usize)) {
                 let side = minus(end, begin);
                 let to_begin = minus(begin, from);
-                let across = cross(way, side);
+                let across = cross(direction, side);
                 // Where they lie in one line, the ends of the side divide it.
                 for corner in [begin, end] {
                     let to_corner = minus(corner, from);
-                    if cross(way, to_corner).abs() <= TOLERANCE * square.sqrt() {
-                        at.push(dot(to_corner, way) / square);
+                    if cross(direction, to_corner).abs() <= TOLERANCE * square.sqrt() {
+                        at.push(dot(to_corner, direction) / square);
                     }
                 }
-                let along_side = cross(to_begin, way) / across;
+                let along_side = cross(to_begin, direction) / across;
                 if across != 0.0 && (0.0..=1.0).contains(&along_side) {
                     at.push(cross(to_begin, side) / across);
                 }
@@ -235,7 +235,7 @@ impl Part {
 pub(crate) struct Regions(pub(crate) Vec<Arc<Region>>);
 
 impl Regions {
-    /// Whether a point is inside; one on the border may be or not.
+    /// Whether a point is inside. On the border the result may be either.
     pub(crate) fn contain(&self, point: Point) -> bool {
         self.0.iter().all(|region| region.contains(point))
     }
@@ -308,12 +308,12 @@ fn pieces(
     let mut is_going_on = false;
     let mut at = Vec::new();
     for [from, to] in pairs(points) {
-        let way = minus(to, from);
-        let length = way[0].hypot(way[1]);
+        let direction = minus(to, from);
+        let length = direction[0].hypot(direction[1]);
         if length == 0.0 {
             continue;
         }
-        let left = [-way[1] / length * TOLERANCE, way[0] / length * TOLERANCE];
+        let left = [-direction[1] / length * TOLERANCE, direction[0] / length * TOLERANCE];
         at.clear();
         for region in regions {
             region.crossings([from, to], &mut at, budget).ok_or(TooMuch)?;
@@ -325,7 +325,7 @@ fn pieces(
         let point = |part: f64| match part {
             0.0 => from,
             1.0 => to,
-            _ => [from[0] + part * way[0], from[1] + part * way[1]],
+            _ => [from[0] + part * direction[0], from[1] + part * direction[1]],
         };
         for part in at.windows(2) {
             let &[begin, end] = part else { continue };
@@ -375,7 +375,8 @@ fn beside(point: Point, left: Point) -> [Point; 2] {
     [[point[0] + left[0], point[1] + left[1]], minus(point, left)]
 }
 
-/// What is the same for two lines through a point in the same direction or its opposite.
+/// Returns a key that is the same for two lines through a point in the same direction or its
+/// opposite.
 fn cell(point: Point, left: Point) -> [i64; 4] {
     let sign = if (left[0], left[1]) < (0.0, 0.0) { -1.0 } else { 1.0 };
     let direction = left.map(|part| (sign * part / TOLERANCE * 1e3).round() as i64);
@@ -455,7 +456,8 @@ mod tests {
             for number in 0..50 {
                 let (sine, cosine) = (f64::from(number) * 0.7).sin_cos();
                 let middle = [f64::from(number % 7) - 3.0, f64::from(number % 5) - 2.0];
-                let end = |way: f64| [middle[0] + way * cosine, middle[1] + way * sine];
+                let end =
+                    |direction: f64| [middle[0] + direction * cosine, middle[1] + direction * sine];
                 let ink: f64 =
                     cut(&[end(-20.0), end(20.0)], &[&star]).iter().map(|it| length(it)).sum();
                 let inside =

@@ -10,7 +10,7 @@ mod flash;
 
 #[cfg(feature = "tiles")]
 pub use area::CutArea;
-pub use flash::{Cut, CutFlash};
+pub use flash::{CutFlash, PowerCut};
 
 use crate::index::Index;
 use crate::machine::{Contacts, EventRing, Pen, Pins, Pulser, PulserState, StepQueue, Tick};
@@ -21,7 +21,7 @@ use crate::plotter::{
     Replies, Stored,
 };
 use crate::protocol::{LineReader, RealTime, Sorter};
-use crate::storage::Noted;
+use crate::storage::LogProgress;
 #[cfg(feature = "tiles")]
 use crate::storage::area::{Area, AreaFlash};
 use core::convert::Infallible;
@@ -605,8 +605,7 @@ impl Board for HostBoard<'_> {
         self.kept.as_mut().ok_or(NotStored)?.note_progress(strokes)
     }
 
-    /// # Panics
-    /// When a step is due meanwhile, as above.
+    /// # Panics When a step is due meanwhile, because a board that writes to its flash delays it.
     fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
         let before = self.state.steps();
         self.pass(self.write_ticks);
@@ -614,7 +613,7 @@ impl Board for HostBoard<'_> {
         self.kept.as_mut().ok_or(NotStored)?.note_point(points)
     }
 
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, LogProgress)> {
         self.kept.as_mut()?.progress(notes)
     }
 

@@ -33,8 +33,8 @@ pub struct Shared {
     count_at_abort: AtomicU32,
 }
 
-/// The main loop's side of one serial port, from which it reads bytes.
-pub struct Line {
+/// The main loop's end of one serial port, from which it reads bytes.
+pub struct SerialInput {
     /// Where the received bytes wait.
     bytes: Consumer<'static>,
     /// The number of bytes that had been queued when the last abort came.
@@ -60,12 +60,12 @@ impl Shared {
     /// Creates both ends of the port.
     ///
     /// A second call is a fault: see [`once`].
-    pub fn ends(&'static self) -> (ReceiveMerge, Line) {
+    pub fn ends(&'static self) -> (ReceiveMerge, SerialInput) {
         let (producer, consumer) = once(self.queue.try_init(ByteQueue::new())).split();
         let count_at_abort = &self.count_at_abort;
         (
             ReceiveMerge { receiver: Receiver::new(producer), count_at_abort },
-            Line { bytes: consumer, count_at_abort, count: 0 },
+            SerialInput { bytes: consumer, count_at_abort, count: 0 },
         )
     }
 }
@@ -84,7 +84,7 @@ pub fn ask(requests: RealTime, merges: &mut [ReceiveMerge]) {
 
 /// Takes the real-time requests that came since the last call. An abort discards the bytes that the
 /// `lines` received before it; `lines` must be those of all ports.
-pub fn take_real_time(lines: &mut [Line]) -> RealTime {
+pub fn take_real_time(lines: &mut [SerialInput]) -> RealTime {
     if REQUESTED.load(Ordering::Acquire) == 0 {
         return RealTime::default();
     }
@@ -94,12 +94,12 @@ pub fn take_real_time(lines: &mut [Line]) -> RealTime {
         RealTime::from_bits(bits)
     });
     if requests.has(RealTime::ABORT) {
-        lines.iter_mut().for_each(Line::drop_void);
+        lines.iter_mut().for_each(SerialInput::drop_void);
     }
     requests
 }
 
-impl Line {
+impl SerialInput {
     /// Returns the next ordinary byte. While an abort waits to be taken, it returns none, because
     /// the bytes before the abort are void.
     pub fn read_byte(&mut self) -> Option<u8> {

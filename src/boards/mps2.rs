@@ -32,7 +32,7 @@ impl Counter {
 
     /// Returns the number of instructions so far. Call it at least once in 171 s of the timer.
     pub fn read(&mut self) -> u64 {
-        // SAFETY: as above; VALUE may be read at any time.
+        // SAFETY: the timer exists on this machine, and VALUE may be read at any time.
         let value = unsafe { TIMER.add(1).read_volatile() };
         self.ticks += u64::from(self.last.wrapping_sub(value));
         self.last = value;

@@ -32,7 +32,7 @@ impl Point {
     /// The origin.
     pub(super) const ZERO: Self = Self { x: 0, y: 0 };
 
-    /// The sum, if it is within the range of coordinates.
+    /// The sum of both, or `None` beyond the range of coordinates.
     pub(super) fn plus(self, other: Self) -> Option<Self> {
         let Self { x, y } = Self { x: self.x + other.x, y: self.y + other.y };
         (x.abs().max(y.abs()) <= FARTHEST).then_some(Self { x, y })
@@ -43,14 +43,14 @@ impl Point {
         Self { x: self.x - other.x, y: self.y - other.y }
     }
 
-    /// The length of the way to it.
+    /// The distance of this point from the origin.
     pub(super) fn length(self) -> i64 {
         let square = |length: i64| u128::from(length.unsigned_abs()).pow(2);
         // Each square is below 2^82, so the root fits.
         (square(self.x) + square(self.y)).isqrt() as i64
     }
 
-    /// Turned by this many quarters, counterclockwise.
+    /// The point turned counterclockwise by this many quarter turns.
     pub(super) fn turned(self, quarters: u8) -> Self {
         match quarters & 3 {
             0 => self,
@@ -88,18 +88,18 @@ impl Rectangle {
         }
     }
 
-    /// Whether the point lies within it.
+    /// Whether the point lies within the rectangle.
     pub(super) fn contains(&self, Point { x, y }: Point) -> bool {
         (self.least.x..=self.most.x).contains(&x) && (self.least.y..=self.most.y).contains(&y)
     }
 
-    /// The nearest point within it.
+    /// Returns the point of the rectangle that is nearest to this one.
     pub(super) fn nearest(&self, Point { x, y }: Point) -> Point {
         let Self { least, most } = *self;
         Point { x: x.min(most.x).max(least.x), y: y.min(most.y).max(least.y) }
     }
 
-    /// The part of the line that lies within it.
+    /// Returns the part of the line within the rectangle; `None` if there is none.
     fn clip(&self, mut line: [Point; 2]) -> Option<[Point; 2]> {
         for side in 0..4 {
             let inside = |point: Point| match side {
@@ -132,7 +132,8 @@ impl Rectangle {
     }
 }
 
-/// How coordinates become positions on the page, and what of the page is drawn on.
+/// The map from coordinates to positions on the page, and the area of the page on which the pen
+/// draws.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Frame {
     /// P1 and P2, in plotter units before the rotation.
@@ -148,7 +149,7 @@ pub(super) struct Frame {
 }
 
 impl Frame {
-    /// Of zero bits only, before there is a state.
+    /// A value that consists of zero bits. It is not valid before initialization.
     pub(super) const ZERO: Self = Self {
         corners: [Point::ZERO; 2],
         scale: None,
@@ -172,7 +173,7 @@ impl Frame {
         self.in_plotter_units(point).map(|point| self.on_page(point))
     }
 
-    /// A distance in the current units as one on the page. `None` beyond the range.
+    /// Converts a distance from the current units to the page. `None` beyond the range.
     pub(super) fn distance(&self, distance: Point) -> Option<Point> {
         self.length(distance).map(|distance| distance.turned(self.quarters))
     }
@@ -186,7 +187,7 @@ impl Frame {
         Some(Point { x, y })
     }
 
-    /// A distance in plotter units as one on the page.
+    /// Converts a distance from plotter units to the page.
     pub(super) fn turned(&self, distance: Point) -> Point {
         distance.turned(self.quarters)
     }
@@ -250,7 +251,7 @@ impl Frame {
         Rectangle::between(a, b)
     }
 
-    /// What can be drawn on.
+    /// The area on which the pen draws.
     pub(super) fn visible(&self) -> Rectangle {
         let Some(Rectangle { least, most }) = self.window else { return self.limits };
         Rectangle { least: self.limits.nearest(least), most: self.limits.nearest(most) }
@@ -305,7 +306,7 @@ impl Frame {
         self.scale.is_some() || numbers.is_empty()
     }
 
-    /// `IW`: sets the window, or none.
+    /// `IW`: sets the window; `None` removes it.
     pub(super) fn set_window(&mut self, corners: Option<[Point; 2]>) -> Option<()> {
         self.window = match corners {
             None => None,

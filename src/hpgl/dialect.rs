@@ -8,12 +8,12 @@ use super::{DAMAGED, ESCAPE, LABEL_END};
 /// The line that begins HP-GL by command.
 const COMMAND: &[u8] = b"$hpgl";
 
-/// What a byte belongs to.
+/// The language or the instruction that a byte belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Token {
     /// A line that is not HP-GL.
     Line,
-    /// HP-GL begins with this byte. What came of the line before belongs to it.
+    /// HP-GL begins with this byte. The bytes of the line before it belong to HP-GL, too.
     Begins(Beginning),
     /// An instruction of HP-GL, and not a text.
     Code,
@@ -25,7 +25,7 @@ pub enum Token {
     Leaves,
 }
 
-/// How HP-GL begins.
+/// The ways in which HP-GL can begin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Beginning {
     /// By the instruction `IN`; the byte is the one after it.
@@ -51,9 +51,9 @@ pub enum Beginning {
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Dialect {
-    /// What the next byte belongs to.
+    /// The state of the recognizer, without instructions to the interface.
     state: State,
-    /// How far an instruction to the interface has come.
+    /// The progress of an instruction to the interface.
     control: Control,
     /// The byte that ends a label.
     terminator: u8,
@@ -63,10 +63,11 @@ pub struct Dialect {
     begins_line: bool,
 }
 
-/// What the next byte belongs to, without the instructions to the interface.
+/// The states of the recognizer: what the next byte belongs to, apart from instructions to the
+/// interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum State {
-    /// A line of another language that is empty so far.
+    /// At the beginning of a line of another language.
     LineBegin,
     /// So many bytes of `IN` have come of a line.
     In(u8),
@@ -88,18 +89,18 @@ enum State {
     Data,
 }
 
-/// How far an instruction to the interface has come.
+/// The progress of an instruction to the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Control {
-    /// There is none.
+    /// No such instruction is in progress.
     None,
     /// ESC has come.
     Escape,
     /// ESC and a dot have come.
     Dot,
-    /// Its parameters are coming, up to a colon.
+    /// The parameters of the instruction are coming, up to a colon.
     Parameters,
-    /// It is one of another language, up to a capital letter.
+    /// An escape sequence of another language is coming, up to a capital letter.
     Other,
 }
 
@@ -163,7 +164,7 @@ impl Dialect {
         }
     }
 
-    /// Takes a byte of an instruction to the interface. `None` if it is none.
+    /// Takes a byte of an instruction to the interface. `None` if the byte does not belong to one.
     fn take_control(&mut self, byte: u8) -> Option<Token> {
         self.control = match self.control {
             Control::None if byte == ESCAPE && self.is_in_force() => Control::Escape,
@@ -181,7 +182,7 @@ impl Dialect {
             Control::Parameters if byte.is_ascii_digit() || byte == b';' => Control::Parameters,
             Control::Parameters if byte == b':' => Control::None,
             Control::Parameters => {
-                // It ends without its colon, and the byte belongs to what follows.
+                // The instruction ends without its colon, and the byte belongs to what follows.
                 self.control = Control::None;
                 return (byte == ESCAPE).then(|| {
                     self.control = Control::Escape;
@@ -192,7 +193,7 @@ impl Dialect {
         Some(Token::Control)
     }
 
-    /// Takes a byte of a line that is not HP-GL so far.
+    /// Takes a byte of a line that may still turn out to be HP-GL.
     fn take_line(&mut self, byte: u8) -> Token {
         let ends_line = byte == b'\n' || byte == b'\r';
         self.state = match (self.state, byte) {

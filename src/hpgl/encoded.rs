@@ -5,7 +5,7 @@ use super::coordinates::Point;
 use super::interpreter::{ErrorNumber, Interpreter, Step};
 use super::polygon::PolygonBuffer;
 
-/// How far an encoded polyline has come.
+/// The progress of an encoded polyline.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Polyline {
     /// Whether the next move is made with the pen up.
@@ -18,14 +18,14 @@ pub(super) struct Polyline {
     fraction: u32,
     /// The x that waits for its y.
     x: Option<i64>,
-    /// What the number that is being read means.
+    /// The meaning of the number that is being read.
     meaning: Meaning,
     /// The number so far, and how many bits of it there are.
     value: i64,
     bits: u32,
 }
 
-/// What a number means.
+/// The meaning of a number of an encoded polyline.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Meaning {
     #[default]

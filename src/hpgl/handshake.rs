@@ -15,7 +15,7 @@ const PARAMETERS: usize = 12;
 /// The most bytes of a string that a sender chooses.
 const STRING: usize = 10;
 
-/// What an instruction to the interface asks of the rest.
+/// What an instruction to the interface asks the plotter to do.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Request {
     /// Nothing more.
@@ -29,7 +29,7 @@ pub(super) enum Request {
 pub(super) enum InterfaceError {
     /// The instruction is not known.
     Unknown = 11,
-    /// A byte stands where none such may.
+    /// A byte came at a place where it is not allowed.
     BadByte = 12,
     /// A parameter is out of its range.
     BadParameter = 13,
@@ -42,14 +42,14 @@ pub(super) enum InterfaceError {
 /// The state of the interface. All its bits may be zero before [`Handshake::reset`].
 #[derive(Debug)]
 pub(super) struct Handshake {
-    /// How far an instruction has come.
+    /// The progress of an instruction to the interface.
     progress: Progress,
     /// The letter of the instruction.
     letter: u8,
     parameters: [u16; PARAMETERS],
     /// The index of the parameter that is being read.
     index: usize,
-    /// What waits to be sent.
+    /// The bytes that wait to be sent.
     pub(super) output: Vec<u8, OUTPUT, u8>,
     /// The bytes that end an answer, and the one that begins it; 0 for none.
     terminators: [u8; 2],
@@ -58,7 +58,7 @@ pub(super) struct Handshake {
     limit: u16,
     /// The byte by which the sender asks for room, 0 for none.
     enquiry: u8,
-    /// Whether it is answered at once, too.
+    /// Whether an enquiry is also answered immediately.
     responds: bool,
     /// What the sender is told when there is room, and when it is to wait.
     go_on: [u8; STRING],
@@ -73,14 +73,14 @@ pub(super) struct Handshake {
     error: u8,
 }
 
-/// How far an instruction has come.
+/// The progress of an instruction to the interface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Progress {
     None,
     Escape,
     Dot,
     Parameters,
-    /// It is one of another language, up to a capital letter.
+    /// An escape sequence of another language is coming, up to a capital letter.
     Other,
 }
 
@@ -114,7 +114,7 @@ impl Handshake {
         *self = Self { error: self.error, output, terminators: [b'\r', 0], ..Self::new() };
     }
 
-    /// Tells the sender to go on if it was asked to wait. Returns what waits to be sent.
+    /// Tells the sender to go on if it was asked to wait. Returns the bytes that wait to be sent.
     pub(super) fn release(&mut self) -> Vec<u8, OUTPUT, u8> {
         if core::mem::take(&mut self.has_stopped) || core::mem::take(&mut self.is_asked) {
             self.send(self.go_on);
@@ -186,7 +186,7 @@ impl Handshake {
     /// Carries out an instruction without parameters.
     fn carry_out(&mut self, letter: u8, room: u16, is_idle: bool) -> Request {
         match letter {
-            // The plotter is always switched on.
+            // These switch the plotter on and off, which has no effect: it is always on.
             b'(' | b')' | b'Y' | b'Z' => {}
             b'B' => self.answer(format_args!("{room}")),
             b'E' => {
@@ -248,15 +248,15 @@ impl Handshake {
         self.send(self.terminators);
     }
 
-    /// Sends bytes up to the first 0. What finds no room is lost: a sender that asks without
-    /// reading the answers has no use for them.
+    /// Sends bytes up to the first 0. Bytes for which there is no room are lost: a sender that asks
+    /// without reading the answers does not need them.
     fn send<const LENGTH: usize>(&mut self, bytes: [u8; LENGTH]) {
         for byte in bytes.into_iter().take_while(|byte| *byte != 0) {
             let _ = self.output.push(byte);
         }
     }
 
-    /// Whether the byte is that by which the sender asks for room. It is then noted.
+    /// Whether the byte is the one by which the sender asks for room. If so, the enquiry is noted.
     pub(super) fn takes_enquiry(&mut self, byte: u8) -> bool {
         let is_enquiry = self.enquiry != 0 && byte == self.enquiry;
         if is_enquiry {
@@ -268,7 +268,7 @@ impl Handshake {
         is_enquiry
     }
 
-    /// Tells the sender to wait or to go on, where it is time to.
+    /// Tells the sender to wait or to go on, depending on the room that is left.
     pub(super) fn regulate(&mut self, room: u16, is_idle: bool) {
         if self.is_asked && room >= self.limit {
             self.is_asked = false;

@@ -3,7 +3,7 @@
 use super::coordinates::{Frame, Point, Rectangle, UNIT};
 use super::encoded::Polyline;
 use super::label::TextStyle;
-use super::line_type::{LineStyle, Part, Stroke};
+use super::line_type::{DashPart, LineStyle, Stroke};
 use super::number::Number;
 use super::outline::ArcStep;
 use super::parser::Mode;
@@ -14,13 +14,13 @@ use heapless::Deque;
 /// The longest answer, in bytes.
 pub const ANSWER_BYTES: usize = 64;
 
-/// An answer, without what ends it.
+/// An answer, without its terminator.
 pub type Answer = heapless::String<ANSWER_BYTES, u8>;
 
-/// The most steps of one byte.
+/// The most steps that one byte can cause.
 const STEPS: usize = 8;
 
-/// What is to be done next.
+/// The actions that the interpreter asks of its owner.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Order {
     /// There is nothing to do.
@@ -33,7 +33,7 @@ pub enum Order {
     Dot(Point),
     /// The pen goes there without drawing.
     Go(Point),
-    /// The pen with this number is needed, from 1; 0 if none is.
+    /// The pen with this number is needed, from 1; 0 puts the pen away.
     Pen(u8),
     /// An answer is sent.
     Answer(Answer),
@@ -99,7 +99,7 @@ impl ErrorNumber {
 /// The buffer holds the points of a polygon; that of a plotter has room for [`VERTICES`].
 #[derive(Debug)]
 pub struct Interpreter<B = [Vertex; VERTICES]> {
-    /// What the next byte belongs to.
+    /// How the next byte is interpreted.
     pub(super) mode: Mode,
     /// The first letter of an instruction, 0 if none has come.
     pub(super) letter: u8,
@@ -107,9 +107,9 @@ pub struct Interpreter<B = [Vertex; VERTICES]> {
     pub(super) name: [u8; 2],
     /// The number that is being read.
     pub(super) number: Number,
-    /// The numbers of the instruction so far that are not used yet.
+    /// The numbers of the instruction that have come and are not used yet.
     pub(super) numbers: [i64; 8],
-    /// How many there are; more than 8 are not kept.
+    /// The number of these numbers; more than 8 are not kept.
     pub(super) count: usize,
     /// Whether a pair of coordinates has been drawn.
     pub(super) has_pairs: bool,
@@ -137,21 +137,21 @@ pub struct Interpreter<B = [Vertex; VERTICES]> {
     pub(super) ticks: [i64; 2],
     /// The speed with the pen down in cm/s, in units of 2^-16; 0 if none was chosen.
     pub(super) speed: i64,
-    /// The number of the first error that `OE` has not told yet, 0 if there was none.
+    /// The number of the first error that `OE` has not reported yet, 0 if there was none.
     pub(super) error: u8,
     pub(super) is_initialized: bool,
     pub(super) has_new_corners: bool,
 
-    /// What is left to do for the last byte.
+    /// The steps that are left to do for the last byte.
     steps: Deque<Step, STEPS>,
-    /// How many parts of the first step are done.
+    /// The number of parts of the first step that are done.
     index: u32,
     /// The line that is being drawn in dashes.
     stroke: Option<Stroke>,
 }
 
 impl Interpreter {
-    /// Consists of zero bits. Before use it must be initialized.
+    /// Creates an interpreter that consists of zero bits. Before use it must be initialized.
     pub const fn new() -> Self {
         Self::with_buffer([Vertex::ZERO; VERTICES])
     }
@@ -193,8 +193,8 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Makes the state that `IN` makes, with the pen at this position and these hard clip limits. A
-    /// plotter's begin at 0; `RO` turns the page within them.
+    /// Sets the state that `IN` sets, with the pen at this position and these hard clip limits. The
+    /// limits of a plotter begin at 0; `RO` turns the page within them.
     pub fn initialize(&mut self, at: Point, limits: Rectangle) {
         self.frame = Frame::new(limits);
         (self.at, self.is_lost, self.is_down) = (at, false, false);
@@ -229,7 +229,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         (self.index, self.stroke) = (0, None);
     }
 
-    /// Whether nothing is left to do for the bytes so far, and no instruction waits for its end.
+    /// Whether nothing is left to do for the bytes so far, and no instruction is incomplete.
     pub fn is_idle(&self) -> bool {
         self.steps.is_empty() && self.stroke.is_none()
     }
@@ -244,14 +244,14 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.fail(ErrorNumber::Locked);
     }
 
-    /// Takes the first error since the last call or the last `OE`. A file's reader, which no one
-    /// can ask by `OE`, tells it.
+    /// Takes the first error since the last call or the last `OE`. The reader of a file reports it,
+    /// because nobody can ask for it by `OE`.
     pub fn take_error(&mut self) -> Option<ErrorNumber> {
         let number = core::mem::take(&mut self.error);
         ErrorNumber::ALL.into_iter().find(|error| *error as u8 == number)
     }
 
-    /// Notes an error, unless one is noted that `OE` has not told yet.
+    /// Notes an error, unless an earlier one has not been reported by `OE` yet.
     pub(super) fn fail(&mut self, error: ErrorNumber) {
         if self.error == 0 {
             self.error = error as u8;
@@ -271,7 +271,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.is_down = false;
     }
 
-    /// Adds a step. There is room, because a byte never makes more of them.
+    /// Adds a step. There is room, because a byte never causes more than [`STEPS`].
     pub(super) fn add(&mut self, step: Step) {
         let is_added = self.steps.push_back(step).is_ok();
         debug_assert!(is_added, "a byte makes too many steps");
@@ -306,7 +306,8 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// The next order of the bytes so far. Take all of them before the next byte comes.
+    /// Returns the next order that results from the bytes so far. Take all orders before the next
+    /// byte comes.
     pub fn next_order(&mut self) -> Option<Order> {
         loop {
             if let Some(order) = self.continue_stroke() {
@@ -383,14 +384,14 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Begins a line in the present style.
+    /// Begins a line in the current style.
     pub(super) fn draw_to(&mut self, to: Point) {
         let from = core::mem::replace(&mut self.at, to);
         self.stroke = Some(Stroke::new(from, to));
     }
 
-    /// The next part of the line that is being drawn. `None` if nothing of the part is drawn, or
-    /// the line is over; then there is no line any more.
+    /// Returns the next part of the line that is being drawn. `None` if nothing of this part is
+    /// drawn, or if the line has ended, which is then forgotten.
     fn continue_stroke(&mut self) -> Option<Order> {
         let mut stroke = self.stroke.take()?;
         if self.line.number.is_none() {
@@ -400,9 +401,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
         let part = self.line.next_part(&mut stroke, pattern)?;
         self.stroke = Some(stroke);
         match part {
-            Part::Dash(line) => self.ink(line),
-            Part::Dot(point) => self.ink([point; 2]),
-            Part::Gap => None,
+            DashPart::Dash(line) => self.ink(line),
+            DashPart::Dot(point) => self.ink([point; 2]),
+            DashPart::Gap => None,
         }
     }
 

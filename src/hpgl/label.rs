@@ -13,7 +13,7 @@ const WIDTH_UNITS: i64 = 16;
 /// The default width and height of letters: 0.187 and 0.269 cm, for a sheet of A4.
 const DEFAULT_SIZE: [i64; 2] = [(UNIT * 748 + 5) / 10, (UNIT * 1076 + 5) / 10];
 
-/// How letters are drawn.
+/// The style in which letters are drawn.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct TextStyle {
     /// The width and the height of letters, in coordinates, or in percent of the distances between
@@ -30,12 +30,12 @@ pub(super) struct TextStyle {
     pub(super) terminator: u8,
     /// The letter that is drawn at each point, 0 for none.
     pub(super) symbol: u8,
-    /// How far the pen has come along the line of letters since its beginning.
+    /// The distance that the pen has covered along the line of letters since its beginning.
     pub(super) advanced: Point,
 }
 
 impl TextStyle {
-    /// Of zero bits only, before there is a state.
+    /// A value that consists of zero bits. It is not valid before initialization.
     pub(super) const ZERO: Self =
         Self { size: [0; 2], direction: [0; 2], terminator: 0, ..Self::DEFAULT };
 
@@ -96,7 +96,7 @@ impl TextStyle {
     }
 
     /// The distance on the page from where a letter begins to a point of it, in the font's units
-    /// from the middle of its baseline. A symbol stands with its middle where it begins.
+    /// from the middle of its baseline. The middle of a symbol is where it begins.
     pub(super) fn letter_point(&self, frame: &Frame, [x, y]: [i32; 2], is_symbol: bool) -> Point {
         let [width, height] = self.letter(frame);
         let scaled = |units: i64, length: i64, of: i64| {

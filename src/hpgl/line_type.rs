@@ -17,14 +17,14 @@ const PATTERNS: [&[u8]; 6] = [
 /// The least length of a pattern: a fifth of a millimetre.
 const LEAST: i64 = 8 * UNIT;
 
-/// How lines are drawn.
+/// The style in which lines are drawn.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LineStyle {
     /// The number after `LT`; `None` for solid lines.
     pub(super) number: Option<u8>,
     /// The length of the pattern in percent of the distance from P1 to P2, in units of 2^-16.
     pub(super) percent: i64,
-    /// How far into the pattern the last line ended.
+    /// The distance into the pattern at which the last line ended.
     phase: i64,
 }
 
@@ -34,13 +34,13 @@ pub(super) struct Stroke {
     pub(super) from: Point,
     pub(super) to: Point,
     pub(super) length: i64,
-    /// How much of its length is done.
+    /// The length that has been drawn already.
     done: i64,
 }
 
 /// A part of a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Part {
+pub(super) enum DashPart {
     /// A dash.
     Dash([Point; 2]),
     /// A dot.
@@ -53,24 +53,24 @@ impl LineStyle {
     /// The length of the pattern when none was chosen: 4 percent.
     pub(super) const DEFAULT_PERCENT: i64 = 4 * UNIT;
 
-    /// Of zero bits only, before there is a state.
+    /// A value that consists of zero bits. It is not valid before initialization.
     pub(super) const ZERO: Self = Self { number: None, percent: 0, phase: 0 };
 
     /// Solid lines.
     pub(super) const SOLID: Self = Self { number: None, percent: Self::DEFAULT_PERCENT, phase: 0 };
 
-    /// Begins a pattern anew, as for each `LT`.
+    /// Begins the pattern from its start, as every `LT` does.
     pub(super) fn chosen(number: u8, percent: i64) -> Self {
         Self { number: Some(number), percent, phase: 0 }
     }
 
     /// The next part of a line, with patterns of this length. `None` at its end.
-    pub(super) fn next_part(&mut self, stroke: &mut Stroke, pattern: i64) -> Option<Part> {
+    pub(super) fn next_part(&mut self, stroke: &mut Stroke, pattern: i64) -> Option<DashPart> {
         let index = self.number.and_then(|number| usize::from(number).checked_sub(1));
         let Some(parts) = index.and_then(|index| PATTERNS.get(index)) else {
             // Dots at the ends of lines only.
             let is_over = core::mem::replace(&mut stroke.done, i64::MAX) == i64::MAX;
-            return (!is_over).then_some(Part::Dot(stroke.to));
+            return (!is_over).then_some(DashPart::Dot(stroke.to));
         };
         if stroke.done >= stroke.length {
             return None;
@@ -82,9 +82,9 @@ impl LineStyle {
             let is_last = index + 1 == parts.len();
             let is_drawn = index % 2 == 0;
             if is_drawn && *part == 0 && self.phase == begin {
-                // The gap behind it begins.
+                // After the dot, the gap begins.
                 self.phase += 1;
-                return Some(Part::Dot(stroke.point(stroke.done)));
+                return Some(DashPart::Dot(stroke.point(stroke.done)));
             }
             if self.phase >= end && !is_last {
                 begin = end;
@@ -98,8 +98,8 @@ impl LineStyle {
             if self.phase >= pattern {
                 self.phase = 0;
             }
-            let dash = Part::Dash([stroke.point(from), stroke.point(stroke.done)]);
-            return Some(if is_drawn { dash } else { Part::Gap });
+            let dash = DashPart::Dash([stroke.point(from), stroke.point(stroke.done)]);
+            return Some(if is_drawn { dash } else { DashPart::Gap });
         }
         None
     }
@@ -113,11 +113,11 @@ impl Stroke {
 
     /// The point at this distance from the beginning.
     fn point(&self, distance: i64) -> Point {
-        let way = self.to.minus(self.from);
+        let offset = self.to.minus(self.from);
         let part = |length: i64| {
             divide_rounding(product(length, distance), self.length.max(1).into()) as i64
         };
-        Point { x: self.from.x + part(way.x), y: self.from.y + part(way.y) }
+        Point { x: self.from.x + part(offset.x), y: self.from.y + part(offset.y) }
     }
 }
 
@@ -136,12 +136,12 @@ mod tests {
         while let Some(part) = style.next_part(&mut stroke, 100 * UNIT) {
             let done = (stroke.done.min(stroke.length) + UNIT / 2) / (10 * UNIT);
             let letter = match part {
-                Part::Dash(_) => '-',
-                Part::Dot(_) => {
+                DashPart::Dash(_) => '-',
+                DashPart::Dot(_) => {
                     text.push('.');
                     continue;
                 }
-                Part::Gap => ' ',
+                DashPart::Gap => ' ',
             };
             (at..done).for_each(|_| text.push(letter));
             at = done;

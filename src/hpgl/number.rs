@@ -17,14 +17,14 @@ pub(super) struct Number {
     power: u32,
 }
 
-/// What a number has turned out to be.
+/// The result of parsing a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Parsed {
     /// There is no number.
     None,
-    /// Its value in units of 2^-16.
+    /// The value in units of 2^-16.
     Value(i64),
-    /// It is no number, or beyond the range.
+    /// The text is no number, or the number is beyond the range.
     Bad,
 }
 
@@ -44,8 +44,8 @@ impl Number {
     /// Digits behind the point beyond this power of ten do not count.
     const LEAST: u32 = 100_000_000;
 
-    /// Takes a digit, a sign or a point. Returns the number before it, which it ends, if it begins
-    /// another one.
+    /// Takes a digit, a sign or a point. If it begins another number, it ends the one before, which
+    /// is returned.
     pub(super) fn push(&mut self, byte: u8) -> Parsed {
         let begins =
             matches!(byte, b'+' | b'-') && self.has_begun || byte == b'.' && self.has_point;

@@ -14,7 +14,7 @@ pub(super) struct ArcStep {
     center: Point,
     /// From the centre to the beginning.
     radius: Point,
-    /// How far it turns counterclockwise, in units of 2^-16 degrees.
+    /// The angle by which the arc turns counterclockwise, in units of 2^-16 degrees.
     sweep: i64,
     /// The number of chords, at least 1.
     chords: u32,

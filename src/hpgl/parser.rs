@@ -7,7 +7,7 @@ use super::number::Parsed;
 use super::polygon::PolygonBuffer;
 use super::{DAMAGED, dialect};
 
-/// What the next byte belongs to.
+/// How the next byte is interpreted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Mode {
     /// An instruction.
@@ -122,7 +122,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Whether coordinates of the instruction are drawn as they come.
+    /// Whether each pair of coordinates of the instruction is drawn as soon as it comes.
     fn draws_pairs(&self) -> bool {
         matches!(&self.name, b"PU" | b"PD" | b"PA" | b"PR")
     }
@@ -324,9 +324,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 }
             }
             b"ER" | b"RR" => {
-                let way = pair()?;
+                let offset = pair()?;
                 at_most(2)?;
-                let corner = self.frame.distance(way).and_then(|way| way.plus(self.at));
+                let corner = self.frame.distance(offset).and_then(|offset| offset.plus(self.at));
                 let corner = corner.ok_or(ErrorNumber::Overflow)?;
                 if &name == b"ER" {
                     self.rectangle(corner);
@@ -473,7 +473,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         match byte {
             0x00..=0x1F | 0x7F => self.control_letter(byte, false),
             0x20..=0x7E => self.write(byte.into()),
-            // What is no letter is drawn as a box.
+            // Bytes that are no letters are drawn as boxes.
             0x80..=0xBF => self.write(char::from_u32(letter).unwrap_or('\u{FFFD}')),
             _ => self.write('\u{FFFD}'),
         }
@@ -508,7 +508,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Goes by this many letters and lines, without drawing.
+    /// Moves the pen by this many letters and lines without drawing.
     fn space(&mut self, columns_and_lines: [i64; 2]) {
         let [columns, lines] = columns_and_lines;
         let along = self.text.spaces(&self.frame, [columns, 0]);

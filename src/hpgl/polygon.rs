@@ -66,8 +66,8 @@ pub trait PolygonBuffer {
     /// The points, from the first one.
     fn vertices(&self) -> &[Vertex];
 
-    /// Sets the point with this index. Those before it have been set; those behind it are not
-    /// needed any more. Returns whether there is room for it.
+    /// Sets the point with this index. Earlier points have been set, and later ones are no longer
+    /// needed. Returns whether there is room for it.
     fn put(&mut self, index: usize, vertex: Vertex) -> bool;
 
     /// Begins the lines of a fill. `span` gives, for the edge that ends at the point with an index,
@@ -115,7 +115,7 @@ pub(super) struct Polygon<B> {
 }
 
 impl<B: PolygonBuffer> Polygon<B> {
-    /// No polygon. It consists of zero bits, if the buffer does.
+    /// Creates an empty polygon. It consists of zero bits if the buffer does.
     pub(super) const fn new(buffer: B) -> Self {
         Self { buffer, count: 0, first: 0, is_open: false, is_full: false, began_at: Point::ZERO }
     }
@@ -136,7 +136,7 @@ impl<B: PolygonBuffer> Polygon<B> {
         !self.is_full
     }
 
-    /// Closes the subpolygon that is being defined. A single point is none.
+    /// Closes the subpolygon that is being defined. A single point is no subpolygon.
     fn close(&mut self) {
         let vertices = self.buffer.vertices();
         let [first, last] =
@@ -166,11 +166,11 @@ fn edge(vertices: &[Vertex], index: usize) -> Option<[Point; 2]> {
     Some([begin.at(), end.at()])
 }
 
-/// How shapes are filled.
+/// The style in which shapes are filled.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct FillStyle {
-    /// 1 and 2: lines at the width of the pen, in both directions or in one. 3: parallel lines. 4:
-    /// crossing ones.
+    /// The fill type. 1 and 2: lines at the width of the pen, in both directions or in one. 3:
+    /// parallel lines. 4: crossing lines.
     kind: u8,
     /// The distance of the lines of 3 and 4, on the page; 0 for 1 % of the distance of P1 and P2.
     spacing: i64,
@@ -191,12 +191,12 @@ impl FillStyle {
     }
 }
 
-/// How far a fill has come.
+/// The progress of a fill.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Hatch {
     /// The sine and the cosine of the direction of the lines, in units of 2^-30.
     direction: [i64; 2],
-    /// How far the line with index 0 lies to the left of the direction.
+    /// The distance of the line with index 0 to the left of the direction of the lines.
     base: i64,
     /// The distance of the lines.
     pitch: i64,
@@ -205,7 +205,7 @@ pub(super) struct Hatch {
     last: i64,
     /// The last crossing of the present line: where along the line, and the index of its edge.
     crossing: Option<(i64, usize)>,
-    /// Whether the lines are those that cross the first ones.
+    /// Whether the lines are those of the second direction, which cross the first ones.
     is_second: bool,
 }
 
@@ -221,22 +221,22 @@ impl Hatch {
         is_second: false,
     };
 
-    /// A point with x along the lines, and y to the left of them.
+    /// Converts a point so that x runs along the lines, and y to the left of them.
     fn turned(&self, point: Point) -> Point {
         let [sine, cosine] = self.direction;
         point.rotated([-sine, cosine])
     }
 
-    /// Where the present line crosses an edge. Of both ends of an edge, the lower one belongs to
-    /// it.
+    /// Returns where the line at `y` crosses an edge. Of the two ends of an edge, the lower one
+    /// belongs to it.
     fn crosses(&self, y: i64, edge: [Point; 2]) -> Option<i64> {
         let [a, b] = edge.map(|point| self.turned(point));
         if (a.y <= y) == (b.y <= y) {
             return None;
         }
         let (from, to) = if a.y < b.y { (a, b) } else { (b, a) };
-        let way = divide_rounding(product(to.x - from.x, y - from.y), (to.y - from.y).into());
-        Some(from.x + way as i64) // It lies between both ends.
+        let offset = divide_rounding(product(to.x - from.x, y - from.y), (to.y - from.y).into());
+        Some(from.x + offset as i64) // It lies between both ends.
     }
 }
 
@@ -342,7 +342,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.fill_polygon()
     }
 
-    /// Checks that the polygon has fitted. Otherwise it is forgotten, since a part of it would be
+    /// Checks that the polygon has fitted. Otherwise it is discarded, because a part of it would be
     /// another shape.
     fn check_polygon(&mut self) -> Result<(), ErrorNumber> {
         if !self.polygon.is_full {
@@ -370,8 +370,8 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.add(Step::Place(self.at));
     }
 
-    /// The edge of the polygon with this index: whether it is drawn, and its end. `None` behind the
-    /// last.
+    /// Returns the edge of the polygon with this index: whether it is drawn, and its end. `None`
+    /// after the last edge.
     pub(super) fn polygon_edge(&self, index: u32) -> Option<(bool, Point)> {
         let vertices = self.polygon.buffer.vertices().get(..self.polygon.count)?;
         let vertex = vertices.get(index as usize)?;
@@ -467,8 +467,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.hatch = hatch;
     }
 
-    /// The next line of a fill. [`Order::Nothing`] if it lies elsewhere than on the page or the
-    /// work took long enough for now; `None` if the shape is filled.
+    /// Returns the next line of a fill; `None` if the shape is filled. [`Order::Nothing`] means
+    /// that the line does not lie on the page, or that the search was interrupted because it took
+    /// long.
     pub(super) fn next_of_fill(&mut self, is_first: bool) -> Option<Order> {
         if is_first {
             self.begin_hatch(false);
@@ -504,7 +505,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         Some(Order::Nothing)
     }
 
-    /// The crossing of the line at `y` that follows another one, or the first.
+    /// Returns the crossing of the line at `y` that follows another one, or the first one.
     fn crossing_after(
         &mut self,
         after: Option<(i64, usize)>,

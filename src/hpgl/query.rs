@@ -7,10 +7,11 @@ use crate::fixed::{BinaryFraction, divide_rounding};
 use core::fmt::Write;
 
 impl<B: PolygonBuffer> Interpreter<B> {
-    /// Answers the instruction with this second letter. Returns `false` if there is none.
+    /// Answers the instruction with this second letter. Returns `false` if there is no such
+    /// instruction.
     pub(super) fn query(&mut self, letter: u8) -> bool {
         let mut answer = Answer::new();
-        // What is written is shorter than an answer may be.
+        // Writing cannot fail, because these answers are shorter than the buffer.
         let _ = match letter {
             b'I' => answer.write_str("7475A"),
             b'S' => {

@@ -18,7 +18,7 @@ pub struct Session {
     received: [u8; RECEIVED_BYTES],
     /// Where the first byte that waits lies.
     first: u16,
-    /// How many wait.
+    /// The number of bytes that wait.
     count: u16,
     handshake: Handshake,
     interpreter: Interpreter,
@@ -29,7 +29,7 @@ pub struct Session {
 }
 
 impl Session {
-    /// Without any bytes. Before use it must begin.
+    /// Creates a session without any bytes. Before use it must begin.
     pub const fn new() -> Self {
         Self {
             received: [0; RECEIVED_BYTES],
@@ -127,8 +127,8 @@ impl Session {
         byte
     }
 
-    /// The order that is to be carried out. It stays the same until [`Session::end_order`]. Some
-    /// bytes may be left although there is none.
+    /// Returns the order that is to be carried out. It stays the same until [`Session::end_order`].
+    /// Even without an order, some bytes may be left.
     pub fn order(&mut self) -> &Order {
         let mut bytes = 0;
         while self.order == Order::Nothing && bytes < BYTES_AT_ONCE {
@@ -160,8 +160,8 @@ impl Session {
         self.handshake.answer(format_args!("{answer}"));
     }
 
-    /// Tells the sender to wait or to go on, where it is time to. Returns what is to be sent, of
-    /// which [`Session::clear_output`] then says that it was.
+    /// Tells the sender to wait or to go on if necessary. Returns the bytes that are to be sent.
+    /// Call [`Session::clear_output`] after they were sent.
     pub fn output(&mut self) -> &[u8] {
         let (room, is_idle) = (self.room() as u16, self.is_idle());
         self.handshake.regulate(room, is_idle);

@@ -97,13 +97,13 @@ pub(super) enum Phase {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SwitchFault;
 
-/// How far the homing of the machine has come.
+/// The progress of homing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub(super) struct Homing {
     /// The axis that is being homed.
     pub(super) axis: Axis,
-    /// What the axis is doing now: whether it seeks the switch or moves away from it, for example.
+    /// The current phase of the axis that is being homed.
     pub(super) phase: Phase,
     /// The position of the pins when the switch was pressed during this phase or the one before;
     /// `None` if it was not.

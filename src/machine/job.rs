@@ -18,18 +18,18 @@ use crate::motion::{EventQueue, Progress as RunnerProgress, Runner};
 /// line.
 const LATE_TICKS: u32 = crate::motion::TICKS_PER_SECOND / 50;
 
-/// How much of a path has been measured.
+/// The progress of measuring a path.
 #[derive(Debug)]
 pub struct Measured {
     /// The size of that part, without the time.
     size: JobSize,
-    /// Where it ends.
+    /// The end of the measured part.
     at: PagePoint,
-    /// Whether it ends with the pen down.
+    /// Whether the measured part ends with the pen down.
     inked: bool,
     /// The number of the pen, from 0.
     pen: u8,
-    /// The time that it takes.
+    /// The estimated duration of the measured part.
     estimate: Estimate,
     /// The number of targets.
     targets: u32,
@@ -101,21 +101,21 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// The job that is being drawn is so much larger than was known, because more of it has been
-    /// computed. The time for it is added here.
+    /// Adds `more` to the size of the job that is being drawn, of which more has been computed. The
+    /// time for it is estimated here.
     #[cfg(feature = "tiles")]
     pub fn grow_job(&mut self, more: JobSize) {
         let milliseconds = super::estimate::even_milliseconds(&self.settings, more);
         self.progress.grow(JobSize { milliseconds, ..more });
     }
 
-    /// Whether the machine, which has drawn all targets that have come, has to wait for others. It
-    /// stands with the pen raised then.
+    /// Whether the machine, which has drawn all targets that have come, has to wait for more. If
+    /// so, it waits with the pen raised.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn stops_for_late_path(&mut self, path: &dyn Path, progress: RunnerProgress) -> bool {
         let Some(late) = path.late().filter(|_| self.activity.reads_path()) else { return false };
-        // After a hold the machine stands for that.
+        // After a hold the machine is already at rest.
         if progress != RunnerProgress::Done {
             return false;
         }
@@ -134,7 +134,7 @@ impl Machine<'_> {
         self.waits_for_late(path, late)
     }
 
-    /// Goes on if the next targets have come. Returns whether they have not.
+    /// Continues if the next targets have come. Returns whether they have not come yet.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn waits_for_late(&mut self, path: &mut dyn Path, late: super::PendingTarget) -> bool {
@@ -298,7 +298,7 @@ impl Machine<'_> {
         }
     }
 
-    /// Begins anew to count the ink after which the machine pauses ([`Setting::InkBeforePause`]).
+    /// Restarts the count of the ink after which the machine pauses ([`Setting::InkBeforePause`]).
     pub(super) fn reset_ink_budget(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
         // Converts units of 2^-16 m to units of 2^-18 mm.
@@ -330,7 +330,8 @@ impl Machine<'_> {
         }
     }
 
-    /// No target comes any more before the machine stands; then its moves come from `source`.
+    /// Records that no more targets come before the machine is at rest. Then its moves come from
+    /// `source`.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn end_targets(&mut self, source: Source) {
         self.activity.set_source(source);

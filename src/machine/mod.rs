@@ -76,13 +76,14 @@ pub struct Machine<'m> {
     activity: Activity,
     /// The motion planner, which turns planned moves into step events.
     runner: Runner<'m>,
-    /// What the step interrupt has done so far, and the orders to it.
+    /// The state that the step interrupt shares with the main loop: what it has done so far, and
+    /// the orders to it.
     pins: &'m PulserState,
     /// The position of the motors, in steps, at which the step counters of `pins` are 0.
     origin: PagePoint,
-    /// How far the queue is planned ahead of the pins, in ticks.
+    /// The time by which the queue is planned ahead of the pins, in ticks.
     ahead_ticks: u32,
-    /// The size of the present job, or of the last one, and how far it has come.
+    /// The size of the current or the last job, and its progress.
     progress: Progress,
     /// The move that is being cut into segments, if any.
     segmenter: Option<Segmenter>,
@@ -90,7 +91,7 @@ pub struct Machine<'m> {
     steady: Steady,
     /// How much of its backlash each motor has taken up.
     backlash: Backlash,
-    /// What of it was taken up while the pen drew on.
+    /// The state of the backlash that is taken up while the pen draws.
     #[cfg(feature = "spread-backlash")]
     spread_backlash: spread_backlash::SpreadBacklash,
     /// The contacts that were pressed when they were last observed.
@@ -101,12 +102,12 @@ pub struct Machine<'m> {
     rapid_percent: u8,
     /// The number of the pen in the holder, counted from 0.
     pen: u8,
-    /// How far the strokes of the job have been noted.
+    /// The progress of noting strokes of the job in flash.
     log: StrokeLog,
     /// The points within strokes at which the machine rests.
     #[cfg(feature = "resume")]
     points: StrokePoints,
-    /// How far it has come with such a rest.
+    /// The progress of a rest within a stroke.
     #[cfg(feature = "resume")]
     rest: StrokeRest,
     /// The ticks of all events when the drivers were switched off at rest.
@@ -265,7 +266,7 @@ impl<'m> Machine<'m> {
         self.activity.state()
     }
 
-    /// Returns the error for a command that the present state does not allow.
+    /// Returns the error for a command that the current state does not allow.
     fn refusal(&self) -> MachineError {
         MachineError::State(self.state())
     }

@@ -4,7 +4,7 @@
 use crate::drawing::{LineType, PagePoint};
 use crate::step::tape::{Decoder, TapeLines};
 
-/// Where the pen moves next, and whether it draws on the way.
+/// The end of the next move of the pen, and whether the pen draws during it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Target {
     /// The end of the move, in steps of the page.
@@ -13,7 +13,7 @@ pub struct Target {
     pub ink: Option<LineType>,
 }
 
-/// A path whose next target has not come yet.
+/// A target of a path that has not come yet.
 #[cfg(any(feature = "stream", feature = "early-ink"))]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct PendingTarget {
@@ -27,13 +27,13 @@ pub trait Path {
     fn next_target(&mut self) -> Option<Target>;
     /// Restarts the path at the first target.
     fn rewind(&mut self);
-    /// Shows the next targets of the same pen, as long as `visit` returns true, and stays where it
-    /// is. A path that is not known ahead shows none.
+    /// Passes the next targets of the same pen to `visit` as long as it returns true, without
+    /// moving on. A path that is not known ahead passes none.
     fn look_ahead(&mut self, visit: &mut dyn FnMut(Target) -> bool) {
         let _ = visit;
     }
-    /// Whether the next target has not come yet, so that the machine waits for it with the pen
-    /// raised. It is asked when there is no next target.
+    /// Returns the pending target if the next target has not come yet, so that the machine waits
+    /// for it with the pen raised. It is asked when there is no next target.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     fn late(&self) -> Option<PendingTarget> {
         None
@@ -123,7 +123,7 @@ impl<I: Iterator<Item = u8> + Clone> Path for TapePath<I> {
     }
 }
 
-/// How long a job is: its strokes, lengths and time. Lengths are in units of 2^-18 mm.
+/// The size of a job: its strokes, lengths and duration. Lengths are in units of 2^-18 mm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct JobSize {

@@ -15,32 +15,33 @@ pub(super) struct Progress {
 }
 
 impl Progress {
-    /// A job that begins now, when the runner's totals are `run`. The size of a job whose moves are
-    /// sent one by one grows with them.
+    /// Begins a job when the totals of the runner are `run`. The size of a job whose moves are sent
+    /// one by one grows with them.
     pub(super) fn begin(size: JobSize, run: RunLengths) -> Self {
         Self { size, begun_at: run, is_inked: false }
     }
 
-    /// The rest of a job, of which `whole` is the size of all and `rest` that of what is left. It
-    /// begins now, when the runner's totals are `run`.
+    /// Begins the rest of a job, when the totals of the runner are `run`. `whole` is the size of
+    /// the whole job, and `rest` that of what is left.
     #[cfg(feature = "resume")]
     pub(super) const fn begin_rest(whole: JobSize, rest: JobSize, run: RunLengths) -> Self {
         let begun_at = RunLengths {
             strokes: run.strokes.wrapping_sub(whole.strokes.wrapping_sub(rest.strokes)),
             drawn: run.drawn.wrapping_sub(whole.drawn.wrapping_sub(rest.drawn)),
-            // The way from where the pen is now to the rest was not among those of the whole.
+            // The move from where the pen is now to the rest was not part of the whole.
             travelled: run.travelled.wrapping_sub(whole.travelled.saturating_sub(rest.travelled)),
         };
         Self { size: whole, begun_at, is_inked: false }
     }
 
-    /// The pen was raised within a stroke and goes on with it, which counts as no other stroke.
+    /// Records that the pen was raised within a stroke and continues it, so that no other stroke is
+    /// counted.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     pub(super) const fn go_on_with_stroke(&mut self) {
         self.begun_at.strokes = self.begun_at.strokes.wrapping_add(1);
     }
 
-    /// The job is so much larger than was known.
+    /// Adds `more` to the size of the job, of which more has become known.
     #[cfg(feature = "tiles")]
     pub(super) const fn grow(&mut self, more: JobSize) {
         self.size.strokes += more.strokes;

@@ -16,7 +16,7 @@ const MOST_MOVES: u32 = 1000;
 pub(super) struct Steady {
     /// How many moves of it have not been read yet.
     moves: u32,
-    /// Its speed, as a stopping distance.
+    /// The speed of this line, as a stopping distance.
     limit: PathLength,
 }
 

@@ -9,7 +9,7 @@ use super::Machine;
 #[cfg(feature = "resume")]
 use super::state::{Activity, Source};
 
-/// How far the strokes of the job have been noted.
+/// The progress of noting the strokes of the job in flash.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct StrokeLog {
     /// What is noted; `None` while nothing is to be noted.

@@ -131,10 +131,10 @@ fn assert_within(stroke: &Stroke, window: f64, speed: f64, acceleration: f64) {
 }
 
 /// How long a straight way takes from rest to rest.
-fn straight(way: f64, [speed, acceleration, jerk, _]: [f64; 4]) -> f64 {
+fn straight(distance: f64, [speed, acceleration, jerk, _]: [f64; 4]) -> f64 {
     // While it lasts, a ramp of the acceleration takes as long as this.
     let ramp = if jerk > 0.0 { acceleration / (jerk * 1000.0) } else { 0.0 };
-    way / speed + speed / acceleration + ramp
+    distance / speed + speed / acceleration + ramp
 }
 
 #[test]
@@ -143,8 +143,8 @@ fn straight_lines_take_as_long_as_the_laws_of_motion_say() {
     {
         for end in [[130.0, 10.0], [10.0, 90.0], [100.0, 77.0]] {
             let stroke = draw(&[[10.0, 10.0], end], settings(motion));
-            let way = libm::hypot(end[0] - 10.0, end[1] - 10.0);
-            assert_takes(&stroke, straight(way, motion), "a line");
+            let distance = libm::hypot(end[0] - 10.0, end[1] - 10.0);
+            assert_takes(&stroke, straight(distance, motion), "a line");
             assert_within(&stroke, 0.02, motion[0], motion[1]);
         }
     }
@@ -181,13 +181,15 @@ fn corners_are_passed_at_the_speed_of_their_deviation() {
         let motion = [60.0, 500.0, 0.0, deviation];
         let stroke = draw(&zigzag, settings(motion));
         // sin of half the angle between the lines, which is small.
-        let way = libm::hypot(40.0, 5.0);
-        let sine = 5.0 / way;
+        let distance = libm::hypot(40.0, 5.0);
+        let sine = 5.0 / distance;
         let corner = libm::sqrt(500.0 * deviation * sine / (1.0 - sine));
         let speeding = (60.0 - corner) / 500.0;
         let seconds = |ends: f64| {
             // Each end that is a corner begins at its speed.
-            way / 60.0 + (2.0 - ends) * 60.0 / 1000.0 + ends * speeding * (60.0 - corner) / 120.0
+            distance / 60.0
+                + (2.0 - ends) * 60.0 / 1000.0
+                + ends * speeding * (60.0 - corner) / 120.0
         };
         assert_takes(&stroke, 8.0 * seconds(2.0) + 2.0 * seconds(1.0), "a zigzag");
     }

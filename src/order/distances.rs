@@ -16,14 +16,14 @@ use core::cell::Cell;
 /// 1/256 steps, which takes no more bits than a pair.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(transparent)]
-struct Known<P>([P; 2]);
+struct DistanceEntry<P>([P; 2]);
 
 /// Returns the distances between the stations of a network, and remembers the last ones asked for.
 pub(super) struct Distances<'s, 'a, I: Index> {
     /// The network in which the stations lie.
     network: Network<'a, I>,
     /// The table. Its length is a power of two, or 0.
-    known: &'s [Cell<Known<I::Pair>>],
+    known: &'s [Cell<DistanceEntry<I::Pair>>],
     /// The hash of a pair, of 32 bits, is shifted right by this to give its index in the table.
     shift: u32,
 }
@@ -34,10 +34,11 @@ impl<'s, 'a, I: Index> Distances<'s, 'a, I> {
 
     /// Makes an empty table, as large as the memory allows.
     pub fn new(network: Network<'a, I>, scratch: &mut Scratch<'s>) -> Result<Self, OutOfScratch> {
-        let slots = scratch.available_bytes() / size_of::<Known<I::Pair>>();
+        let slots = scratch.available_bytes() / size_of::<DistanceEntry<I::Pair>>();
         let bits = slots.checked_ilog2().unwrap_or(0).min(Self::MOST_BITS);
-        let known: &mut [Known<I::Pair>] = scratch.take(if bits == 0 { 0 } else { 1 << bits })?;
-        known.fill(Known([I::pair(I::NONE, I::NONE), 0.into()]));
+        let known: &mut [DistanceEntry<I::Pair>] =
+            scratch.take(if bits == 0 { 0 } else { 1 << bits })?;
+        known.fill(DistanceEntry([I::pair(I::NONE, I::NONE), 0.into()]));
         Ok(Self {
             network,
             known: Cell::from_mut(known).as_slice_of_cells(),
@@ -58,14 +59,14 @@ impl<'s, 'a, I: Index> Distances<'s, 'a, I> {
         // Knuth's multiplicative hashing, with a prime near 2^32 times the golden ratio.
         let mixed = (low.into().rotate_left(16) ^ high.into()).wrapping_mul(2_654_435_761);
         let slot = self.known.get((mixed >> self.shift) as usize);
-        let known = slot.map(Cell::get).filter(|Known([known, _])| *known == pair);
+        let known = slot.map(Cell::get).filter(|DistanceEntry([known, _])| *known == pair);
         let length = match known {
-            Some(Known([_, length])) => length.into() as u32,
+            Some(DistanceEntry([_, length])) => length.into() as u32,
             None if self.network.least_distance(from, to) >= bound => return None,
             None => {
                 let length = self.network.distance(from, to);
                 if let Some(slot) = slot {
-                    slot.set(Known([pair, length.into()]));
+                    slot.set(DistanceEntry([pair, length.into()]));
                 }
                 length
             }

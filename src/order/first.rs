@@ -39,13 +39,13 @@ const GREEDY_MICROSECONDS: u64 = 600;
 /// The microseconds of everything else in the order, for each odd point.
 const POINT_MICROSECONDS: u64 = 1500;
 
-/// The pen is busy for this many milliseconds longer than the order is estimated to take. The order
-/// is improved meanwhile, which costs no time.
+/// The time in milliseconds by which the pen is busy longer than the order is estimated to take.
+/// The order is improved during that time, so it costs no time.
 const SPARE_MILLISECONDS: u64 = 4000;
 
-/// The strokes that are drawn first.
+/// The choice of the strokes that are drawn first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct First {
+pub struct FirstStrokes {
     /// The number of their segments. They are the first ones of the drawing, each of them drawn
     /// from its `from` end, in this order.
     pub segments: usize,
@@ -60,10 +60,10 @@ pub struct First {
     pub spare_milliseconds: u32,
 }
 
-/// How long the pen is busy.
+/// Estimates how long the pen is busy with strokes.
 pub trait StrokeDurations {
-    /// Returns the milliseconds that this many strokes take, of this length together in 1/256 steps,
-    /// without the moves between them.
+    /// Returns the milliseconds that this many strokes take, without the moves between them. Their
+    /// total length is given in 1/256 steps.
     fn milliseconds(&self, strokes: u32, length: u64) -> u64;
 }
 
@@ -82,7 +82,7 @@ struct Parts<'s, I> {
     corner: PagePoint,
 }
 
-/// In the place of a distance: the part has been chosen.
+/// The value in place of a distance that means that the part has been chosen.
 const CHOSEN: u32 = u32::MAX;
 
 impl<'s, I: Index> Parts<'s, I> {
@@ -193,10 +193,10 @@ pub fn choose_first<I: Index>(
     meanwhile: &dyn StrokeDurations,
     scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-) -> Result<First, OrderError> {
+) -> Result<FirstStrokes, OrderError> {
     match choose(points, segments, options, meanwhile, scratch, cancel) {
         // Where memory is short, the whole order is computed before the pen begins.
-        Err(OrderError::Scratch(_)) => Ok(First::default()),
+        Err(OrderError::Scratch(_)) => Ok(FirstStrokes::default()),
         chosen => chosen,
     }
 }
@@ -212,14 +212,14 @@ fn choose<I: Index>(
     meanwhile: &dyn StrokeDurations,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
-) -> Result<First, OrderError> {
+) -> Result<FirstStrokes, OrderError> {
     let drawing = Drawing { points, segments: &*segments };
     let (order_takes, all_odd) = milliseconds_to_order(drawing, scratch.reborrow(), cancel)?;
     let pen = segments.iter().map(|segment| segment.pen()).min();
     let Some(pen) = pen.filter(|_| order_takes >= LEAST_MILLISECONDS) else {
-        return Ok(First::default());
+        return Ok(FirstStrokes::default());
     };
-    let mut first = First::default();
+    let mut first = FirstStrokes::default();
     let corner;
     let (mut odd, mut strokes, mut milliseconds) = (0, 0, 0);
     {
@@ -306,7 +306,7 @@ pub fn first_legs<I: Index>(tour: &mut [Leg<I>]) {
 /// See [`OrderError`].
 pub fn order_rest<I: Index>(
     drawing: Drawing<'_, I>,
-    first: First,
+    first: FirstStrokes,
     drawn: &[Leg<I>],
     options: Options,
     scratch: Scratch<'_>,
@@ -414,7 +414,7 @@ mod tests {
 
     /// Orders such a drawing. Returns the segments as they were before and are now, the choice, the
     /// tour, and the report.
-    type Ordered<I> = (Vec<Segment<I>>, Vec<Segment<I>>, First, Vec<Leg<I>>, Report);
+    type Ordered<I> = (Vec<Segment<I>>, Vec<Segment<I>>, FirstStrokes, Vec<Leg<I>>, Report);
 
     fn order_all<I: Index>(count: u32, pens: u8, seed: u32, options: Options) -> Ordered<I> {
         let (points, before) = polylines::<I>(count, pens, seed);
@@ -483,9 +483,9 @@ mod tests {
         for seed in 10..14 {
             let (points, segments) = polylines::<u32>(500, 1, seed);
             let corner = points.iter().min().copied().unwrap_or_default();
-            let way = |point: u32| u64::from(length(corner, points[point as usize]));
+            let distance = |point: u32| u64::from(length(corner, points[point as usize]));
             let (_, now, _, tour, report) = order_all::<u32>(500, 1, seed, Options::default());
-            early += report.pen_up + way(path(&now, &tour)[0][0]);
+            early += report.pen_up + distance(path(&now, &tour)[0][0]);
             let mut memory = std::vec![0; 1 << 19];
             let mut tour = std::vec![Leg::new(0, false); segments.len()];
             let drawing = Drawing { points: &points, segments: &segments };
@@ -495,7 +495,7 @@ mod tests {
                 .expect("an order")
                 .pen_up;
             let path = path(&segments, &tour);
-            late += way(path[0][0]).min(path.last().map_or(0, |leg| way(leg[1])));
+            late += distance(path[0][0]).min(path.last().map_or(0, |leg| distance(leg[1])));
         }
         assert!(early < late + late / 100, "{early} and {late}");
     }
@@ -504,7 +504,7 @@ mod tests {
     fn nothing_is_chosen_where_it_does_not_pay() {
         // Few strokes; and a part that is too large.
         let (_, _, first, ..) = order_all::<u16>(100, 1, 1, Options::default());
-        assert_eq!(first, First::default());
+        assert_eq!(first, FirstStrokes::default());
         let points: Vec<_> = (0..1000).map(|at| PagePoint { x: at * 7 % 901, y: at }).collect();
         let mut star: Vec<Segment<u16>> = (1..1000).map(|to| Segment::new(0, to)).collect();
         let mut memory = std::vec![0; 1 << 17];
@@ -522,7 +522,7 @@ mod tests {
         let scratch = Scratch::new(&mut memory);
         let pen = &Pen(500);
         let first = choose_first(&points, &mut segments, options, pen, scratch, &mut NeverCancel);
-        assert_eq!(first, Ok(First::default()));
+        assert_eq!(first, Ok(FirstStrokes::default()));
         let mut memory = std::vec![0; 1 << 17];
         let scratch = Scratch::new(&mut memory);
         let first =
@@ -583,7 +583,7 @@ mod tests {
             let (drawn, rest) = tour.split_at_mut(first.segments);
             first_legs(drawn);
             let drawing = Drawing { points: &points, segments: &segments };
-            let (first, mut calls) = (First { spare_milliseconds, ..first }, Calls(0));
+            let (first, mut calls) = (FirstStrokes { spare_milliseconds, ..first }, Calls(0));
             let scratch = Scratch::new(&mut memory);
             let report = order_rest(drawing, first, drawn, options, scratch, &mut calls, rest);
             (report.expect("an order").pen_up, calls.0)

@@ -44,7 +44,7 @@ mod remaining;
 mod search;
 
 #[cfg(feature = "early-ink")]
-pub use first::{First, StrokeDurations, choose_first, first_legs, order_rest};
+pub use first::{FirstStrokes, StrokeDurations, choose_first, first_legs, order_rest};
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
@@ -59,8 +59,8 @@ use network::{Anchor, Network, start_point};
 use odd::OddPoints;
 use work_budget::WorkBudget;
 
-/// In the place of a partner: the station belongs to a part that has no odd point. [`Index::NONE`]
-/// there means that there is none.
+/// Returns the value that marks, in place of a partner, a station of a part that has no odd point.
+/// [`Index::NONE`] in that place means that there is no partner.
 fn even_part<I: Index>() -> I {
     I::NONE - I::ONE
 }
@@ -131,8 +131,8 @@ pub enum Shape {
     ClosedCycle,
 }
 
-/// How fast the pen travels, and how fast the order is improved. They say whether a shorter way is
-/// worth the work.
+/// How long pen-up travel and the search for a better order take. These durations decide whether a
+/// shorter path is worth the work of finding it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TimeModel {
     /// The greatest speed with the pen up, in steps per second, below 2^22.
@@ -154,8 +154,8 @@ impl TimeModel {
 }
 
 impl Default for TimeModel {
-    /// That of a board with the default settings of its machine: 100 mm/s and 800 mm/s², with 80
-    /// steps to the millimetre.
+    /// The model of a board with the default settings of its machine: 100 mm/s and 800 mm/s², with
+    /// 80 steps to the millimetre.
     fn default() -> Self {
         Self { speed: 8000, acceleration: 64_000, units_per_second: Self::BOARD }
     }
@@ -165,9 +165,9 @@ impl Default for TimeModel {
 /// distance computations, not in time, so that every machine gives the same tour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Effort {
-    /// As much as pays: until a further second of work saves less than a second of drawing at this
-    /// time_model. What is saved is taken from the moves with the pen up, each lift at its cost
-    /// ([`Options::lift_cost`]).
+    /// As much as pays: until a further second of work saves less than a second of drawing,
+    /// according to this model. What is saved is taken from the moves with the pen up, each lift at
+    /// its cost ([`Options::lift_cost`]).
     Auto(TimeModel),
     /// So many distance computations for each pen-up move. With 0 the tour is not improved: the
     /// parts are drawn nearest first.

@@ -58,7 +58,7 @@ pub(super) struct Network<'a, I> {
     anchor: Anchor,
 }
 
-/// Where the pen is when a path begins that follows strokes drawn before. The way from there
+/// Where the pen is when a path begins that follows strokes drawn before. The move from there
 /// counts, and so the path begins where that is short. Without the feature `early-ink` there are no
 /// such strokes, and this takes no memory.
 #[derive(Debug, Clone, Copy, Default)]

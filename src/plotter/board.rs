@@ -6,7 +6,7 @@
 use crate::machine::Contacts;
 use crate::motion::EventQueue;
 use crate::protocol::RealTime;
-use crate::storage::Noted;
+use crate::storage::LogProgress;
 #[cfg(feature = "tiles")]
 use crate::storage::area::{Area, AreaFlash};
 
@@ -39,13 +39,13 @@ pub trait Board {
     fn take_opened(&mut self) -> bool {
         false
     }
-    /// Chooses where replies go from now on: if `only_to_opened`, only to the port that was opened
-    /// last, else to all ports again.
+    /// Chooses the ports for all later replies: only the port that was opened last
+    /// (`only_to_opened`), or all ports.
     fn reply_only_to_opened(&mut self, only_to_opened: bool) {
         let _ = only_to_opened;
     }
-    /// Chooses the ports to which all that is written goes from now on. A board with one port may
-    /// leave it out.
+    /// Chooses the ports for everything that is written from now on. A board with one port need not
+    /// implement it.
     fn reply_to(&mut self, replies: Replies) {
         let _ = replies;
     }
@@ -83,8 +83,8 @@ pub trait Board {
         let _ = (record, parts);
         Ok(())
     }
-    /// Saves a new state of `record` as [`Board::save`] does, and leaves room behind it for so many
-    /// bytes that are [added](Board::add) later.
+    /// Saves a new state of `record` as [`Board::save`] does, and leaves `room` behind it for bytes
+    /// that are [added](Board::add) later.
     ///
     /// # Errors
     /// [`NotStored`] if the flash does not take it; the last state is still kept.
@@ -122,8 +122,7 @@ pub trait Board {
     /// called in place of [`Board::wait`] where the plotter computes while steps run.
     #[cfg(feature = "early-ink")]
     fn begin_steps(&mut self) {}
-    /// Passes to `take` what was added to the state of `record` that was saved last, if all of it
-    /// is there.
+    /// Passes to `take` what was added to the last saved state of `record`, if all of it is there.
     #[cfg(feature = "early-ink")]
     fn load_added(&mut self, record: Record, take: &mut dyn FnMut(&mut dyn Stored)) {
         let _ = (record, take);
@@ -137,9 +136,9 @@ pub trait Board {
     fn keeps_progress(&self) -> bool {
         false
     }
-    /// Begins to keep how far the job has come that was saved last: no stroke is drawn yet, of so
-    /// many. `notes` are kept with it. The call may block, so it is only made while the machine is
-    /// stopped.
+    /// Begins to keep the progress of the job that was saved last, which has this many `strokes`,
+    /// none of which is drawn yet. `notes` are kept with it. The call may block, so it is only made
+    /// while the machine is stopped.
     ///
     /// # Errors
     /// [`NotStored`] if no job is kept, or the flash does not take it.
@@ -169,7 +168,7 @@ pub trait Board {
     /// Copies the notes of the job that was saved last to the front of `notes`, and goes on to keep
     /// how far that job comes. Returns the length of the notes and how many strokes are drawn and
     /// points within strokes are passed; `None` if no drawing of that job has begun.
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, LogProgress)> {
         let _ = notes;
         None
     }
@@ -177,8 +176,8 @@ pub trait Board {
     /// Called while the main loop computes.
     #[cfg(feature = "tiles")]
     fn start_steps(&mut self) {}
-    /// The flash in which a model is kept that is too large for the memory, and what writes it;
-    /// `None` if the board has none.
+    /// The flash for a model that is too large for the memory, and what writes to it; `None` if the
+    /// board has none.
     #[cfg(feature = "tiles")]
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         None
@@ -220,7 +219,7 @@ pub enum Replies {
     OthersIfAny(usize),
 }
 
-/// What a board with flash keeps through a loss of power.
+/// The records that a board with flash keeps through a loss of power.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Record {
     /// The settings of the machine, which `$N=VALUE` changes.

@@ -2,12 +2,12 @@
 //!
 //! [`choose_first`](crate::order::choose_first) says which strokes come first. Once they are known,
 //! the machine begins with them. The order is computed as always, by code that knows nothing of
-//! this; where it asks whether it is cancelled, [`Meanwhile`] keeps the machine going. So what is
+//! this; where it asks whether it is cancelled, [`OrderCancel`] keeps the machine going. So what is
 //! drawn depends on the drawing and the settings, and not on how fast the board computes: if the
 //! order is late, the pen waits, raised, behind the first strokes.
 //!
 //! Where the lines take long to find, too, the pen travels to the left end of the drawing meanwhile
-//! ([`Approach`]), where the first strokes will lie.
+//! ([`EarlyTravel`]), where the first strokes will lie.
 //!
 //! A board with flash keeps the drawing and the first strokes before the pen moves, with all that
 //! the order is computed from. When the order is known, it is [added](super::Board::add) to that
@@ -32,9 +32,9 @@ const TARGETS_A_TURN: u32 = 64;
 pub(super) struct Pending<I> {
     /// The job with its order.
     job: Job<I>,
-    /// How far it has been measured.
+    /// The position up to which the job has been measured.
     cursor: Cursor<I>,
-    /// How much of it has been measured; `None` once all is.
+    /// The state of measuring the job; `None` once it is finished.
     measured: Option<Measured>,
     /// The size of the job, once it is measured.
     size: JobSize,
@@ -47,15 +47,16 @@ impl<I> Pending<I> {
     }
 }
 
-/// Lets the pen travel to where it will probably begin, while the lines of the job are found.
-struct Approach<'l, 'b, 'm, B: Board> {
+/// Lets the pen travel to where it will probably begin to draw, while the lines of the job are
+/// found.
+struct EarlyTravel<'l, 'b, 'm, B: Board> {
     /// Answers the user.
     listener: &'l mut Listener<'b, B>,
     /// The machine.
     machine: &'l mut Machine<'m>,
     /// Whether the pen has left, and has not arrived yet.
-    is_on_the_way: bool,
-    /// How often the stages have asked since the machine was looked after.
+    is_travelling: bool,
+    /// The number of checks by the stages since the machine was last served.
     checks: u8,
 }
 
@@ -63,13 +64,13 @@ struct Approach<'l, 'b, 'm, B: Board> {
 /// holds for 50 ms at least.
 const CHECKS_BETWEEN: u8 = 8;
 
-impl<B: Board> Approach<'_, '_, '_, B> {
+impl<B: Board> EarlyTravel<'_, '_, '_, B> {
     /// Waits until the pen has arrived, because flash must not be written while something moves.
     ///
     /// # Errors
     /// [`Aborted`] if the user does not want the job any more, or in an alarm.
     fn arrive(&mut self) -> Result<(), Aborted> {
-        while self.is_on_the_way {
+        while self.is_travelling {
             let answered = self.listener.check();
             self.travel(answered)?;
             self.listener.board.wait_briefly();
@@ -98,7 +99,7 @@ impl<B: Board> Approach<'_, '_, '_, B> {
         match machine.state() {
             State::Alarm(_) => Err(Aborted),
             State::Idle => {
-                self.is_on_the_way = !machine.is_stopped();
+                self.is_travelling = !machine.is_stopped();
                 answered
             }
             _ => answered,
@@ -106,11 +107,11 @@ impl<B: Board> Approach<'_, '_, '_, B> {
     }
 }
 
-impl<B: Board> Cancel for Approach<'_, '_, '_, B> {
+impl<B: Board> Cancel for EarlyTravel<'_, '_, '_, B> {
     #[inline(never)] // Keeps its frame off the stack while the lines are found.
     fn check(&mut self) -> Result<(), Aborted> {
         let answered = self.listener.check();
-        if !self.is_on_the_way {
+        if !self.is_travelling {
             return answered;
         }
         self.checks = (self.checks + 1) % CHECKS_BETWEEN;
@@ -125,24 +126,24 @@ impl<B: Board> Cancel for Approach<'_, '_, '_, B> {
         let may_travel =
             self.machine.state() == State::Idle && !self.listener.requests.has(RealTime::HOLD);
         // What lies beyond the travel is refused later, with the reason.
-        self.is_on_the_way = may_travel && self.machine.jog(at, None).is_ok();
+        self.is_travelling = may_travel && self.machine.jog(at, None).is_ok();
     }
 }
 
 /// Keeps the machine going while the order of a job is computed, and ends the computation when the
 /// user gives the job up.
-struct Meanwhile<'h, 'm, B: Board, I> {
-    /// All but the working memory.
+struct OrderCancel<'h, 'm, B: Board, I> {
+    /// The plotter without its working memory.
     inner: &'h mut Inner<'m, I>,
     /// The board.
     board: &'h mut B,
-    /// What the machine may read.
+    /// The part of the job that the machine may read.
     begun: Begun<'h, I>,
     /// Whether a status report waits for room in the output.
     status_due: bool,
 }
 
-impl<B: Board, I: Index> Cancel for Meanwhile<'_, '_, B, I> {
+impl<B: Board, I: Index> Cancel for OrderCancel<'_, '_, B, I> {
     #[inline(never)] // Keeps its frame off the stack while the order is computed.
     fn check(&mut self) -> Result<(), Aborted> {
         let Self { inner, board, begun, status_due } = self;
@@ -208,7 +209,7 @@ impl<I: Index> Inner<'_, I> {
         &mut self,
         listener: &mut Listener<'_, B>,
     ) -> Result<(), CommandError> {
-        let job = self.begin_job_on_the_way(listener)?;
+        let job = self.begin_job_while_travelling(listener)?;
         if !self.begins_early(job) {
             self.job = job.ordered(self.words, listener)?;
             Self::make_room(listener, records::flash_bytes(&self.job))?;
@@ -237,7 +238,7 @@ impl<I: Index> Inner<'_, I> {
     /// Computes the drawing of `$plot`, in place of the last job, while the pen travels to where it
     /// will probably begin.
     #[inline(never)] // Keeps its frame off the stack while the order is computed.
-    fn begin_job_on_the_way<B: Board>(
+    fn begin_job_while_travelling<B: Board>(
         &mut self,
         listener: &mut Listener<'_, B>,
     ) -> Result<Job<I>, CommandError> {
@@ -245,14 +246,14 @@ impl<I: Index> Inner<'_, I> {
         let (steps, early) = (self.machine.settings().page_steps(), self.early());
         let time_model = self.machine.settings().time_model(self.units_per_second());
         let Self { model, options, words, machine, .. } = self;
-        let mut approach = Approach { listener, machine, is_on_the_way: false, checks: 0 };
-        let (cancel, observer) = (&mut approach, &mut Unobserved);
+        let mut travel = EarlyTravel { listener, machine, is_travelling: false, checks: 0 };
+        let (cancel, observer) = (&mut travel, &mut Unobserved);
         let begun =
             Pipeline { model, options, steps, time_model, early, words, cancel, observer }.begin();
         if begun.is_ok() {
-            approach.arrive()?;
-        } else if approach.is_on_the_way {
-            approach.machine.abort();
+            travel.arrive()?;
+        } else if travel.is_travelling {
+            travel.machine.abort();
         }
         begun
     }
@@ -354,7 +355,7 @@ impl<I: Index> Inner<'_, I> {
         let board = &mut *listener.board;
         let ordered = job.ordered_by(words, |begun, scratch, rest, unordered| {
             let Unordered { first, options } = unordered;
-            let mut meanwhile = Meanwhile { inner: self, board, begun, status_due: false };
+            let mut meanwhile = OrderCancel { inner: self, board, begun, status_due: false };
             let Begun { drawing, drawn } = begun;
             order::order_rest(drawing, first, drawn, options, scratch, &mut meanwhile, rest)
         });

@@ -1,13 +1,12 @@
-//! What a board with flash keeps through a loss of power: the records, and how far the job has
-//! come.
+//! The records that a board with flash keeps through a loss of power, and the progress of the job.
 //!
 //! A board owns a [`FlashRecords`] and passes its calls of [`Board`](super::Board) on to it.
 
 use super::{NotStored, Record, Stored};
-use crate::storage::{Log, Noted, Slots};
+use crate::storage::{Log, LogProgress, Slots};
 use embedded_storage::nor_flash::MultiwriteNorFlash;
 
-/// Where in the flash each record lies.
+/// The addresses of the records in the flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Layout {
     /// The settings of the machine.
@@ -16,7 +15,7 @@ pub struct Layout {
     pub parameters: Slots,
     /// The strokes of the last job.
     pub job: Slots,
-    /// How far the job has come: a log for each of the job's two slots.
+    /// The logs of the progress of the job: one for each of the two slots of the job.
     pub logs: [Log; 2],
 }
 
@@ -55,10 +54,10 @@ impl Layout {
 /// The log that is written while a job is drawn.
 #[derive(Debug, Clone, Copy)]
 struct OpenLog {
-    /// Where it lies in the flash.
+    /// The location of the log in the flash.
     log: Log,
-    /// How many strokes are noted in it, and how many points within strokes.
-    noted: Noted,
+    /// The numbers of strokes, and of points within strokes, that are noted in it.
+    noted: LogProgress,
 }
 
 /// The records in the flash `F`.
@@ -66,22 +65,22 @@ struct OpenLog {
 pub struct FlashRecords<F> {
     /// The flash.
     pub flash: F,
-    /// Where in it each record lies.
+    /// The addresses of the records.
     layout: Layout,
     /// The log of the job that is being drawn, or that could go on.
     open: Option<OpenLog>,
-    /// What has been erased for the next job.
+    /// The parts of the flash that were erased in advance for the next job.
     #[cfg(feature = "early-ink")]
-    ahead: Ahead,
+    ahead: ErasedAhead,
 }
 
-/// What has been erased for the next job, and not been written since.
+/// The parts of the flash that were erased in advance for the next job, and were not written since.
 #[cfg(feature = "early-ink")]
 #[derive(Debug, Clone, Copy, Default)]
-struct Ahead {
+struct ErasedAhead {
     /// The number of bytes of the slot that is written next, from its beginning on.
     job: u32,
-    /// The number of the slot whose log it is, if the log is erased.
+    /// The number of the slot whose log is erased, if one is.
     log: Option<usize>,
 }
 
@@ -93,7 +92,7 @@ impl<F: MultiwriteNorFlash> FlashRecords<F> {
             layout,
             open: None,
             #[cfg(feature = "early-ink")]
-            ahead: Ahead { job: 0, log: None },
+            ahead: ErasedAhead { job: 0, log: None },
         }
     }
 
@@ -213,7 +212,7 @@ impl<F: MultiwriteNorFlash> FlashRecords<F> {
         #[cfg(not(feature = "early-ink"))]
         let begun = log.begin(&mut self.flash, sum, notes);
         begun.map_err(|_| NotStored)?;
-        self.open = Some(OpenLog { log, noted: Noted::default() });
+        self.open = Some(OpenLog { log, noted: LogProgress::default() });
         Ok(())
     }
 
@@ -240,7 +239,7 @@ impl<F: MultiwriteNorFlash> FlashRecords<F> {
     }
 
     /// Carries out [`Board::progress`](super::Board::progress).
-    pub fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
+    pub fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, LogProgress)> {
         let (slot, sum) = self.layout.job.identify(&mut self.flash)?;
         let log = *self.layout.logs.get(slot)?;
         let (length, noted) = log.read(&mut self.flash, sum, notes)?;

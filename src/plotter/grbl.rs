@@ -18,7 +18,7 @@ use crate::protocol::{BlockError, CommandError, GCode, Significant};
 /// The idleness that ends a program, in microseconds.
 const IDLE_MICROSECONDS: u32 = 1_000_000;
 
-/// Work on the flash that takes less than this many microseconds has kept nobody waiting.
+/// If work on the flash took less than this many microseconds, nobody was kept waiting.
 #[cfg(feature = "early-ink")]
 const UNNOTICED_MICROSECONDS: u32 = 2_000;
 
@@ -252,7 +252,7 @@ impl<I: Index> Inner<'_, I> {
                 Err(error) => Reply(board).line(format_args!(">{line}:error:{}", error.number())),
             }
         }
-        // These lines are no program.
+        // These lines are not part of a program, so there is nothing to report at its end.
         let _ = self.program.end(self.machine.settings());
     }
 

@@ -21,22 +21,22 @@ pub(super) struct HpGl<'m> {
     /// The port whose HP-GL is carried out.
     port: Option<usize>,
     session: &'m mut Session,
-    /// Whether the user has been asked for the pen that the present order needs.
+    /// Whether the user has been asked for the pen that the current order needs.
     has_asked: bool,
     /// Whether something was to be drawn while the machine was locked. Nothing is drawn then until
     /// the next `IN`.
     was_locked: bool,
 }
 
-/// What came of an order.
+/// The result of trying to carry out an order.
 enum Outcome {
-    /// It is over.
+    /// The order is complete.
     Done,
     /// A part of it was carried out.
     More,
-    /// It waits for the machine.
+    /// The order has to wait for the machine.
     Waits,
-    /// It cannot be carried out.
+    /// The order cannot be carried out.
     Refused,
 }
 

@@ -123,17 +123,18 @@ pub struct Plotter<'m, I = u16> {
     port: usize,
     /// Whether and how the reply to that line is numbered and checked.
     label: Label,
-    /// All that carries out a line. It is apart from the lines, which stay borrowed meanwhile.
+    /// Everything that carries out a line. It is separate from the lines, which stay borrowed
+    /// meanwhile.
     inner: Inner<'m, I>,
     /// Whether a status report was asked for and waits for room in the output.
     status_due: bool,
-    /// HP-GL, where it takes the place of lines.
+    /// The state of HP-GL, which may take the place of lines.
     #[cfg(feature = "hpgl")]
     hpgl: hpgl::HpGl<'m>,
 }
 
-/// What is left to do after a line has been carried out. Jobs are left to the caller, because their
-/// computation needs much stack.
+/// The task that is left after a line has been carried out. Jobs are left to the caller, because
+/// their computation needs much stack.
 enum Next {
     /// The line has been carried out completely.
     Nothing,
@@ -182,27 +183,28 @@ struct Inner<'m, I> {
     /// The job whose order is known, but not released yet.
     #[cfg(feature = "early-ink")]
     pending: Option<early::Pending<I>>,
-    /// How far the strokes of a job have come that are sent while they are drawn.
+    /// The progress of a job whose strokes are sent while they are drawn.
     #[cfg(feature = "stream")]
     streamed: streamed::Streamed,
-    /// What the flash for models holds.
+    /// The state of the model in flash.
     #[cfg(feature = "tiles")]
-    large: stored::Large,
-    /// How far the drawing of a model in flash has come.
+    large: stored::FlashModel,
+    /// The progress of drawing a model in flash.
     #[cfg(feature = "tiles")]
     parts: stored::Parts<I>,
     /// The modes that lines of G-code have set.
     program: Program,
-    /// What stays when a program ends.
+    /// What is kept when a program ends.
     parameters: Parameters,
-    /// What is known of the job that could go on.
+    /// What is known of a job that can be resumed.
     resumption: Resumption,
     /// When the plotter last had something to do, in microseconds of the board's clock.
     busy_at: u32,
-    /// When the machine moved last, as [`Board::microseconds`] tells it.
+    /// The time of the last movement, as [`Board::microseconds`] tells it.
     #[cfg(feature = "driver-pins")]
     moved_at: u32,
-    /// When status reports next hold what they hold now and then.
+    /// The counters that decide when status reports contain the parts that are only sent now and
+    /// then.
     report_counts: ReportCounts,
     /// The task of a line that takes longer. The line is answered when the task is done.
     task: Option<Task>,
@@ -258,7 +260,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 #[cfg(feature = "early-ink")]
                 pending: None,
                 #[cfg(feature = "tiles")]
-                large: stored::Large::default(),
+                large: stored::FlashModel::default(),
                 #[cfg(feature = "tiles")]
                 parts: stored::Parts::default(),
                 program: Program::default(),
@@ -277,7 +279,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         }
     }
 
-    /// Takes what else the board has kept, and greets the user, as after every reset.
+    /// Loads the rest of what the board has kept, and greets the user, as after every reset.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn begin<B: Board>(&mut self, board: &mut B) {
         if board.fault().is_some() {
@@ -445,11 +447,11 @@ impl<'m, I: Index> Plotter<'m, I> {
             return false;
         }
         let tended = self.inner.tend_parts(board);
-        if tended == stored::Tended::Aborted {
+        if tended == stored::PartsProgress::Aborted {
             self.inner.machine.abort();
             self.reset(board);
         }
-        tended != stored::Tended::Idle
+        tended != stored::PartsProgress::Idle
     }
 
     /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
@@ -511,7 +513,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor, ends)
     }
 
-    /// Carries out the real-time `requests`, and whatever else does not come by a line.
+    /// Carries out the real-time `requests`, and everything else that does not come by a line.
     fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
         let state = self.inner.machine.state();
         report::greet_opened(state, self.inner.resumption, board);

@@ -30,8 +30,8 @@ pub(super) enum Drawing {
     },
 }
 
-/// For this many microseconds the user is listened to between two erasures of the flash: what is
-/// answered has left before the next one begins.
+/// The time in microseconds for which the plotter listens to the user between two erasures of the
+/// flash, so that its answers have been sent before the next erasure begins.
 #[cfg(feature = "early-ink")]
 pub(super) const ANSWER_MICROSECONDS: u32 = 10_000;
 
@@ -110,12 +110,12 @@ impl<I: Index> Inner<'_, I> {
     /// [`Aborted`] if the user does not want what comes next.
     #[cfg(all(feature = "stream", feature = "resume"))]
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn stand<B: Board>(&mut self, board: &mut B) -> Result<(), Aborted> {
+    pub(super) fn wait_until_idle<B: Board>(&mut self, board: &mut B) -> Result<(), Aborted> {
         let [x, y] = self.machine.position_mm();
         let (position, inches) = ([x, y, self.program.z()], self.in_inches());
         let mut listener = Listener::new(board, position, inches);
         self.settle(&mut listener)?;
-        // The rest of a job that has stopped goes on in its log.
+        // The rest of a job that has stopped continues in the log of that job.
         #[cfg(feature = "early-ink")]
         if self.resumption.stopped(State::Idle).is_none() {
             Self::make_room(&mut listener, 2 * PAGE_BYTES as u32)?;
@@ -217,7 +217,7 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// Ends the last job, whose memory is overwritten, even if the next one fails.
+    /// Discards the last job, because its memory is overwritten even if the next one fails.
     #[inline(always)] // Adds no frame to the stack.
     pub(super) fn forget_job(&mut self) {
         self.copy_words = 0;
@@ -225,7 +225,7 @@ impl<I: Index> Inner<'_, I> {
         self.cursor = Cursor::default();
     }
 
-    /// What computes the job of `$plot`.
+    /// Creates the pipeline that computes the job of `$plot`.
     #[inline(always)] // Adds no frame to the stack.
     pub(super) fn pipeline<'p>(
         &'p mut self,

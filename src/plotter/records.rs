@@ -183,7 +183,7 @@ pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotS
 /// alone. When the order is known, it is added: the number of strokes, the figures, and the legs.
 #[cfg(feature = "early-ink")]
 const BEGUN_LAYOUT: u32 = u32::from_le_bytes(*b"job2");
-/// Number of words before the drawing of such a job.
+/// Number of words before the drawing of a job whose order is not known yet.
 #[cfg(feature = "early-ink")]
 const BEGUN_HEADER: usize = JOB_HEADER + UNORDERED_WORDS;
 /// Number of words before the legs of an order.
@@ -266,8 +266,8 @@ pub(super) fn strokes_of_added_order<B: Board>(board: &mut B) -> Option<u32> {
     strokes
 }
 
-/// Loads the order that was added to a kept job, whose drawing is in `words`. Returns the job as it
-/// was if none was added.
+/// Loads the order that was added to a kept job, whose drawing is in `words`. If none was added,
+/// returns the job as it was.
 #[cfg(feature = "early-ink")]
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 fn load_order<B: Board, I: Index>(begun: Job<I>, words: &mut [u64], board: &mut B) -> Job<I> {

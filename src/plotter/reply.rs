@@ -73,16 +73,16 @@ impl<B: Board + ?Sized> Reply<'_, B> {
             self.0.write(text.as_bytes());
         };
         // Writing to the serial line may block, but it does not fail.
-        let _ = fmt::write(&mut Pieces(&mut write), arguments);
+        let _ = fmt::write(&mut PieceWriter(&mut write), arguments);
         let sum = digest.finalize();
         if with_crc { self.line(format_args!("*{sum:04X}")) } else { self.line(format_args!("")) }
     }
 }
 
 /// Hands formatted text on to a callback, piece by piece as it is formatted.
-struct Pieces<'w>(&'w mut dyn FnMut(&str));
+struct PieceWriter<'w>(&'w mut dyn FnMut(&str));
 
-impl Write for Pieces<'_> {
+impl Write for PieceWriter<'_> {
     fn write_str(&mut self, text: &str) -> fmt::Result {
         (self.0)(text);
         Ok(())

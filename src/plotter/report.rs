@@ -13,7 +13,8 @@ use crate::protocol::AlarmEntry;
 /// The number of bytes that a port receives before any is read.
 const RECEIVE_BYTES: usize = 255;
 
-/// The numbers of status reports until the next one with what they hold now and then.
+/// For each part that status reports contain only now and then, the number of reports until the
+/// next one that contains it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct ReportCounts {
     /// Until the origin of the coordinates.
@@ -60,7 +61,8 @@ pub(super) fn fault<B: Board>(board: &mut B) {
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Says so if the machine is slower than its settings ask for, unless it was as slow `before`.
+    /// Tells the user if the machine is slower than its settings ask for, unless it was as slow
+    /// `before`.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn report_held<B: Board>(&self, before: Option<Value>, board: &mut B) {
         let held = self.machine.held_to();
@@ -97,7 +99,7 @@ impl<I: Index> Inner<'_, I> {
         Reply(board).line(format_args!("[OPT:VZ,{blocks},{RECEIVE_BYTES}]"));
     }
 
-    /// The last job, or the one that is drawn and whose strokes are not all released yet.
+    /// The job that is drawn and whose strokes are not all released yet, or else the last job.
     fn known_job(&self) -> &Job<I> {
         #[cfg(feature = "early-ink")]
         if let Some(pending) = &self.pending {

@@ -19,7 +19,7 @@ use super::Reply;
 use super::{Board, Inner};
 use crate::index::Index;
 
-/// What is known of the job that could go on.
+/// What is known of a job that can be resumed.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Resumption {
     /// How many strokes of the kept job are drawn, and how many there are; `None` if there is no
@@ -30,7 +30,7 @@ pub(super) struct Resumption {
     /// and have more strokes than the flash notes.
     #[cfg(feature = "resume")]
     more_at_once: u32,
-    /// How many strokes of a job that is sent were drawn before its sender went on.
+    /// The number of strokes of a job that is sent that were drawn before its sender resumed it.
     #[cfg(feature = "resume")]
     drawn_before: u32,
     /// Whether the position of the pen is not known since the job stopped.
@@ -49,7 +49,7 @@ mod with_feature {
     use crate::plotter::records;
     use crate::protocol::CommandError;
     use crate::stage::Cancel;
-    use crate::storage::Noted;
+    use crate::storage::LogProgress;
 
     /// The settings that decide where ink falls, so that they must be the same in all parts of a
     /// drawing.
@@ -158,8 +158,8 @@ mod with_feature {
     }
 
     impl<I: Index> Inner<'_, I> {
-        /// The order of the job has become known, and with it the number of strokes. `kept` says
-        /// whether the flash has taken it.
+        /// Records that the order of the job has become known, and with it the number of strokes.
+        /// `kept` says whether the flash has stored it.
         #[cfg(feature = "early-ink")]
         #[inline(never)] // Keeps its frame off the stack while the stages run.
         pub(in crate::plotter) fn order_kept<B: Board>(
@@ -223,7 +223,7 @@ mod with_feature {
             }
         }
 
-        /// Keeps that this many strokes have been drawn.
+        /// Records in flash that this many strokes have been drawn.
         #[inline(never)] // Inlined, it would take room in the main loop.
         fn note_stroke<B: Board>(&mut self, strokes: u32, board: &mut B) {
             let at_once = self.resumption.more_at_once.saturating_add(1);
@@ -242,7 +242,7 @@ mod with_feature {
             }
         }
 
-        /// Keeps that this many points within strokes have been passed.
+        /// Records in flash that this many points within strokes have been passed.
         #[inline(never)] // Inlined, it would take room in the main loop.
         fn note_point<B: Board>(&mut self, points: u32, board: &mut B) {
             let kept = board.note_point(points);
@@ -266,7 +266,7 @@ mod with_feature {
             &mut self,
             at_origin: bool,
             board: &mut B,
-        ) -> Result<Option<Noted>, CommandError> {
+        ) -> Result<Option<LogProgress>, CommandError> {
             let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
             let all = all_strokes(&notes, board);
             if done(&notes, noted) >= all {
@@ -323,14 +323,15 @@ mod with_feature {
             Ok(())
         }
 
-        /// Hands the rest of the job to the machine, of which so much is `drawn`.
+        /// Hands the rest of the job to the machine. `drawn` is the part that has been drawn
+        /// already.
         ///
         /// # Errors
         /// The machine's refusal, or [`CommandError::Aborted`].
         #[inline(never)] // Keeps its frame off the stack while the stages run.
         pub(in crate::plotter) fn begin_rest(
             &mut self,
-            drawn: Noted,
+            drawn: LogProgress,
             cancel: &mut dyn Cancel,
         ) -> Result<(), CommandError> {
             let ends = self.machine.stroke_ends();
@@ -346,7 +347,7 @@ mod with_feature {
             let (mut points, distance) = (0, self.machine.point_distance());
             if drawn.points > 0 && distance > 0 {
                 let length = |ends| self.machine.length(ends);
-                let Noted { parts, points: passed } = drawn;
+                let LogProgress { parts, points: passed } = drawn;
                 points = strokes.strokes.begin_at_point(parts, passed, distance, &length);
             }
             self.machine.start_rest(&mut strokes, whole)?;
@@ -390,8 +391,7 @@ mod with_feature {
                 };
                 return;
             }
-            // It takes the place of the job that `$again` would draw, which is not the last one any
-            // more.
+            // This job replaces the one that `$again` would draw, which is no longer the last one.
             if records::save_streamed(id, board).is_err() {
                 return refuse(board);
             }
@@ -442,8 +442,9 @@ mod with_feature {
         word(notes, 0) == STREAMED
     }
 
-    /// How many strokes of a job with these notes are drawn once so much is noted.
-    fn done(notes: &Notes, noted: Noted) -> u32 {
+    /// Returns the number of strokes of a job with these notes that are drawn, according to its
+    /// log.
+    fn done(notes: &Notes, noted: LogProgress) -> u32 {
         let (strokes, at_once) = (word(notes, 2), word(notes, 3));
         if is_streamed(notes) {
             noted.parts.saturating_mul(at_once).min(strokes)
@@ -453,7 +454,7 @@ mod with_feature {
     }
 
     /// Reads the notes of the kept job, and how much of it is drawn.
-    fn read<B: Board>(board: &mut B) -> Option<(Notes, Noted)> {
+    fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
         let mut notes: Notes = [[0; 4]; WORDS];
         let (length, noted) = board.progress(notes.as_flattened_mut())?;
         let layout = word(&notes, 0);

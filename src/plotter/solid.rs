@@ -94,7 +94,7 @@ struct Edges<'a, I> {
     shown: usize,
     /// Number of hidden edges, which are at the back of `pairs`.
     hidden: usize,
-    /// What becomes of hidden edges; they are kept only if they are drawn.
+    /// The treatment of hidden edges; they are stored only if they are drawn.
     wanted: HiddenLines,
 }
 

@@ -16,7 +16,8 @@ use crate::protocol::{AlarmEntry, CommandError, GCode, RealTime};
 use crate::step::{Arc, Chords, Line};
 use core::fmt;
 
-/// What is left to do for the line that is being carried out, which takes longer than others.
+/// The task that is left for the line that is being carried out, if the line takes longer than
+/// others.
 #[derive(Debug)]
 pub(super) enum Task {
     /// The rest of an arc, from the point reached so far.
@@ -287,7 +288,7 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// What the interpreter must know beside the line.
+    /// Returns the state that the interpreter needs besides the line.
     pub(super) fn context(&self) -> Context<'_> {
         let settings = self.machine.settings();
         let park = [settings.get(Setting::ParkX), settings.get(Setting::ParkY)];

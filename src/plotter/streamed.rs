@@ -18,10 +18,10 @@ const COORDINATE_BITS: u32 = 21;
 /// The number of bits of a pen's number.
 const PEN_BITS: u32 = 5;
 
-/// How far the strokes have come.
+/// The progress of strokes that are sent while they are drawn.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Streamed {
-    /// What was said of the job before its strokes; without targets if there is no such job.
+    /// The header that was sent before the strokes; without targets if there is no such job.
     header: StreamHeader,
     /// The number of targets that have come.
     taken: u32,
@@ -30,7 +30,7 @@ pub(super) struct Streamed {
 }
 
 impl Streamed {
-    /// A job of which it is not known yet how many targets it has.
+    /// Creates the state of a job whose number of targets is not known yet.
     #[cfg(feature = "tiles")]
     pub(super) fn open_ended() -> Self {
         let header = StreamHeader { targets: u32::MAX, ..StreamHeader::default() };
@@ -92,7 +92,8 @@ fn unpacked(ring: &[u64], index: usize) -> Option<StreamedTarget> {
 }
 
 impl<I: Index> Strokes<'_, I> {
-    /// The next target that was sent, behind the strokes of the job, of which such a job has none.
+    /// Returns the next target that was sent. A job of this kind has no strokes besides those that
+    /// are sent.
     #[inline(never)] // Other jobs come here once, at their end.
     pub(super) fn next_streamed(&mut self) -> Option<Target> {
         let StreamedTarget { target, pen } = self.streamed?.target(self.ring, self.cursor.leg)?;
@@ -101,7 +102,7 @@ impl<I: Index> Strokes<'_, I> {
         Some(target)
     }
 
-    /// Whether the next target has not come yet, or not all of its stroke.
+    /// Returns the pending target if the next target, or a part of its stroke, has not come yet.
     #[inline(never)] // Other jobs come here once, at their end.
     pub(super) fn lateness(&self) -> Option<PendingTarget> {
         let (streamed, read) = (self.streamed?, self.cursor.leg);
@@ -114,15 +115,15 @@ impl<I: Index> Strokes<'_, I> {
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Of strokes that are being sent: how many targets have come, how many there are, and how many
-    /// more there is room for.
+    /// For a job whose strokes are being sent, returns how many targets have come, how many there
+    /// are in all, and for how many more there is room.
     pub(super) fn streamed_targets(&self) -> Option<[u32; 3]> {
         let Streamed { header, taken, .. } = self.streamed;
         let room = self.streamed.room(self.words.len(), self.cursor.leg);
         self.is_streamed().then_some([taken, header.targets, room as u32])
     }
 
-    /// Whether strokes are being sent that the machine draws.
+    /// Whether the machine draws a job whose strokes are being sent.
     pub(super) fn is_streamed(&self) -> bool {
         #[cfg(feature = "tiles")]
         if self.parts.is_active() {
@@ -163,7 +164,7 @@ impl<I: Index> Inner<'_, I> {
             return Err(CommandError::OtherSteps);
         }
         #[cfg(feature = "resume")]
-        if self.machine.state() == State::Idle && self.stand(board).is_err() {
+        if self.machine.state() == State::Idle && self.wait_until_idle(board).is_err() {
             return Err(CommandError::Aborted);
         }
         self.machine.start_streamed(header.size, [header.least, header.greatest])?;
@@ -208,7 +209,7 @@ impl<I: Index> Inner<'_, I> {
             let place = (end as usize).checked_rem(length);
             let Some(word) = place.and_then(|place| self.words.get_mut(place)) else { break };
             *word = packed(target);
-            // What comes before a move with the pen up, or before another pen, is whole strokes.
+            // A move with the pen up, or a change of the pen, completes the strokes before it.
             if target.target.ink.is_none() {
                 released = end + 1;
             } else if pen.is_some_and(|pen| pen != target.pen) {

@@ -15,7 +15,7 @@ pub struct AlarmEntry {
     pub cause: HostOnly<&'static str>,
     /// What the user can do about it, by lines at the serial port.
     pub cure: HostOnly<&'static str>,
-    /// The same by commands of the client.
+    /// What the user can do about it, by commands of the client.
     pub for_client: HostOnly<&'static str>,
 }
 

@@ -71,11 +71,11 @@ pub enum Command<'a> {
     SetInfo(&'a str),
     /// `$RST=…`: restores defaults.
     Restore {
-        /// Whether those of the settings.
+        /// Whether to reset the settings.
         settings: bool,
-        /// Whether those of the coordinate systems.
+        /// Whether to reset the parameters of the coordinate systems.
         parameters: bool,
-        /// Whether those of the startup lines and the text of `$I`.
+        /// Whether to reset the startup lines and the text of `$I`.
         texts: bool,
     },
     /// `$options`: lists the options of the plot.

@@ -92,9 +92,9 @@ impl<'a> GCode<'a> {
     }
 }
 
-/// Which part of a line of G-code a byte belongs to.
+/// The part of a line of G-code to which a byte belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) enum Part {
+pub(super) enum LinePart {
     /// Outside comments.
     #[default]
     Code,
@@ -104,8 +104,8 @@ pub(super) enum Part {
     Rest,
 }
 
-impl Part {
-    /// Goes on by a byte. Returns whether the byte belongs to a comment or bounds it.
+impl LinePart {
+    /// Takes the next byte. Returns whether the byte belongs to a comment or delimits one.
     pub(super) fn takes(&mut self, byte: u8) -> bool {
         let was = *self;
         *self = match (was, byte) {
@@ -126,7 +126,7 @@ impl Iterator for Significant<'_> {
     type Item = u8;
 
     fn next(&mut self) -> Option<u8> {
-        let mut part = Part::Code;
+        let mut part = LinePart::Code;
         loop {
             let byte = self.0.next()?;
             if !part.takes(byte) && matches!(byte, b'!'..=b'~') && !matches!(byte, b'/' | b'%') {

@@ -3,7 +3,7 @@
 //! A line of G-code may hold comments of any length and any bytes, as Grbl allows: what does not
 //! fit of its comments is dropped, and so are bytes that are no text.
 
-use super::gcode::Part;
+use super::gcode::LinePart;
 use super::numbering::NUMBER_LIMIT;
 use super::values::trim;
 use super::{CommandError, DAMAGED, GCode};
@@ -23,7 +23,7 @@ pub struct LineReader {
     /// Whether comments have given way.
     is_cut: bool,
     /// The part of the line that the last byte belongs to, once comments have given way.
-    part: Part,
+    part: LinePart,
     /// The byte that ended the previous line, until the next byte comes.
     ended_by: Option<u8>,
 }
@@ -33,7 +33,7 @@ impl LineReader {
     pub const fn new() -> Self {
         let bytes = heapless::Vec::new();
         let (too_long, damaged, is_cut) = (false, false, false);
-        Self { bytes, too_long, damaged, is_cut, part: Part::Code, ended_by: None }
+        Self { bytes, too_long, damaged, is_cut, part: LinePart::Code, ended_by: None }
     }
 
     /// Adds a byte. At the end of a line (LF, CR or CR LF), returns the line, even if it is empty,
@@ -87,7 +87,7 @@ impl LineReader {
             self.too_long = true;
             return;
         }
-        let mut part = Part::Code;
+        let mut part = LinePart::Code;
         self.bytes.retain(|byte| !part.takes(*byte));
         (self.is_cut, self.part) = (true, part);
         if !self.bytes.is_full() {

@@ -45,9 +45,9 @@ pub struct Receiver<'q> {
 enum Damage {
     /// No bytes are missing there.
     None,
-    /// They are, but the queue has had no room for the mark yet.
+    /// Bytes were lost, but the queue has had no room for the mark yet.
     Unmarked,
-    /// They are, and the mark that says so is in the queue.
+    /// Bytes were lost, and the mark that says so is in the queue.
     Marked,
 }
 

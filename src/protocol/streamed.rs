@@ -52,8 +52,8 @@ impl StreamHeader {
 
     /// Parses the text after `$stream=`: whole numbers with commas between them.
     ///
-    /// # Errors
-    /// The numbers are not so many, or one is none, or it is too large.
+    /// # Errors There are too few or too many numbers, or one of them is not a number or is too
+    /// large.
     pub fn parse(text: &str) -> Result<Self, CommandError> {
         let wrong_count = CommandError::WrongNumberCount { needed: Self::COUNT };
         let mut parts = text.split(',');

@@ -59,7 +59,7 @@ impl Pattern {
         if self.repeats == 0 { self.moves } else { self.end_of_dash(piece) }
     }
 
-    /// The same of a line with gaps.
+    /// Returns the end of a piece of a line with gaps.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     const fn end_of_dash(self, piece: u32) -> u32 {
         let Dashes { lengths, period, .. } = self.line_type.dashes();

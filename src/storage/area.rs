@@ -54,9 +54,9 @@ pub trait AreaFlash {
 /// Which of the two contents of an area.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// Those that grow upwards from the second page.
+    /// The contents that grow upwards from the second page.
     Low,
-    /// Those that grow downwards from the end.
+    /// The contents that grow downwards from the end.
     High,
 }
 
@@ -64,10 +64,10 @@ pub enum Side {
 #[derive(Debug, Clone, Copy)]
 pub struct Area<'f>(&'f [AtomicU32]);
 
-/// A record, and how long both contents are to which it belongs.
+/// A record about both contents of an area, with their lengths.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AreaRecord {
-    /// What the owner has written.
+    /// The words of the record, which the owner chooses.
     pub words: [u32; RECORD_WORDS],
     /// The lengths of the low and the high contents, in bytes.
     pub lengths: [usize; 2],
@@ -88,7 +88,7 @@ impl<'f> Area<'f> {
         size_of_val(self.0)
     }
 
-    /// The word with this index. Beyond the end it is empty.
+    /// The word with this index. Words beyond the end count as empty.
     #[inline]
     pub fn word(self, index: usize) -> u32 {
         self.0.get(index).map_or(EMPTY, |word| word.load(Ordering::Relaxed))
@@ -101,7 +101,7 @@ impl<'f> Area<'f> {
     /// order in which they came.
     #[inline]
     pub fn high_3(self, after: usize) -> [u8; 3] {
-        // They lie downwards, so the last of the three comes first.
+        // The high contents grow downwards, so the last of the three bytes comes first.
         let Some(at) = self.bytes().checked_sub(after + 3) else { return [0xFF; 3] };
         let (index, shift) = (at / 4, at % 4 * 8);
         let mut bits = self.word(index) >> shift;
@@ -112,7 +112,7 @@ impl<'f> Area<'f> {
         [first, second, third]
     }
 
-    /// The record, if it is whole. That of the contents themselves is not checked: see
+    /// The record, if it is complete. This does not check the contents themselves: see
     /// [`Area::is_sound`].
     pub fn record(self) -> Option<AreaRecord> {
         let page = self.first_page();
@@ -155,7 +155,7 @@ impl<'f> Area<'f> {
                 }
                 let bytes = match side {
                     0 => self.word(Self::LOW + number).to_le_bytes(),
-                    // They lie downwards.
+                    // The high contents grow downwards.
                     _ => self.word(end.saturating_sub(number + 1)).to_be_bytes(),
                 };
                 digest.update(bytes.get(..length - 4 * number).unwrap_or(&bytes));
@@ -196,12 +196,12 @@ fn pages(lengths: [usize; 2]) -> usize {
     low.saturating_add(high)
 }
 
-/// What has come of one of the two contents.
+/// The progress of writing one of the two contents.
 #[derive(Debug, Clone, Copy)]
-struct End {
+struct ContentEnd {
     /// The number of bytes.
     length: usize,
-    /// Those that do not fill a page yet, as they will lie in it.
+    /// The bytes that do not fill a page yet, in the order in which they will lie in it.
     page: [u8; PAGE_BYTES],
     /// The checksum of all that has come.
     digest: Crc32,
@@ -209,7 +209,7 @@ struct End {
     erased: usize,
 }
 
-impl End {
+impl ContentEnd {
     /// Nothing yet.
     const NEW: Self = Self { length: 0, page: [0xFF; PAGE_BYTES], digest: Crc32::new(), erased: 0 };
 }
@@ -217,14 +217,14 @@ impl End {
 /// Fills an area. Until [`AreaWriter::finish`] there is no record.
 #[derive(Debug, Clone, Copy)]
 pub struct AreaWriter {
-    /// What has come of the low contents.
-    low: End,
-    /// What has come of the high contents.
-    high: End,
+    /// The progress of the low contents.
+    low: ContentEnd,
+    /// The progress of the high contents.
+    high: ContentEnd,
 }
 
 impl AreaWriter {
-    /// Removes what the area holds, and begins to fill it.
+    /// Erases the area, and begins to fill it.
     ///
     /// # Errors
     /// [`NotWritten`]; the area is then empty, or holds what it held.
@@ -233,7 +233,7 @@ impl AreaWriter {
             return Err(NotWritten);
         }
         flash.erase_sector(0)?;
-        Ok(Self { low: End { erased: 1, ..End::NEW }, high: End::NEW })
+        Ok(Self { low: ContentEnd { erased: 1, ..ContentEnd::NEW }, high: ContentEnd::NEW })
     }
 
     /// Whether this many more bytes of both contents fit.
@@ -260,7 +260,7 @@ impl AreaWriter {
                 Side::High => (&mut self.high, PAGE_BYTES - 1),
             };
             let here = end.length % PAGE_BYTES;
-            // Downwards from the last byte for the high contents.
+            // The high contents fill the page downwards from its last byte.
             if let Some(slot) = end.page.get_mut(step.abs_diff(here)) {
                 *slot = byte;
             }

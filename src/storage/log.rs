@@ -20,15 +20,15 @@ const MARK: u32 = u32::from_le_bytes(*b"log1");
 const HEADER_BYTES: usize = 16;
 /// The most bytes of notes that a log holds.
 pub const NOTE_BYTES: usize = PAGE_BYTES - HEADER_BYTES;
-/// How many bytes of bits are read at a time.
+/// The number of bytes of bits that are read at a time.
 const PIECE_BYTES: usize = 32;
 
-/// How far the work has come that a log describes.
+/// The progress of the work that a log describes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct Noted {
-    /// How many parts of the work are done.
+pub struct LogProgress {
+    /// The number of parts of the work that are done.
     pub parts: u32,
-    /// How many points within its parts are passed, counted over all of the work.
+    /// The number of points within its parts that are passed, counted over the whole work.
     pub points: u32,
 }
 
@@ -87,7 +87,7 @@ impl Log {
         Ok(())
     }
 
-    /// Begins the log as [`Log::begin`] does, where it has been erased.
+    /// Begins the log as [`Log::begin`] does, if its flash has been erased already.
     ///
     /// # Errors
     /// As [`Log::begin`].
@@ -117,7 +117,7 @@ impl Log {
         flash: &mut F,
         of: u32,
         notes: &mut [u8],
-    ) -> Option<(usize, Noted)> {
+    ) -> Option<(usize, LogProgress)> {
         let mut header = [0; HEADER_BYTES];
         read_surely(flash, self.start, &mut header).ok()?;
         let [mark, found, length, sum] = words(header);
@@ -127,7 +127,7 @@ impl Log {
         }
         read_surely(flash, self.start + HEADER_BYTES as u32, notes).ok()?;
         (sum == checksum(of, notes)).then(|| {
-            let noted = Noted { parts: self.count(flash), points: self.count_points(flash) };
+            let noted = LogProgress { parts: self.count(flash), points: self.count_points(flash) };
             (notes.len(), noted)
         })
     }
@@ -269,11 +269,11 @@ mod tests {
             LOG.note(&mut flash, parts, next).unwrap();
             LOG.note_points(&mut flash, points, next_points).unwrap();
             (parts, points) = (next, next_points);
-            assert_eq!(read(&mut flash), Noted { parts, points });
+            assert_eq!(read(&mut flash), LogProgress { parts, points });
         }
         // Notes of a page less its head are too long by a byte, and leave the log as it was.
         assert!(LOG.begin(&mut flash, 7, &[0; 241]).is_err());
-        assert_eq!(read(&mut flash), Noted { parts, points });
+        assert_eq!(read(&mut flash), LogProgress { parts, points });
         // Another state has another log, and a page with another mark is none.
         assert!(LOG.read(&mut flash, 8, &mut [0; NOTE_BYTES]).is_none());
         flash.bytes[4096] ^= 1;

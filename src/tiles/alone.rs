@@ -116,7 +116,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         Ok(())
     }
 
-    /// Returns the ends of the seam with this number of two faces. `None` if they have fewer.
+    /// Returns the ends of the seam with this number of two faces. `None` if they have fewer seams.
     fn seam(
         &self,
         firsts: [usize; 2],

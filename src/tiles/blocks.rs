@@ -7,7 +7,7 @@ use crate::stage::{Cancel, Scratch, items};
 use crate::visibility::VisibilityError;
 use bytemuck::{Pod, Zeroable};
 
-/// The part of the working memory that the index takes at most is one in this many bytes.
+/// The index takes at most the working memory divided by this number.
 const SHARE: usize = 16;
 /// The fewest corners in a block: the index gains little from fewer.
 const FEWEST_CORNERS: usize = 24;
@@ -20,12 +20,12 @@ struct Block {
     low: [u8; 2],
     /// The upper right corner; it lies to the left of the other if the block is empty.
     high: [u8; 2],
-    /// How far an element of the block extends at most, to the right and upwards.
+    /// The greatest extent of an element of the block, to the right and upwards.
     extent: [u8; 2],
 }
 
 impl Block {
-    /// Makes the smallest one that contains a rectangle.
+    /// Returns the smallest block that contains a rectangle.
     fn around(bounds: Rectangle) -> Self {
         let coarse = |point: GridPoint| [(point.x >> 8) as u8, (point.y >> 8) as u8];
         Self { low: coarse(bounds.low), high: coarse(bounds.high), extent: [0; 2] }
@@ -36,7 +36,7 @@ impl Block {
         self.extent.map(|extent| u16::from(extent) << 8 | 0xFF)
     }
 
-    /// Whether it may meet another.
+    /// Whether the block may meet another one.
     fn meets(self, other: Self) -> bool {
         (0..2).all(|axis: usize| {
             self.low[axis] <= other.high[axis] && other.low[axis] <= self.high[axis]
@@ -50,7 +50,7 @@ const DIVISIONS: u16 = 16;
 /// The number of parts that this makes.
 const PARTS: usize = (DIVISIONS * DIVISIONS) as usize;
 
-/// How the index of a model lies in memory: the blocks, and the counts behind them.
+/// The layout of the index of a model in memory: the blocks, and the counts behind them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PausedBlocks {
     /// The number of blocks.
@@ -72,7 +72,8 @@ impl PausedBlocks {
 pub(super) struct Blocks<'t> {
     /// The blocks, in the order of the model.
     blocks: &'t [Block],
-    /// How many elements have their lower left corner in each part of the page, row by row.
+    /// The number of elements that have their lower left corner in each part of the page, row by
+    /// row.
     counts: &'t [u32],
     /// The number of corners of a block. An element belongs to the block in which it begins.
     length: usize,
@@ -121,7 +122,7 @@ impl<'t> Blocks<'t> {
         PausedBlocks { count: self.blocks.len(), length: self.length }
     }
 
-    /// Finds the index again, which lies at the front of the memory in which it was made.
+    /// Restores the index, which lies at the front of the memory in which it was made.
     pub fn go_on(paused: PausedBlocks, memory: &'t [u64]) -> Option<Self> {
         let PausedBlocks { count, length } = paused;
         let blocks = items(memory, count)?;
@@ -182,7 +183,7 @@ impl<'t> Blocks<'t> {
     }
 }
 
-/// How far one has gone through the blocks.
+/// The position in an iteration over the blocks.
 pub(super) struct BlockCursor {
     /// The rectangle that the blocks may meet.
     near: Block,
@@ -192,7 +193,7 @@ pub(super) struct BlockCursor {
     next: usize,
     /// The corner at which that block ends.
     end: usize,
-    /// How far the elements of that block extend on the grid at most.
+    /// The greatest extent of the elements of that block on the grid.
     extent: [u16; 2],
 }
 

@@ -24,9 +24,9 @@ const WANTED_TIMES: usize = 3;
 /// Which elements are loaded.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Reach {
-    /// Those that meet a rectangle of the page.
+    /// The elements that meet a rectangle of the page.
     Rectangle(Rectangle),
-    /// Those that may meet a segment of the page, or come so near to it.
+    /// The elements that may meet a segment of the page, or come within this distance of it.
     Segment([GridPoint; 2], u16),
     /// Two elements, which begin at these corners of the model.
     Pair([usize; 2]),
@@ -58,12 +58,12 @@ impl Reach {
 pub(super) struct Loaded<'a> {
     /// For each element the index of its first corner in the model.
     firsts: &'a [u32],
-    /// For each vertex its number in the model. Those where edges are cut, which come last, have
+    /// For each vertex its number in the model. The vertices where edges are cut come last and have
     /// none.
     numbers: &'a [u32],
     /// The positions of the vertices in the model, if they are known.
     positions: &'a [Position],
-    /// What the eye sees of the vertices, and of the points where edges are cut.
+    /// The view coordinates of the vertices, and of the points where edges are cut.
     vertices: &'a [Vertex],
     /// The faces and bars in front of the near plane.
     pub elements: Elements<'a, u16>,
@@ -290,7 +290,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
 struct Renumbered<'r, N> {
     /// For each vertex of a small scene its number in the model.
     numbers: &'r [u32],
-    /// What receives the stretches.
+    /// The receiver of the stretches.
     sink: &'r mut dyn StretchSink<N>,
 }
 

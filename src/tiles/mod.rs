@@ -54,7 +54,7 @@ use region::{PausedRegion, Region};
 pub use page::Survey;
 pub use source::{Projected, ProjectedStored};
 
-/// A model as it is read again and again: its corners, and its vertices as a camera sees them.
+/// A model that is read repeatedly: its corners, and its vertices as a camera sees them.
 pub trait ModelSource {
     /// Returns the number of corners of all faces and bars.
     fn corner_count(&self) -> usize;
@@ -74,14 +74,14 @@ pub trait ModelSource {
     fn vertex(&self, vertex: u32) -> Vertex;
 }
 
-/// How the model is seen.
+/// The parameters of the view of a model: how vertices are projected, and how exact they are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ViewParameters {
     /// Whether the view is perspective or parallel.
     pub projection: Projection,
     /// The least depth that is drawn; what is nearer is cut off.
     pub near: Option<i32>,
-    /// How far the positions may be off.
+    /// The greatest possible error of the positions in the model.
     pub precision: Precision,
     /// Twice the possible error of a view coordinate, at least 1.
     pub error_bound: u32,
@@ -96,20 +96,20 @@ const LOOK: usize = 3000;
 /// The number of instructions for placing an element on the page.
 const PLACE: usize = 8000;
 
-/// A region has a margin of one in this many points of its shorter side: the next tiles also need the
-/// elements beside them.
+/// The margin of a region is its shorter side divided by this number, because the next tiles also
+/// need the elements beside them.
 const REGION_MARGIN: u16 = 16;
 
-/// For each element of a tile this many bytes are needed in most models, for what lies beside the
-/// tile and for the search, too. A tile with more elements than that is divided before it is
-/// loaded.
+/// The bytes that are needed for each element of a tile in most models, including those for
+/// elements beside the tile and for the search. A tile with more elements than fit by this estimate
+/// is divided before it is loaded.
 const LIKELY_BYTES: usize = 72;
 
 /// The search for the stretches of a model, tile after tile.
 pub struct Tiles<'t, S> {
     /// The model.
     source: &'t S,
-    /// How it is seen.
+    /// The parameters of the view.
     parameters: ViewParameters,
     /// Which kinds of stretches the user wants to see.
     options: Options,

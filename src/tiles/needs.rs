@@ -6,9 +6,9 @@ use super::{LOOK, Listed, ModelSource, PLACE, Tiles};
 use crate::stage::Cancel;
 use crate::visibility::{VisibilityError, YieldCounter};
 
-/// What the edges and seams of a tile need.
+/// The memory and the elements that the edges and seams of a tile need.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Needs {
+pub(super) struct TileNeeds {
     /// The rectangle around all of them, [`Rectangle::NONE`] if there are none.
     pub all: Rectangle,
     /// The rectangle around those that are not longer than the tile.
@@ -65,10 +65,10 @@ impl<S: ModelSource> Tiles<'_, S> {
         no_small_faces: bool,
         listed: Option<&Listed<'_>>,
         cancel: &mut dyn Cancel,
-    ) -> Result<Needs, VisibilityError> {
+    ) -> Result<TileNeeds, VisibilityError> {
         let none = Rectangle::NONE;
         let mut needs =
-            Needs { all: none, short: none, long_sides: 0, large_pairs: 0, elements: 0 };
+            TileNeeds { all: none, short: none, long_sides: 0, large_pairs: 0, elements: 0 };
         let (mut faces, mut large_faces) = (Pairs::default(), Pairs::default());
         let (mut of_faces, mut of_small_faces) = (none, none);
         let limit = tile.extent();

@@ -15,7 +15,7 @@ pub(super) struct Outline<'s, S> {
     source: &'s S,
     /// The index of its first corner.
     first: usize,
-    /// Its first corner.
+    /// The first corner of the element.
     start: Corner<u32>,
     /// The index after that of its last corner.
     end: usize,
@@ -108,7 +108,8 @@ impl<'s, S: ModelSource> Outline<'s, S> {
         false
     }
 
-    /// Whether the rectangle around the outline meets another, which `window` stands for.
+    /// Whether the rectangle around the outline meets another one, whose bounds on the page are
+    /// `window`.
     #[inline(never)] // One copy of the code is enough: it is long.
     pub fn meets(
         &self,
@@ -121,7 +122,8 @@ impl<'s, S: ModelSource> Outline<'s, S> {
         for corner in self.first..self.end {
             let vertex = self.vertex(corner);
             if parameters.near.is_some_and(|near| vertex.z < near) {
-                // What the near plane leaves of it must be known.
+                // The near plane cuts the element, so the bounds of what is left of it must be
+                // computed.
                 return self.bounds(parameters, survey).is_some_and(|bounds| bounds.meets(other));
             }
             beyond &= window.outcode(parameters.projection, vertex);

@@ -9,16 +9,16 @@ use core::slice;
 
 /// Where the elements are found.
 enum Origin<'a> {
-    /// In a list that has all of them and no others.
+    /// In a list that contains exactly these elements.
     List(slice::Iter<'a, u32>),
-    /// In the region, which has others, too.
+    /// In the list of a region, which also contains other elements.
     Region(RegionCursor<'a>),
     /// In the blocks of the model that may meet the rectangle.
     Model(BlockCursor),
 }
 
-/// Iterates over the elements that may meet a rectangle, in the order of the model. Each other one
-/// that must be looked at is a `None`, so that the caller can check for cancelling.
+/// Iterates over the elements that may meet a rectangle, in the order of the model. Each other
+/// element that has to be examined yields `None`, so that the caller can check for cancelling.
 pub(super) struct Outlines<'a, 't, S> {
     /// The search.
     tiles: &'a Tiles<'t, S>,
@@ -26,12 +26,12 @@ pub(super) struct Outlines<'a, 't, S> {
     origin: Origin<'a>,
     /// The rectangle.
     near: Rectangle,
-    /// The same as bounds on the page.
+    /// The rectangle as bounds on the page.
     window: Window,
     /// The bounds within which each element begins that meets the rectangle, if it extends no
     /// farther than `extent`.
     around: Window,
-    /// How far the elements extend on the grid at most.
+    /// The greatest extent of the elements on the grid.
     extent: [u16; 2],
 }
 

@@ -12,12 +12,12 @@ use crate::visibility::Ownership;
 pub(super) struct OfTile<'o> {
     /// The points of the tile.
     pub tile: Rectangle,
-    /// How far an edge, and one of the two faces of a seam, may extend. Longer edges, and the seams
-    /// of two larger faces, are left to be followed one by one.
+    /// The greatest extent of an edge, and of one of the two faces of a seam. Longer edges, and the
+    /// seams of two larger faces, are left to be followed one by one.
     pub limit: Option<[u16; 2]>,
     /// Whether all faces count as large, because a seam may lie too far beside them.
     pub no_small_faces: bool,
-    /// What has been loaded.
+    /// The elements that have been loaded.
     pub loaded: &'o Loaded<'o>,
     /// The depth at which the model is cut.
     pub near: Option<i32>,
@@ -69,11 +69,11 @@ pub(super) struct OneSeam {
     pub firsts: [usize; 2],
     /// Which of their seams it is, in the order in which they are found.
     pub number: usize,
-    /// How many of their seams have been found.
+    /// The number of seams of the two faces that have been found.
     pub found: usize,
     /// Whether to follow it, not only to find it.
     pub is_followed: bool,
-    /// Its ends, once it has been found.
+    /// The ends of the seam, once it has been found.
     pub ends: Option<[Vertex; 2]>,
 }
 

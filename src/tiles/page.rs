@@ -127,15 +127,15 @@ impl Rectangle {
     }
 }
 
-/// What one pass over the model finds out about it.
+/// The results of one pass over the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Survey {
     /// The least x and y on the page of what is seen, in units of 2^-20.
     low: [i64; 2],
     /// The number of bits by which x and y are shifted right to give coordinates of the grid.
     shift: [u32; 2],
-    /// How far a point may lie beside its place on the grid for each half unit by which its view
-    /// coordinates may be off.
+    /// The greatest error of a point on the grid for each half unit of error of its view
+    /// coordinates.
     error_bound: u64,
     /// The number of faces that are left out because they have no area.
     pub degenerate_faces: u32,
@@ -205,7 +205,7 @@ impl Survey {
         self.window_around(rectangle, [0; 2])
     }
 
-    /// Returns a rectangle as bounds on the page, each of them so much farther out.
+    /// Returns a rectangle as bounds on the page, each of them moved outwards by this much.
     pub(super) fn window_around(&self, rectangle: Rectangle, by: [u16; 2]) -> Window {
         let Rectangle { low, high } = rectangle;
         let bound = |axis: usize, place: i64| self.low[axis] + (place << self.shift[axis]);
@@ -217,8 +217,8 @@ impl Survey {
         }
     }
 
-    /// Returns how far on the grid a point may be off whose view coordinates may be off by this many
-    /// halves of a unit.
+    /// Returns the greatest error on the grid of a point whose view coordinates may be off by this
+    /// many halves of a unit.
     pub(super) fn error_bound(&self, halves: u32) -> u16 {
         self.error_bound.saturating_mul(halves.into()).min(u16::MAX.into()) as u16
     }

@@ -8,27 +8,27 @@ use super::page::Rectangle;
 use crate::stage::{OutOfScratch, Scratch};
 use core::slice;
 
-/// The part of the working memory that the list takes is one in this many bytes.
+/// The list takes at most the working memory divided by this number.
 const SHARE: usize = 16;
 
-/// A region with fewer elements than one in this many for which there is room is small: the next one
-/// may be twice as large.
+/// A region is small if it has fewer elements than there is room for, divided by this number. Then
+/// the next one may be twice as large.
 const SMALL: usize = 4;
 
-/// A step over so many corners that leads to no element. A lesser one leads from the first corner
-/// of an element to that of the next.
+/// A step over this many corners leads to no element. A smaller step leads from the first corner of
+/// an element to that of the next.
 const FAR: u8 = u8::MAX;
 
-/// What is known of a region beside its list.
+/// The properties of a region that are stored beside its list.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PausedRegion {
     /// The rectangle whose elements are listed, [`Rectangle::NONE`] if none are.
     near: Rectangle,
-    /// How far an element of the list extends on the grid at most.
+    /// The greatest extent of an element of the list on the grid.
     extent: [u16; 2],
     /// The number of steps of the list.
     length: usize,
-    /// How often the page is divided to get the next region.
+    /// The number of times that the page is divided to get the next region.
     pub depth: u32,
     /// The number of words of memory.
     words: usize,
@@ -44,15 +44,15 @@ impl PausedRegion {
 /// The list of all elements that may meet a part of the page, in the order of the model.
 #[derive(Debug)]
 pub(super) struct Region<'t> {
-    /// The way from each element to the next, and from corner 0 to the first.
+    /// The number of corners from each element to the next, and from corner 0 to the first.
     steps: &'t mut [u8],
-    /// What else is known.
+    /// The other properties of the region.
     pub known: PausedRegion,
     /// The first corner of the element that was listed last.
     last: usize,
 }
 
-/// How far one has gone through the list.
+/// The position in an iteration over the list.
 pub(super) struct RegionCursor<'a> {
     /// The steps that are left.
     steps: slice::Iter<'a, u8>,
@@ -121,13 +121,13 @@ impl<'t> Region<'t> {
     /// Adds an element, given by its first corner, behind those that are listed. Returns whether
     /// there was room for it.
     pub fn push(&mut self, first: usize) -> bool {
-        let mut way = first.saturating_sub(self.last);
+        let mut distance = first.saturating_sub(self.last);
         self.last = first;
         loop {
             let Some(step) = self.steps.get_mut(self.known.length) else { return false };
             self.known.length += 1;
-            *step = way.min(FAR.into()) as u8;
-            way -= usize::from(*step);
+            *step = distance.min(FAR.into()) as u8;
+            distance -= usize::from(*step);
             if *step != FAR {
                 return true;
             }

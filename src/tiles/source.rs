@@ -23,14 +23,14 @@ impl<'m, I: Index> Projected<'m, I> {
         Self { positions: model.vertices(), elements: model.elements(), view }
     }
 
-    /// Returns how the model is seen if its positions have this precision.
+    /// Returns the parameters of the view of a model whose positions have this precision.
     pub fn parameters(&self, precision: Precision) -> ViewParameters {
         ViewParameters::new(self.view, precision)
     }
 }
 
 impl ViewParameters {
-    /// Returns how a view shows a model whose positions have this precision.
+    /// Returns the parameters of a view of a model whose positions have this precision.
     pub fn new(view: &View, precision: Precision) -> Self {
         Self {
             projection: view.projection(),

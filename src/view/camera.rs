@@ -149,7 +149,7 @@ pub(super) fn middle_and_radius(model: &impl Positions) -> Option<(Direction, f6
     Some(middle_and_radius_of(model.bounds()?, model.fraction_bits()))
 }
 
-/// The same of a model with this box around it.
+/// Returns the middle and the radius of a model with this bounding box.
 #[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
 #[cfg_attr(not(feature = "tiles"), inline(always))]
 fn middle_and_radius_of((low, high): (Position, Position), fraction_bits: u32) -> (Direction, f64) {

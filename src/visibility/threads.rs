@@ -32,7 +32,7 @@ const PATIENCE: Duration = Duration::from_millis(20);
 
 /// A part of the search.
 #[derive(Debug, Clone)]
-enum Part {
+enum SearchPart {
     /// The edges of the elements between these corners.
     Edges(Range<usize>),
     /// The seams of the faces with these ranks, each with the faces of higher rank.
@@ -95,20 +95,20 @@ pub fn find_stretches_in_parts<I: Index>(
 }
 
 /// Divides the search of a scene into parts, in the order in which their stretches are handed over.
-fn parts<I: Index>(part: usize, around: &SceneIndex<'_, I>, options: Options) -> Vec<Part> {
+fn parts<I: Index>(part: usize, around: &SceneIndex<'_, I>, options: Options) -> Vec<SearchPart> {
     let corners = around.outlines.corners.len();
     let mut parts = Vec::new();
     let mut begin = 0;
     for (first, _) in around.outlines.elements() {
         if first >= begin + part {
-            parts.push(Part::Edges(begin..first));
+            parts.push(SearchPart::Edges(begin..first));
             begin = first;
         }
     }
-    parts.push(Part::Edges(begin..corners));
+    parts.push(SearchPart::Edges(begin..corners));
     if options.with_seams {
         let faces = around.faces.len();
-        let part_of = |begin: usize| Part::Seams(begin..faces.min(begin + part));
+        let part_of = |begin: usize| SearchPart::Seams(begin..faces.min(begin + part));
         parts.extend((0..faces).step_by(part).map(part_of));
     }
     parts
@@ -122,7 +122,7 @@ fn search<I: Index>(
     around: &SceneIndex<'_, I>,
     grid: &Grid<'_, I>,
     options: Options,
-    part: Part,
+    part: SearchPart,
     stop: &AtomicBool,
 ) -> Found<I> {
     let faces = around.faces.len();
@@ -133,8 +133,8 @@ fn search<I: Index>(
     let mut stopping = Stopping(stop);
     let yield_counter = &mut YieldCounter::new(&mut stopping);
     match part {
-        Part::Edges(corners) => finder.follow_edges(corners, yield_counter, &mut found)?,
-        Part::Seams(ranks) => finder.follow_seams(ranks, yield_counter, &mut found)?,
+        SearchPart::Edges(corners) => finder.follow_edges(corners, yield_counter, &mut found)?,
+        SearchPart::Seams(ranks) => finder.follow_seams(ranks, yield_counter, &mut found)?,
     }
     Ok(found.0)
 }

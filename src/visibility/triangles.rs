@@ -45,7 +45,7 @@ pub struct Ears<'a, I> {
 /// How many faces a fan does not cover, and how large they are, which gives the memory that their
 /// triangles need.
 #[derive(Debug, Clone, Copy, Default)]
-struct Needs {
+struct EarNeeds {
     /// The number of faces that no fan covers.
     faces: usize,
     /// The number of their triangles.
@@ -54,7 +54,7 @@ struct Needs {
     most_corners: usize,
 }
 
-impl Needs {
+impl EarNeeds {
     /// Counts the faces of a scene that no fan covers.
     fn of<I: Index>(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> Self {
         outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
@@ -72,7 +72,7 @@ impl<'a, I: Index> Ears<'a, I> {
     /// Returns the bytes that [`Self::cut`] takes, including those for the corners of a face while
     /// it is being cut.
     pub fn bytes(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> usize {
-        let needs = Needs::of(outlines, vertices);
+        let needs = EarNeeds::of(outlines, vertices);
         Scratch::bytes_for::<Entry<I>>(needs.faces)
             + Scratch::bytes_for::<[I; 3]>(needs.ears)
             + Scratch::bytes_for::<I>(needs.most_corners)
@@ -89,7 +89,7 @@ impl<'a, I: Index> Ears<'a, I> {
         scratch: &mut Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
-        let needs = Needs::of(outlines, vertices);
+        let needs = EarNeeds::of(outlines, vertices);
         yield_counter.spend(200 * outlines.corners.len())?;
         let entries: &mut [Entry<I>] = scratch.take(needs.faces)?;
         let ears: &mut [[I; 3]] = scratch.take(needs.ears)?;

@@ -56,7 +56,7 @@ fn bridge() -> (Arc<Seen>, String) {
     let far = Arc::clone(&seen);
     let bridge = Bridge::new(Box::new(move || {
         far.opened.fetch_add(1, Ordering::SeqCst);
-        Ok(Far::Port(Box::new(Answers { seen: Arc::clone(&far), waiting: Vec::new() })))
+        Ok(FarEnd::Port(Box::new(Answers { seen: Arc::clone(&far), waiting: Vec::new() })))
     }));
     let bridge = Arc::new(bridge.expect("a line"));
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");

@@ -2,7 +2,7 @@
 
 use super::{FormatArgs, machine};
 use crate::board;
-use crate::bridge::{Bridge, Far};
+use crate::bridge::{Bridge, FarEnd};
 use crate::error::Error;
 use crate::machines;
 use crate::outcome::Outcome;
@@ -84,7 +84,7 @@ pub fn serve(args: &PageArgs) -> Result<Outcome, Error> {
 /// The bridge to the plotter that the arguments name, and what the page calls that plotter.
 fn bridge(args: &PageArgs) -> Result<Option<(String, Bridge)>, Error> {
     if let Some(board) = args.board {
-        let open = move || machines::emulate(board).map(Far::Board);
+        let open = move || machines::emulate(board).map(FarEnd::Board);
         let name = format!("Emulated board {}", board.name);
         return Ok(Some((name, Bridge::new(Box::new(open))?)));
     }
@@ -93,6 +93,7 @@ fn bridge(args: &PageArgs) -> Result<Option<(String, Bridge)>, Error> {
         ports::AUTOMATIC => "The plotter of the program penup".to_owned(),
         device => format!("The plotter at {device}"),
     };
-    let open = move || -> Result<Far, Error> { Ok(Far::Port(Box::new(ports::open(&device)?))) };
+    let open =
+        move || -> Result<FarEnd, Error> { Ok(FarEnd::Port(Box::new(ports::open(&device)?))) };
     Ok(Some((name, Bridge::new(Box::new(open))?)))
 }

@@ -12,10 +12,10 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, Error, FromArgMatches};
 use penup::plotter::{Flag, OPTIONS, PlotOption, PlotOptions};
 use penup::protocol::{Command as PlotterCommand, CommandError, Escape, LINE_LIMIT};
 use penup_job::Settings;
+use penup_job::user_choices::{FilePage, UserChoices, page_value};
 use penup_job::view::{
     AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
 };
-use penup_job::wishes::{FilePage, Wishes, page_value};
 use penup_readers::lines::acts_at_once;
 use penup_readers::page::{NAMED_PAGES, Page};
 use penup_readers::words::for_client;
@@ -43,7 +43,7 @@ const PLAN: &str = "Plan: a drawing of straight lines at one height, in this ord
 /// The arguments of camera, page and order.
 #[derive(Debug, Clone)]
 pub struct ViewArgs {
-    wishes: Wishes,
+    wishes: UserChoices,
     arrangement: Arrangement,
 }
 
@@ -56,7 +56,7 @@ impl ViewArgs {
     /// The settings for a file that was arranged by [`ViewArgs::arrangement`].
     ///
     /// # Errors
-    /// As [`Wishes::settings_for`].
+    /// As [`UserChoices::settings_for`].
     pub fn settings_for(&self, file: &SourceFile) -> Result<Settings, String> {
         let page =
             FilePage { own: file.page(), sheet: file.sheet(), is_plan: file.bounds().is_some() };
@@ -141,7 +141,7 @@ impl FromArgMatches for ViewArgs {
             settings.values.push((UP, "0,1,0".to_owned()));
         }
         let has_margin = arrangement.has_margin();
-        Ok(Self { wishes: Wishes { settings, viewpoint, has_margin }, arrangement })
+        Ok(Self { wishes: UserChoices { settings, viewpoint, has_margin }, arrangement })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

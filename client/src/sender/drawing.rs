@@ -40,9 +40,9 @@ impl Standstill {
     }
 }
 
-/// What is known of a drawing that is followed.
+/// The state of a drawing that the sender follows.
 #[derive(Debug, Default)]
-pub(super) struct Followed {
+pub(super) struct FollowedDrawing {
     standstill: Standstill,
     held_since: Option<Instant>,
     is_holding: bool,
@@ -132,7 +132,7 @@ impl Sender<'_> {
         progress: &mut dyn Progress,
     ) -> Result<Status, Error> {
         let command = &|| began.map(|[line]| line.clone());
-        let mut followed = Followed::default();
+        let mut followed = FollowedDrawing::default();
         self.last_heard = self.link.now();
         self.query()?;
         loop {
@@ -154,7 +154,7 @@ impl Sender<'_> {
                     }
                 }
                 Some(Reply::Done(_) | Reply::Last(_) | Reply::Resend(_) | Reply::Error(_)) => {}
-                // A refusal of what others have sent.
+                // This is the refusal of a line that another sender has sent.
                 Some(Reply::Refused(number, _)) if began.is_none() || number != self.done => {}
                 Some(Reply::Refused(_, error)) => {
                     self.fail_on(Reply::Error(error), command)?;
@@ -169,7 +169,7 @@ impl Sender<'_> {
     /// Does what the user of this program asked for by keys.
     pub(super) fn obey(
         &mut self,
-        followed: &mut Followed,
+        followed: &mut FollowedDrawing,
         numbers: Numbers,
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
@@ -191,7 +191,7 @@ impl Sender<'_> {
                     progress.note(&self.move_pen(by, followed, numbers)?);
                     continue;
                 }
-                // It is carried out where an interrupt is.
+                // This order is carried out where interrupts are handled.
                 Order::GiveUp => continue,
             };
             self.link.send(&[byte])?;
@@ -199,12 +199,11 @@ impl Sender<'_> {
         Ok(())
     }
 
-    /// Changes the height of the lowered pen by so much, and returns what became of it, for the
-    /// user.
+    /// Changes the height of the lowered pen by this much. Returns the outcome, for the user.
     fn move_pen(
         &mut self,
         by: f64,
-        followed: &Followed,
+        followed: &FollowedDrawing,
         numbers: Numbers,
     ) -> Result<String, Error> {
         if !followed.is_standing {
@@ -247,7 +246,7 @@ impl Sender<'_> {
     pub(super) fn wait_or_resume(
         &mut self,
         status: &Status,
-        followed: &mut Followed,
+        followed: &mut FollowedDrawing,
     ) -> Result<(), Error> {
         followed.is_holding = status.is_holding() && status.pen_wanted.is_none();
         followed.is_standing = status.is_standing;

@@ -1,6 +1,6 @@
 //! Sends a drawing that this computer has computed, while it is drawn.
 
-use super::drawing::Followed;
+use super::drawing::FollowedDrawing;
 use super::{Patience, Sender};
 use crate::error::Error;
 use crate::link::Link;
@@ -15,9 +15,9 @@ use std::sync::atomic::AtomicBool;
 pub struct Taken {
     /// The number by which the plotter knows it: [`StreamedJob::id`].
     pub id: u32,
-    /// How many of its targets have come.
+    /// The number of targets of the drawing that have come.
     pub targets: u32,
-    /// How many strokes are drawn in all, if the plotter has said so.
+    /// The number of strokes that are drawn in all, if the plotter has said so.
     pub strokes: Option<u32>,
 }
 
@@ -26,28 +26,30 @@ pub struct Taken {
 pub struct Stopped {
     /// The number by which the plotter knows it: [`StreamedJob::id`].
     pub id: u32,
-    /// How many of its strokes are drawn.
+    /// The number of strokes that are drawn.
     pub drawn: u32,
-    /// How many strokes it has.
+    /// The number of strokes of the drawing.
     pub all: u32,
     /// Whether nobody has said where the pen is since then.
     pub is_lost: bool,
 }
 
-/// What is known of a drawing while its lines are sent.
+/// The state of a drawing while its lines are sent.
 pub(super) struct Streaming<'j> {
-    /// Its lines.
+    /// The lines of the drawing.
     pub job: &'j StreamedJob,
-    /// How far it is followed.
-    pub followed: Followed,
-    /// How many changes of pens are over, where the plotter does not tell which pen it waits for.
+    /// The progress of the drawing.
+    pub followed: FollowedDrawing,
+    /// The number of changes of pens that are done, if the plotter does not tell which pen it waits
+    /// for.
     pub pens_in: usize,
     /// Whether the machine has been seen to wait for the next one.
     pub waited: bool,
 }
 
 impl Streaming<'_> {
-    /// Whether the plotter, which has this status, cannot take a line before the pen has moved on.
+    /// Whether the plotter, according to its status, cannot take another line before the pen has
+    /// moved on.
     pub fn waits(&self, status: &Status) -> bool {
         match (self.job.form(), status.stream) {
             (Form::Strokes, Some([_, _, room])) => (room as usize) < MOST_TARGETS,
@@ -102,7 +104,7 @@ impl<'a> Sender<'a> {
         for _ in 0..super::MOST_QUESTIONS {
             let replies = match sender.ask(STREAM) {
                 Ok(replies) => replies,
-                // It has ended meanwhile.
+                // The drawing has ended in the meantime.
                 Err(Error::Refused { .. }) => return Ok(None),
                 Err(error) => return Err(error),
             };
@@ -160,7 +162,8 @@ impl<'a> Sender<'a> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         self.strokes = job.size().strokes.into();
-        let streaming = Streaming { job, followed: Followed::default(), pens_in: 0, waited: false };
+        let streaming =
+            Streaming { job, followed: FollowedDrawing::default(), pens_in: 0, waited: false };
         self.deliver_as(job, Some(streaming), progress, &mut |_| {})?;
         match job.form() {
             Form::Strokes => self.watch(progress)?,

@@ -15,7 +15,7 @@ use std::io::{self, Read};
 /// The most bytes of the line before the contents.
 const LONGEST_LINE: u64 = 16 << 10;
 
-/// What stands before the contents of a file.
+/// The parts of a request that come before the contents of a file.
 #[derive(Deserialize)]
 struct Asked {
     name: String,

@@ -66,16 +66,16 @@ fn inside(from: Point, to: Point, rectangle: [Point; 2]) -> Option<[Point; 2]> {
     let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
     let (mut enters_at, mut leaves_at) = (None, None);
     for axis in 0..2 {
-        let way = to[axis] - from[axis];
+        let direction = to[axis] - from[axis];
         let [low, high] = [rectangle[0][axis], rectangle[1][axis]];
-        if way == 0.0 {
+        if direction == 0.0 {
             if !(low..=high).contains(&from[axis]) {
                 return None;
             }
             continue;
         }
-        let (near, far) = if way > 0.0 { (low, high) } else { (high, low) };
-        let (begin, end) = ((near - from[axis]) / way, (far - from[axis]) / way);
+        let (near, far) = if direction > 0.0 { (low, high) } else { (high, low) };
+        let (begin, end) = ((near - from[axis]) / direction, (far - from[axis]) / direction);
         if begin > enter {
             (enter, enters_at) = (begin, Some((axis, near)));
         }

@@ -44,7 +44,7 @@ pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
     Ok(())
 }
 
-/// What the closed strokes of each pen surround together.
+/// Returns the areas that the closed strokes of each pen surround together.
 fn closed(plan: &Plan) -> Vec<Area> {
     let mut areas: BTreeMap<u32, Area> = BTreeMap::new();
     for stroke in plan.strokes.iter().filter(|stroke| stroke.is_closed()) {
@@ -61,7 +61,8 @@ fn closed(plan: &Plan) -> Vec<Area> {
 fn lines_within(outlines: &[Vec<Point>], hatch: Hatch, most: usize) -> Option<Vec<[Point; 2]>> {
     let Hatch { spacing, angle } = hatch;
     let (sine, cosine) = sine_cosine(angle);
-    // In coordinates along the lines and across them, in units of their distance.
+    // Converts a point to coordinates along the lines and across them, in units of the distance
+    // between lines.
     let turned = |[x, y]: Point| [x * cosine + y * sine, (y * cosine - x * sine) / spacing];
     let mut crossings: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
     let mut count = 0usize;

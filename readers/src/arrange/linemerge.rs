@@ -25,8 +25,8 @@ impl Ends {
         self.squares.entry((pen, layer, x, y)).or_default().push(end);
     }
 
-    /// The end nearest to `point` among those of `strokes` that are left, if one is no farther than
-    /// the side of a square.
+    /// Returns the end nearest to `point` among those of the `strokes` that are left, if it is
+    /// within the side of a square.
     fn nearest(
         &self,
         (pen, layer): (u32, u32),

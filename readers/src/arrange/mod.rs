@@ -28,25 +28,26 @@ use crate::plan::{Plan, Point};
 /// Whether the page is turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Turn {
-    /// The page is as it is named.
+    /// The page keeps its orientation.
     #[default]
     AsItIs,
     /// The page lies on its long side.
     Landscape,
-    /// The page lies on its long side if the plan is wider than high, and else on its short one.
+    /// The page lies on its long side if the plan is wider than high, and otherwise on its short
+    /// side.
     Automatic,
 }
 
-/// What is cut off.
+/// The part of a plan that is cut off.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum Crop {
-    /// What is beyond the page without its margin.
+    /// Everything beyond the page without its margin.
     Page,
-    /// What is beyond a rectangle: its least and greatest x and y in mm.
+    /// Everything beyond a rectangle, given by its least and greatest x and y in mm.
     Rectangle([Point; 2]),
 }
 
-/// How areas are hatched.
+/// The way in which areas are hatched.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Hatch {
     /// The distance between two lines, in mm.
@@ -86,13 +87,13 @@ impl Arrangement {
         Self { page, turn, margin, ..Self::default() }
     }
 
-    /// The same, with texts drawn in these fonts.
+    /// Returns the arrangement with these fonts, in which texts are drawn.
     #[must_use]
     pub fn with_fonts(self, fonts: Fonts) -> Self {
         Self { fonts, ..self }
     }
 
-    /// The same, with these files for what refers to files.
+    /// Returns the arrangement with these files, for formats that refer to other files.
     #[must_use]
     pub fn with_files(self, files: Files) -> Self {
         Self { files, ..self }
@@ -113,7 +114,8 @@ impl Arrangement {
         (option.set)(self, text)
     }
 
-    /// The name of the first option that is given and works on plans only, as it is written.
+    /// Returns the name, as it is written, of the first option that is given and works on plans
+    /// only.
     pub(crate) fn first_given(&self) -> Option<String> {
         let given = PLAN_OPTIONS.iter().find(|option| (option.is_set)(self));
         let name = given.map(|option| format!("--{}", option.name));

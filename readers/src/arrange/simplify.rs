@@ -34,10 +34,14 @@ fn simplified(points: &[Point], tolerance: f64) -> Vec<Point> {
 
 /// The distance of a point from the line between two others.
 pub(super) fn to_line(point: Point, from: Point, to: Point) -> f64 {
-    let way = [to[0] - from[0], to[1] - from[1]];
+    let direction = [to[0] - from[0], to[1] - from[1]];
     let offset = [point[0] - from[0], point[1] - from[1]];
-    let square = way[0] * way[0] + way[1] * way[1];
-    let part = if square > 0.0 { (offset[0] * way[0] + offset[1] * way[1]) / square } else { 0.0 };
+    let square = direction[0] * direction[0] + direction[1] * direction[1];
+    let part = if square > 0.0 {
+        (offset[0] * direction[0] + offset[1] * direction[1]) / square
+    } else {
+        0.0
+    };
     let part = part.clamp(0.0, 1.0);
-    (offset[0] - part * way[0]).hypot(offset[1] - part * way[1])
+    (offset[0] - part * direction[0]).hypot(offset[1] - part * direction[1])
 }

@@ -7,11 +7,11 @@ use super::{Arrangement, Crop, Hatch};
 pub struct PlanOption {
     /// The name of the option, as in `--name`.
     pub name: &'static str,
-    /// What stands for the value in the help; empty if the option takes none.
+    /// The placeholder for the value in the help; empty if the option takes none.
     pub value: &'static str,
-    /// What the help says.
+    /// The text of the help.
     pub help: &'static str,
-    /// Whether it would have no effect on a plan that is scaled to the page.
+    /// Whether the option would have no effect on a plan that is scaled to the page.
     pub changes_size: bool,
     /// Parses and sets the value. On an error nothing is changed.
     pub(super) set: fn(&mut Arrangement, &str) -> Result<(), String>,

@@ -6,7 +6,7 @@ use std::f64::consts::TAU;
 /// The greatest distance of a chord from its curve in mm, below half a motor step.
 const CHORD_ERROR: f64 = 0.003;
 
-/// How often a piece of a spline is halved at most.
+/// The most times that a piece of a spline is halved.
 const MOST_HALVINGS: u32 = 16;
 
 /// A map of the plane: x' = a x + c y + e and y' = b x + d y + f, in the order a to f.
@@ -81,9 +81,9 @@ impl Spline {
     }
 }
 
-/// A piece of a curve.
+/// A piece of a [`Curve`].
 #[derive(Debug, Clone)]
-enum Piece {
+enum CurvePiece {
     /// A straight line to a point.
     Line(Point),
     /// An arc of an ellipse: its centre, its half axes as vectors, the angle at which it begins, in
@@ -93,16 +93,16 @@ enum Piece {
     Spline(Spline),
 }
 
-/// A curve that the pen draws in one go.
+/// A curve that the pen draws without being lifted.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Curve {
     begin: Option<Point>,
-    pieces: Vec<Piece>,
+    pieces: Vec<CurvePiece>,
 }
 
 impl Curve {
     pub(super) fn polyline(points: &[Point]) -> Self {
-        let pieces = points.iter().skip(1).map(|point| Piece::Line(*point)).collect();
+        let pieces = points.iter().skip(1).map(|point| CurvePiece::Line(*point)).collect();
         Self { begin: points.first().copied(), pieces }
     }
 
@@ -121,7 +121,7 @@ impl Curve {
 
     fn elliptic(centre: Point, axes: [Point; 2], start: f64, turn: f64) -> Self {
         let begin = on_ellipse(centre, axes, start);
-        Self { begin: Some(begin), pieces: vec![Piece::Arc { centre, axes, start, turn }] }
+        Self { begin: Some(begin), pieces: vec![CurvePiece::Arc { centre, axes, start, turn }] }
     }
 
     /// A spline; `None` if its knots do not fit its points.
@@ -130,30 +130,30 @@ impl Curve {
             return None;
         }
         let begin = spline.point(spline.degree, spline.knots[spline.degree]);
-        Some(Self { begin: Some(begin), pieces: vec![Piece::Spline(spline)] })
+        Some(Self { begin: Some(begin), pieces: vec![CurvePiece::Spline(spline)] })
     }
 
     /// Appends a side of a polyline, an arc if it has a bulge.
     pub(super) fn side(&mut self, from: Point, to: Point, bulge: f64) {
         self.begin.get_or_insert(from);
-        let way = [to[0] - from[0], to[1] - from[1]];
-        if bulge == 0.0 || way == [0.0; 2] {
-            self.pieces.push(Piece::Line(to));
+        let direction = [to[0] - from[0], to[1] - from[1]];
+        if bulge == 0.0 || direction == [0.0; 2] {
+            self.pieces.push(CurvePiece::Line(to));
             return;
         }
         // The centre lies to the left of the way if the arc turns left by less than a half turn.
         let off = (1.0 - bulge * bulge) / (4.0 * bulge);
         let centre = [
-            f64::midpoint(from[0], to[0]) - way[1] * off,
-            f64::midpoint(from[1], to[1]) + way[0] * off,
+            f64::midpoint(from[0], to[0]) - direction[1] * off,
+            f64::midpoint(from[1], to[1]) + direction[0] * off,
         ];
         let spoke = [from[0] - centre[0], from[1] - centre[1]];
         let radius = spoke[0].hypot(spoke[1]);
         let axes = [[radius, 0.0], [0.0, radius]];
         let (start, turn) = (spoke[1].atan2(spoke[0]), 4.0 * bulge.atan());
-        self.pieces.push(Piece::Arc { centre, axes, start, turn });
+        self.pieces.push(CurvePiece::Arc { centre, axes, start, turn });
         // The end is the corner itself, whatever rounding says.
-        self.pieces.push(Piece::Line(to));
+        self.pieces.push(CurvePiece::Line(to));
     }
 
     /// A polyline near the curve as `to_page` shows it, in mm; `None` if it has more than `most`
@@ -163,8 +163,8 @@ impl Curve {
         let mut points = vec![to_page.apply(begin)];
         for piece in &self.pieces {
             match piece {
-                Piece::Line(to) => points.push(to_page.apply(*to)),
-                Piece::Arc { centre, axes, start, turn } => {
+                CurvePiece::Line(to) => points.push(to_page.apply(*to)),
+                CurvePiece::Arc { centre, axes, start, turn } => {
                     let half = |[x, y]: Point| x.hypot(y);
                     let radius = half(axes[0]).max(half(axes[1])) * to_page.most();
                     let chord = 2.0 * (1.0 - CHORD_ERROR / radius.max(2.0 * CHORD_ERROR)).acos();
@@ -177,7 +177,7 @@ impl Curve {
                         to_page.apply(on_ellipse(*centre, *axes, angle))
                     }));
                 }
-                Piece::Spline(spline) => {
+                CurvePiece::Spline(spline) => {
                     for span in spline.degree..spline.control.len() {
                         let [low, high] = [spline.knots[span], spline.knots[span + 1]];
                         if low < high {

@@ -22,7 +22,7 @@ pub(super) struct Entity<'a> {
     pub(super) pairs: Vec<Pair<'a>>,
 }
 
-/// A reason for a refusal, and the line.
+/// The reason why a file is refused: the number of the line, and a message.
 pub(super) type LineError = (usize, String);
 
 impl<'a> Entity<'a> {
@@ -77,7 +77,7 @@ pub(super) fn number(pair: Pair<'_>) -> Result<f64, LineError> {
     }
 }
 
-/// What a file says.
+/// The contents of a file.
 #[derive(Debug, Default)]
 pub(super) struct Document<'a> {
     pub(super) unit: Option<i64>,
@@ -153,7 +153,7 @@ pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, LineError> {
         };
         let value_at = Pair { code, value: value.trim(), raw: value, line: index + 1 };
         pairs.push(value_at);
-        // Nothing that follows belongs to the drawing.
+        // Whatever follows does not belong to the drawing.
         if (code, value_at.value) == (0, "EOF") {
             break;
         }

@@ -23,13 +23,14 @@ impl Plane {
         Self { axes: [x, cross(up, x), up] }
     }
 
-    /// How a drawing in this plane, so high above its origin, is seen from above.
+    /// Returns the map of a drawing in this plane, at this height above the origin of the plane, to
+    /// its view from above.
     pub(super) fn seen(self, height: f64) -> Affine {
         let [x, y, up] = self.axes;
         Affine([x[0], x[1], y[0], y[1], up[0] * height, up[1] * height])
     }
 
-    /// What `vector` becomes by a quarter turn about what is up.
+    /// Turns `vector` by a quarter turn about the upward direction.
     pub(super) fn turned(self, vector: Vector) -> Vector {
         cross(self.axes[2], vector)
     }

@@ -14,7 +14,7 @@ use penup::fixed::Millimetres;
 
 /// The height of capitals in units of the font.
 const CAPITAL: f64 = 21.0;
-/// How far the lowest letters reach below their line, as a part of the height.
+/// The distance by which the lowest letters reach below their line, as a part of the height.
 const DEPTH: f64 = 1.0 / 3.0;
 /// The distance of the lines of a paragraph, as a part of the height.
 const LEADING: f64 = 5.0 / 3.0;
@@ -23,7 +23,7 @@ const UNBROKEN: &str = "\u{A0}";
 /// The most letters of a piece. Its width in units of the font is below 2^15.
 const MOST_LETTERS: usize = 1000;
 
-/// Letters of one height.
+/// A run of letters of one height.
 #[derive(Debug, Clone, PartialEq)]
 struct Run {
     text: String,
@@ -61,7 +61,7 @@ impl Run {
     }
 }
 
-/// What an entity writes.
+/// The text of an entity, as strokes.
 #[derive(Debug, Default)]
 pub(super) struct Writing {
     /// The strokes of all letters, where and how they stand before the plane of the entity.
@@ -105,9 +105,9 @@ pub(super) fn line(entity: &Entity<'_>) -> Result<Option<Writing>, LineError> {
     let mut at = if has_second && (across, upward) != (0, 0) { second } else { first };
     if matches!(across, 3 | 5) && has_second {
         // The text fills the way between two points; 3 keeps the form of the letters.
-        let way = [second[0] - first[0], second[1] - first[1]];
-        (at, angle) = (first, way[1].atan2(way[0]));
-        factor = way[0].hypot(way[1]) / width.max(f64::MIN_POSITIVE);
+        let baseline = [second[0] - first[0], second[1] - first[1]];
+        (at, angle) = (first, baseline[1].atan2(baseline[0]));
+        factor = baseline[0].hypot(baseline[1]) / width.max(f64::MIN_POSITIVE);
         size = if across == 3 { factor } else { 1.0 };
     }
     let begin = match across {
@@ -150,7 +150,7 @@ pub(super) fn paragraph(entity: &Entity<'_>, plane: Plane) -> Result<Option<Writ
     if longest.is_some_and(|letters| letters > MOST_LETTERS) {
         return Ok(None);
     }
-    // Of the angle and the direction of x, the last one counts.
+    // The angle and the direction of x exclude each other; the last one given counts.
     let last = entity.pairs.iter().rfind(|pair| matches!(pair.code, 50 | 11));
     let angle = if last.is_some_and(|pair| pair.code == 11) {
         let [x, y] = entity.point(11)?;
@@ -315,17 +315,17 @@ fn wrap(line: Vec<Run>, width: f64, lines: &mut Vec<Vec<Run>>) {
         lines.push(line);
         return;
     }
-    let (mut present, mut way) = (Vec::<Run>::new(), 0.0);
+    let (mut present, mut advance) = (Vec::<Run>::new(), 0.0);
     for Run { text, height } in line {
         for word in text.split_inclusive(' ') {
             let run = Run { text: word.to_owned(), height };
             // The space behind the last word of a line may reach beyond it.
             let seen = Run { text: word.trim_end_matches(' ').to_owned(), height }.width();
-            if !present.is_empty() && way + seen > width {
+            if !present.is_empty() && advance + seen > width {
                 lines.push(std::mem::take(&mut present));
-                way = 0.0;
+                advance = 0.0;
             }
-            way += run.width();
+            advance += run.width();
             match present.last_mut() {
                 Some(last) if last.height == height => last.text.push_str(word),
                 _ => present.push(run),

@@ -16,9 +16,9 @@ use super::{Move, Signals};
 /// Levels that differ by less are the same.
 const SAME: f64 = 1e-6;
 
-/// How a signal lifts the pen.
+/// The levels of a signal at which the pen is up.
 struct Division {
-    /// What lies between the levels at which the pen is up and the others.
+    /// The level that divides those at which the pen is up from the others.
     middle: f64,
     high_is_up: bool,
 }
@@ -72,7 +72,7 @@ fn by_power(moves: &[Move]) -> Option<Vec<bool>> {
     (!is_laser).then_some(draws)
 }
 
-/// By the levels of a signal; `None` if it does not change.
+/// Decides by the levels of a signal; `None` if it does not change.
 fn by_level(
     moves: &[Move],
     level: impl Fn(&Signals) -> Option<f64>,
@@ -96,20 +96,21 @@ fn by_level(
 /// The division with the longest way by G0 at the levels that are up, and by G1 to G3 at the
 /// others.
 fn by_rapids(moves: &[Move], levels: &[Option<f64>]) -> Option<Division> {
-    let mut ways: Vec<(f64, [f64; 2])> = Vec::new();
+    let mut lengths: Vec<(f64, [f64; 2])> = Vec::new();
     for (it, level) in moves.iter().zip(levels) {
-        let way = if it.is_rapid { [it.length(), 0.0] } else { [0.0, it.length()] };
-        ways.extend(level.map(|level| (level, way)));
+        let length = if it.is_rapid { [it.length(), 0.0] } else { [0.0, it.length()] };
+        lengths.extend(level.map(|level| (level, length)));
     }
-    ways.sort_by(|one, other| one.0.total_cmp(&other.0));
-    let mut high = [0, 1].map(|kind: usize| ways.iter().map(|(_, way)| way[kind]).sum::<f64>());
+    lengths.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut high =
+        [0, 1].map(|kind: usize| lengths.iter().map(|(_, length)| length[kind]).sum::<f64>());
     let mut low = [0.0; 2];
     let mut best: Option<(f64, f64, Division)> = None;
-    for pair in ways.windows(2) {
-        let &[(level, way), (next, _)] = pair else { continue };
+    for pair in lengths.windows(2) {
+        let &[(level, length), (next, _)] = pair else { continue };
         for kind in 0..2 {
-            low[kind] += way[kind];
-            high[kind] -= way[kind];
+            low[kind] += length[kind];
+            high[kind] -= length[kind];
         }
         let gap = next - level;
         if gap < SAME {
@@ -129,8 +130,8 @@ fn by_rapids(moves: &[Move], levels: &[Option<f64>]) -> Option<Division> {
     best.map(|(_, _, division)| division)
 }
 
-/// What lies between the two levels to which a signal is set most often; `None` if there are not
-/// two.
+/// Returns the middle between the two levels to which a signal is set most often; `None` if there
+/// are not two.
 fn between_most_visited(levels: &[Option<f64>]) -> Option<f64> {
     let mut visited: Vec<f64> = Vec::new();
     for level in levels.iter().copied().flatten() {

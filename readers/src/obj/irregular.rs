@@ -51,7 +51,7 @@ const WITHOUT_MEANING: &[&str] = &[
     "cdp",
     "res",
     "curvature",
-    // Those of a library of materials, which some programs write into the model itself.
+    // Statements of a library of materials, which some programs write into the model itself.
     "newmtl",
     "Ka",
     "Kd",
@@ -121,7 +121,7 @@ struct Irregular {
 enum Freeform {
     /// B-splines are.
     BSplines,
-    /// Those of this kind are not.
+    /// Freeform elements of this kind are not read.
     Other,
 }
 
@@ -315,7 +315,7 @@ impl Irregular {
         self.push(&line, number);
     }
 
-    /// The length of the last line, if it is of this line of the file.
+    /// Returns the length of the last line, if it comes from this line of the file.
     fn longest_since(&self, number: usize) -> usize {
         let mut ends = self.others.iter().rev();
         match (ends.next(), ends.next()) {

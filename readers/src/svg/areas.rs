@@ -15,7 +15,7 @@ use usvg::{
     BlendMode, ClipPath, Color, Group, Mask, MaskType, Node, Paint, PaintOrder, Path, Stop,
 };
 
-/// How the colours of a mask become light.
+/// The conversion of the colours of a mask to light.
 #[derive(Debug, Clone, Copy)]
 struct Light {
     /// Whether the opacity alone counts.
@@ -33,10 +33,10 @@ struct Layers {
     is_soft: bool,
 }
 
-/// A mask cannot be applied.
+/// The reasons why a mask cannot be applied.
 enum MaskError {
     TooManyPoints,
-    /// It has what no region is like.
+    /// The mask is partly transparent, which a region cannot represent.
     Soft,
 }
 
@@ -47,7 +47,8 @@ impl From<TooManyPoints> for MaskError {
 }
 
 impl Drawing<'_, '_, '_> {
-    /// Appends what a clip path leaves, and those that clip it.
+    /// Appends the regions to which a clip path, and the clip paths of the clip path itself, limit
+    /// the drawing.
     pub(super) fn clip(
         &mut self,
         mut clip: Option<&ClipPath>,
@@ -127,7 +128,7 @@ impl Drawing<'_, '_, '_> {
         Ok(soft)
     }
 
-    /// Lays the shapes of a group in a mask, which are this opaque, on those below.
+    /// Adds the shapes of a group in a mask, with this opacity, on top of those below.
     fn layers(
         &mut self,
         group: &Group,
@@ -228,7 +229,7 @@ fn painted(group: &Group) -> usize {
 }
 
 impl Layers {
-    /// What a paint of this opacity adds.
+    /// Returns the shade of a paint of this opacity.
     fn shade(&mut self, paint: &Paint, opacity: f64) -> Shade {
         let light = self.light;
         let of_colour = |colour: Color| if light.is_alpha { 1.0 } else { luminance(colour, light) };
@@ -259,7 +260,7 @@ pub(super) fn rectangle(low: [f64; 2], high: [f64; 2], to_page: Affine) -> Vec<[
     on_page.iter().map(|corner| [corner.x, corner.y]).collect()
 }
 
-/// How light a colour is, from 0 to 1, as masks of SVG count it.
+/// Returns the lightness of a colour, from 0 to 1, as SVG defines it for masks.
 fn luminance(colour: Color, light: Light) -> f64 {
     let part = |part: u8| {
         let part = f64::from(part) / 255.0;

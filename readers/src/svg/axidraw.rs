@@ -2,7 +2,7 @@
 //! `!` for a pause before it, a number, and then `+S`, `+H` and `+D` with numbers of their own
 //! (<https://wiki.evilmadscientist.com/AxiDraw_Layer_Control>).
 
-/// What the name of a layer asks of an AxiDraw.
+/// The instructions to an AxiDraw in the name of a layer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Control {
     /// The layer is not plotted.
@@ -60,7 +60,7 @@ impl Control {
         }
     }
 
-    /// What of it a plotter of penup does not do, as codes.
+    /// Returns the codes that a plotter of penup does not obey.
     pub(super) fn not_obeyed(self) -> Vec<String> {
         let codes = [("+S", self.speed), ("+H", self.height), ("+D", self.delay)];
         let code = |(code, value): (&str, Option<u32>)| Some(format!("{code}{}", value?));

@@ -31,11 +31,11 @@ const MOST_WORK: usize = 300_000_000;
 /// A path of the drawing.
 #[derive(Debug)]
 pub(super) struct Shape {
-    /// The element that it comes from, if that is known.
+    /// The element that the path comes from, if that is known.
     pub(super) element: Option<NodeId>,
-    /// What may choose its pen.
+    /// The properties that may choose the pen of the path.
     pub(super) marks: Marks,
-    /// What is drawn, in mm, with y upward from the lower left corner of the page.
+    /// The lines to draw, in mm, with y upward from the lower left corner of the page.
     pub(super) polylines: Vec<Polyline>,
     /// Whether a line without a length is a dot, because its ends are round or square.
     pub(super) has_dots: bool,
@@ -52,9 +52,9 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) markup: &'a Markup<'a, 'input>,
     page: ConvexArea,
     with_areas: bool,
-    /// How many points more fit in memory.
+    /// The number of further points that fit in memory.
     pub(super) budget: usize,
-    /// How much work at clip paths and masks is left.
+    /// The amount of work at clip paths and masks that is left.
     work: usize,
     /// The paths in the order of the file.
     pub(super) shapes: Vec<Shape>,
@@ -84,16 +84,16 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) texts: Vec<&'tree Text>,
 }
 
-/// What applies to the contents of a group.
+/// The properties that apply to the contents of a group.
 #[derive(Debug, Clone)]
 struct Context {
     to_page: Affine,
     areas: Regions,
     /// The innermost group or text that is an element of the file.
     element: Option<NodeId>,
-    /// Whether it is the outline of letters.
+    /// Whether the contents are the outlines of letters.
     is_text: bool,
-    /// Whether it belongs to an SVG that is an image in the file.
+    /// Whether the contents belong to an SVG that is an image in the file.
     is_nested: bool,
 }
 
@@ -334,8 +334,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         Ok(())
     }
 
-    /// What clip paths leave of the lines of a path. Of one that is only filled, their borders
-    /// within it are a part of its outline.
+    /// Returns what clip paths leave of the lines of a path. If the path is only filled, the
+    /// borders of the clip paths within it are a part of its outline.
     fn clipped(
         &mut self,
         polylines: &[Polyline],

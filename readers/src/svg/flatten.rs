@@ -24,12 +24,12 @@ const LONGEST: f64 = 1e6;
 /// A polyline in millimetres.
 #[derive(Debug, Clone)]
 pub(super) struct Polyline {
-    /// Its points, two or more. The last is the first if it is closed.
+    /// The points of the polyline, two or more. If it is closed, the last point equals the first.
     pub(super) points: Vec<Point>,
 }
 
 impl Polyline {
-    /// Its points.
+    /// Returns the points of the polyline.
     pub(super) fn positions(&self) -> Vec<[f64; 2]> {
         self.points.iter().map(|point| [point.x, point.y]).collect()
     }
@@ -58,7 +58,7 @@ impl From<TooMuch> for TooManyPoints {
 /// Which cubic Béziers of a path are arcs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arcs {
-    /// Those that could be one: the source has arcs.
+    /// All that could be arcs, because the source has arcs.
     Any,
     /// Quarters of an ellipse: what the source has is unknown.
     Quarters,

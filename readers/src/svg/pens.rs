@@ -9,18 +9,18 @@ use usvg::roxmltree::NodeId;
 /// A layer of the drawing.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
 pub(super) struct Layer {
-    /// The group that it is.
+    /// The group that is the layer.
     pub(super) element: NodeId,
-    /// Its label, or else its `id`.
+    /// The label of the layer, or else its `id`.
     pub(super) name: String,
 }
 
-/// What may choose the pen of a path.
+/// The properties of a path that may choose its pen.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Marks {
-    /// The layer that contains it.
+    /// The layer that contains the path.
     pub(super) layer: Option<Layer>,
-    /// Its colour: red, green and blue; `None` if it has several, as a gradient has.
+    /// The colour of the path: red, green and blue; `None` if it has several, as a gradient has.
     pub(super) colour: Option<[u8; 3]>,
 }
 

@@ -59,7 +59,7 @@ impl TextFonts {
             }),
             select_fallback: Box::new(move |letter, used, database| {
                 let found = fallback(letter, used, database);
-                // A letter without a shape is looked for as well, and drawn as nothing.
+                // Letters without a shape are reported as well, because nothing is drawn for them.
                 if found.is_none() && !letter.is_control() && !letter.is_whitespace() {
                     lock(&of_letter).missing_letters.insert(letter);
                 }

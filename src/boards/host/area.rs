@@ -1,6 +1,6 @@
 //! A simulated flash memory for models, whose power may fail between any two bytes.
 
-use super::flash::Cut;
+use super::flash::PowerCut;
 use crate::storage::PAGE_BYTES;
 use crate::storage::area::{Area, AreaFlash, NotWritten, SECTOR_BYTES};
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -54,9 +54,9 @@ impl CutArea {
     }
 
     /// Changes one byte after the other until the power fails.
-    fn each(&mut self, from: usize, bytes: &[u8], erases: bool) -> Result<(), Cut> {
+    fn each(&mut self, from: usize, bytes: &[u8], erases: bool) -> Result<(), PowerCut> {
         for (at, &byte) in (from..).zip(bytes) {
-            self.budget = self.budget.checked_sub(1).ok_or(Cut)?;
+            self.budget = self.budget.checked_sub(1).ok_or(PowerCut)?;
             let before = self.words[at / 4].load(Ordering::Relaxed).to_le_bytes()[at % 4];
             self.set_byte(at, if erases { byte } else { byte & before });
         }
@@ -69,7 +69,7 @@ impl AreaFlash for CutArea {
         assert!(at.is_multiple_of(SECTOR_BYTES));
         assert!(self.may_erase, "flash is erased while something moves");
         self.erasures[at / SECTOR_BYTES] += 1;
-        self.each(at, &[0xFF; SECTOR_BYTES], true).map_err(|Cut| NotWritten)
+        self.each(at, &[0xFF; SECTOR_BYTES], true).map_err(|PowerCut| NotWritten)
     }
 
     fn write_page(&mut self, at: usize, page: &[u8; PAGE_BYTES]) -> Result<(), NotWritten> {
@@ -81,6 +81,6 @@ impl AreaFlash for CutArea {
         let clears_once = before.iter().zip(page).all(|(before, new)| !before & !new == 0);
         assert!(clears_once, "a bit is cleared twice at {at:#x}");
         self.pages += 1;
-        self.each(at, page, false).map_err(|Cut| NotWritten)
+        self.each(at, page, false).map_err(|PowerCut| NotWritten)
     }
 }

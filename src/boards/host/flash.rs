@@ -26,9 +26,9 @@ pub struct CutFlash {
 
 /// The error of an operation during which the power fails, or after it has failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Cut;
+pub struct PowerCut;
 
-impl NorFlashError for Cut {
+impl NorFlashError for PowerCut {
     fn kind(&self) -> NorFlashErrorKind {
         NorFlashErrorKind::Other
     }
@@ -64,13 +64,13 @@ impl CutFlash {
         from: usize,
         to: usize,
         change: impl Fn(usize, u8) -> u8,
-    ) -> Result<(), Cut> {
+    ) -> Result<(), PowerCut> {
         for at in from..to {
             match self.budget.checked_sub(1) {
                 Some(budget) if !self.is_cut => self.budget = budget,
                 _ => {
                     self.is_cut = true;
-                    return Err(Cut);
+                    return Err(PowerCut);
                 }
             }
             self.bytes[at] = change(at, self.bytes[at]);
@@ -80,13 +80,13 @@ impl CutFlash {
 }
 
 impl ErrorType for CutFlash {
-    type Error = Cut;
+    type Error = PowerCut;
 }
 
 impl ReadNorFlash for CutFlash {
     const READ_SIZE: usize = 1;
 
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Cut> {
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), PowerCut> {
         let from = offset as usize;
         bytes.copy_from_slice(&self.bytes[from..from + bytes.len()]);
         if let Some(left) = self.garbage_after {
@@ -110,7 +110,7 @@ impl NorFlash for CutFlash {
     const WRITE_SIZE: usize = Self::PAGE;
     const ERASE_SIZE: usize = Self::SECTOR;
 
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Cut> {
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), PowerCut> {
         let (from, to) = (from as usize, to as usize);
         assert!(from.is_multiple_of(Self::SECTOR) && to.is_multiple_of(Self::SECTOR));
         for erasures in &mut self.erasures[from / Self::SECTOR..to / Self::SECTOR] {
@@ -119,7 +119,7 @@ impl NorFlash for CutFlash {
         self.each(from, to, |_, _| 0xFF)
     }
 
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Cut> {
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), PowerCut> {
         let from = offset as usize;
         assert!(from.is_multiple_of(Self::PAGE) && bytes.len().is_multiple_of(Self::PAGE));
         let before = &self.bytes[from..from + bytes.len()];

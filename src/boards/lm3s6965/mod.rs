@@ -72,7 +72,7 @@ pub struct Lm3s6965 {
     /// The clock, which is stopped while the machine sleeps without a task.
     clock: clock::Clock,
     /// The end of the serial line from which the main loop reads.
-    serial: serial::Line,
+    serial: serial::Serial,
     /// The main loop's end of the queue of step events.
     steps: steps::Steps,
 }

@@ -37,10 +37,10 @@ static SHARED: Shared = Shared::new();
 static RECEIVE_MERGE: Owned<ReceiveMerge> = Owned::empty();
 
 /// The main loop's side of the line, from which it reads bytes.
-pub struct Line(line::Line);
+pub struct Serial(line::SerialInput);
 
 /// Sets up UART0 and its pins, and lets bytes be received.
-pub fn set_up(nvic: &mut NVIC) -> Line {
+pub fn set_up(nvic: &mut NVIC) -> Serial {
     SYSTEM_CONTROL.set_bits(offset::UART_CLOCKS, 1);
     SYSTEM_CONTROL.set_bits(offset::GPIO_CLOCKS, 1);
     // The port responds three cycles after its clock is on; this read takes longer.
@@ -57,11 +57,11 @@ pub fn set_up(nvic: &mut NVIC) -> Line {
     unsafe { RECEIVE_MERGE.fill(receive_merge) };
     critical::enable(nvic, Interrupt::UART0, critical::SERIAL_PRIORITY);
     UART0.enable();
-    Line(line)
+    Serial(line)
 }
 
-impl Line {
-    /// Returns the next byte that is not a real-time byte: see [`line::Line::read_byte`].
+impl Serial {
+    /// Returns the next byte that is not a real-time byte: see [`line::SerialInput::read_byte`].
     pub fn read_byte(&mut self) -> Option<u8> {
         self.0.read_byte()
     }

@@ -300,7 +300,7 @@ fn TIMER_2A() {
     // This read has no effect on the machine. An emulator's trace takes the time of the pin changes
     // from it.
     clock::count_down();
-    // SAFETY: as above.
+    // SAFETY: as in `TIMER_1A`.
     if unsafe { STEPPER.get_filled() }.pulser.end_pulses() {
         NVIC::pend(BRAKE);
     }
@@ -309,6 +309,6 @@ fn TIMER_2A() {
 /// The interrupt for the brake's work: few steps wait, or the length of the steps changes.
 #[interrupt]
 fn TIMER_0B() {
-    // SAFETY: as above.
+    // SAFETY: as in `TIMER_1A`.
     unsafe { STEPPER.get_filled() }.brake();
 }

@@ -8,7 +8,7 @@
 //! page is written while the pen is raised and no step waits.
 //!
 //! A worn flash reports no error; its cells simply no longer change. So what was erased or written
-//! is read back, and the error is [`Worn`] if it is not as expected.
+//! is read back, and the error is [`VerifyError`] if it is not as expected.
 
 use core::fmt::Write;
 use core::ptr;
@@ -216,16 +216,16 @@ impl Flash {
 
 /// The error when the flash does not hold what was written to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Worn;
+pub struct VerifyError;
 
-impl NorFlashError for Worn {
+impl NorFlashError for VerifyError {
     fn kind(&self) -> NorFlashErrorKind {
         NorFlashErrorKind::Other
     }
 }
 
 impl ErrorType for Flash {
-    type Error = Worn;
+    type Error = VerifyError;
 }
 
 impl ReadNorFlash for Flash {
@@ -233,7 +233,7 @@ impl ReadNorFlash for Flash {
 
     /// Reads what the flash itself returns now. From its cache, garbage that it returned while the
     /// voltage rose would be read again and again.
-    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Worn> {
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), VerifyError> {
         let mut word = [0; 4];
         let mut words = None;
         for (at, byte) in (offset..).zip(bytes) {
@@ -262,16 +262,16 @@ impl NorFlash for Flash {
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
     /// Erases sectors in the part of the flash that is reserved for this module. Other sectors stay
-    /// as they are, which normally gives [`Worn`].
-    fn erase(&mut self, from: u32, to: u32) -> Result<(), Worn> {
+    /// as they are, which normally gives [`VerifyError`].
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), VerifyError> {
         if from >= START && to <= END {
             self.work(Work::Erase { from, bytes: (to - from) as usize });
         }
-        if (from..to).all(|at| byte_at(at) == 0xFF) { Ok(()) } else { Err(Worn) }
+        if (from..to).all(|at| byte_at(at) == 0xFF) { Ok(()) } else { Err(VerifyError) }
     }
 
     /// Writes whole pages in the same part of the flash. Bits that are clear stay clear.
-    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), Worn> {
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), VerifyError> {
         for (to, bytes) in (offset..).step_by(PAGE_BYTES).zip(bytes.chunks_exact(PAGE_BYTES)) {
             if (START..END).contains(&to) {
                 let mut page = [0; PAGE_BYTES];
@@ -286,7 +286,7 @@ impl NorFlash for Flash {
                     continue;
                 }
             }
-            return Err(Worn);
+            return Err(VerifyError);
         }
         Ok(())
     }
@@ -311,7 +311,7 @@ impl AreaFlash for Flash {
         if from >= RECORDS {
             return Err(NotWritten);
         }
-        self.erase(from, from + SECTOR_BYTES as u32).map_err(|Worn| NotWritten)
+        self.erase(from, from + SECTOR_BYTES as u32).map_err(|VerifyError| NotWritten)
     }
 
     fn write_page(&mut self, at: usize, page: &[u8; PAGE_BYTES]) -> Result<(), NotWritten> {
@@ -319,6 +319,6 @@ impl AreaFlash for Flash {
         if to >= RECORDS {
             return Err(NotWritten);
         }
-        self.write(to, page).map_err(|Worn| NotWritten)
+        self.write(to, page).map_err(|VerifyError| NotWritten)
     }
 }

@@ -47,7 +47,7 @@ use penup::plotter::{
     Board, FlashRecords, Memory, MemorySlices, NotStored, Record, Replies, Stored,
 };
 use penup::protocol::RealTime;
-use penup::storage::Noted;
+use penup::storage::LogProgress;
 #[cfg(feature = "tiles")]
 use penup::storage::area::{Area, AreaFlash};
 use rp2040_hal::clocks::init_clocks_and_plls;
@@ -291,7 +291,7 @@ impl Board for Pico {
         self.kept.note_point(points)
     }
 
-    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, Noted)> {
+    fn progress(&mut self, notes: &mut [u8]) -> Option<(usize, LogProgress)> {
         self.kept.progress(notes)
     }
 

@@ -12,7 +12,7 @@ use penup::protocol::{RealTime, Receiver};
 
 use super::{serial, usb};
 use crate::boards::handler::Owned;
-use crate::boards::line::{self, Line, ReceiveMerge, Shared};
+use crate::boards::line::{self, ReceiveMerge, SerialInput, Shared};
 
 /// A serial port, by its number.
 #[derive(Clone, Copy, PartialEq, Eq)]
@@ -49,7 +49,7 @@ pub struct ReceiveSide {
 /// both.
 pub struct Ports {
     /// The main loop's ends of the receiving queues.
-    lines: [Line; COUNT],
+    lines: [SerialInput; COUNT],
     /// The number of the port where the next byte is looked for first: the same port until its line
     /// ends.
     last: usize,
@@ -64,7 +64,7 @@ pub struct Ports {
 }
 
 /// Creates the receiving ends for the handlers; returns the main loop's ends.
-pub fn set_up() -> [Line; COUNT] {
+pub fn set_up() -> [SerialInput; COUNT] {
     let [uart, usb] = &SHARED;
     let ((uart, uart_line), (usb, usb_line)) = (uart.ends(), usb.ends());
     // SAFETY: the ports' interrupts are masked since reset, and this runs once (the queues' cells
@@ -116,15 +116,15 @@ impl ReceiveSide {
 impl Ports {
     /// How many more bytes fit into the fuller of the queues.
     pub fn receive_room(&self) -> usize {
-        self.lines.iter().map(Line::room).min().unwrap_or(0)
+        self.lines.iter().map(SerialInput::room).min().unwrap_or(0)
     }
 
     /// Combines the parts that the set-up of the ports has returned.
-    pub fn new(lines: [Line; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
+    pub fn new(lines: [SerialInput; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
         Self { lines, last: 0, only_to_opened: false, replies: Replies::All, uart, usb }
     }
 
-    /// Returns the next ordinary byte and the number of its port: see [`Line::read_byte`]. It keeps
+    /// Returns the next ordinary byte and the number of its port: see [`SerialInput::read_byte`]. It keeps
     /// reading a port until nothing waits there or its line ends, then it is the other port's turn.
     pub fn read_byte(&mut self) -> Option<(usize, u8)> {
         for _ in 0..COUNT {

@@ -86,13 +86,13 @@ impl<R: Writable + RegisterSpec<Ux = u32>> Put for Reg<R> {
 
     #[inline(always)]
     fn set(&self, bits: u32) {
-        // SAFETY: as above, for the alias of the register.
+        // SAFETY: the contract of `Registers::at`, which also covers the aliases of the register.
         unsafe { self.as_ptr().byte_add(0x2000).write_volatile(bits) };
     }
 
     #[inline(always)]
     fn clear(&self, bits: u32) {
-        // SAFETY: as above.
+        // SAFETY: the contract of `Registers::at`, which also covers the aliases of the register.
         unsafe { self.as_ptr().byte_add(0x3000).write_volatile(bits) };
     }
 }

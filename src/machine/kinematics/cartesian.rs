@@ -4,7 +4,7 @@
 use super::{HomingSpace, Properties};
 use crate::machine::{Setting, Value};
 
-/// What sets a Cartesian machine apart from the other kinds.
+/// The properties that distinguish a Cartesian machine from the other kinds.
 pub(super) const PROPERTIES: Properties = Properties {
     steps_per_mm: [Setting::StepsPerMmX, Setting::StepsPerMmY],
     motor_ratio: Value::ONE,

@@ -5,7 +5,7 @@ use super::{HomingSpace, Properties};
 use crate::drawing::PagePoint;
 use crate::machine::{Setting, Value};
 
-/// What sets a CoreXY machine apart from the other kinds.
+/// The properties that distinguish a CoreXY machine from the other kinds.
 pub(super) const PROPERTIES: Properties = Properties {
     steps_per_mm: [Setting::StepsPerMmX; 2],
     // A diagonal move on the page is √2 times as long for one of the motors.

@@ -28,7 +28,7 @@ pub enum Kinematics {
     Polargraph(Anchors),
 }
 
-/// What sets one kind of machine apart from the others, whatever its size.
+/// The properties that distinguish a kind of machine from the others, whatever its size.
 #[derive(Debug)]
 pub(super) struct Properties {
     /// The settings that hold the steps per millimetre of x and y on the page.
@@ -49,7 +49,7 @@ pub(super) struct Properties {
     pub(super) homed_length: Option<Setting>,
 }
 
-/// What the limit switches limit, and so in which coordinates a machine is homed.
+/// What the limit switches limit, which determines the coordinates in which a machine is homed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum HomingSpace {
     /// The page: each switch ends the travel of x or of y.

@@ -34,7 +34,7 @@ pub struct Pulser<'q, A, P, const N: usize> {
     pen: P,
     /// The queue from which events are taken.
     ring: &'q EventRing<N>,
-    /// The orders of the main loop and the counts for it.
+    /// The state that is shared with the main loop: its orders, and the counts for it.
     state: &'q PulserState,
     /// The ticks from the current event to the next.
     ticks: u32,

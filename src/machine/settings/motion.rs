@@ -17,7 +17,7 @@ impl Settings {
         Limits::new(&self.motion_settings()).map(|_| ())
     }
 
-    /// The limits that the motion planner needs if this many steps can be counted on to wait in the
+    /// Returns the limits that the motion planner needs if this many steps are sure to wait in the
     /// `queue`.
     ///
     /// Speed and acceleration are measured along the path, so the slower axis determines both.
@@ -57,7 +57,7 @@ impl Settings {
         (limits.brake(longest_step, queue), is_less.then_some(held))
     }
 
-    /// Returns how long strokes take.
+    /// Returns the durations of strokes.
     #[cfg(feature = "early-ink")]
     pub fn stroke_time(&self) -> StrokeTime {
         let MotionSettings { steps_per_mm, draw_mm_per_min, .. } = self.motion_settings();
@@ -70,8 +70,8 @@ impl Settings {
         }
     }
 
-    /// Returns how fast the pen travels on the page, for an order that is improved by this many units
-    /// of work in a second. It does not depend on the board.
+    /// Returns how fast the pen travels on the page, and how many units of work on the order count
+    /// as one second. It does not depend on the board.
     pub fn time_model(&self, units_per_second: u32) -> TimeModel {
         let MotionSettings { steps_per_mm, travel_mm_per_min, acceleration_mm_per_s2, .. } =
             self.motion_settings();
@@ -119,7 +119,7 @@ impl Settings {
     }
 }
 
-/// How long strokes take.
+/// The durations of strokes.
 #[cfg(feature = "early-ink")]
 #[derive(Debug, Clone, Copy)]
 pub struct StrokeTime {

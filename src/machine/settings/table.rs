@@ -47,7 +47,7 @@ pub enum Setting {
     HomingFeed,
     /// `$25` The speed of the first approach to a switch.
     HomingSeek,
-    /// `$26` How long the machine stands between two moves of homing.
+    /// `$26` How long the machine rests between two moves of homing.
     HomingDebounce,
     /// `$27` The distance from its switch at which an axis is homed.
     HomingPullOff,
@@ -171,7 +171,7 @@ pub struct SettingInfo {
     pub setting: Setting,
     /// The number by which the user changes it, as in `$100=80`.
     pub number: u16,
-    /// What it is, in the words of the list that `$$` prints.
+    /// The name of the setting, as the list printed by `$$` shows it.
     pub name: &'static str,
     /// The unit; empty for a plain number.
     pub unit: &'static str,
@@ -237,7 +237,7 @@ const KEEPS_POINTS: bool = cfg!(feature = "resume");
 /// The name of [`Setting::PointDistance`].
 const POINT_NAME: &str =
     if KEEPS_POINTS { "within strokes keep the point reached each" } else { "(not on this board)" };
-/// Its least and greatest value, and its default.
+/// The least and the greatest value of such a setting, and its default.
 const POINT_RANGE: (f64, f64, f64) =
     if KEEPS_POINTS { (0.0, 10000.0, 0.0) } else { (0.0, 0.0, 0.0) };
 

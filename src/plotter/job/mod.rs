@@ -28,7 +28,7 @@ use crate::drawing::Stored;
 use crate::index::Index;
 use crate::machine::StrokeEnds;
 #[cfg(feature = "early-ink")]
-use crate::order::First;
+use crate::order::FirstStrokes;
 use crate::order::{self, Leg};
 use crate::stage::Scratch;
 #[cfg(not(feature = "early-ink"))]
@@ -62,12 +62,12 @@ impl<I: Index> Observer<I> for Unobserved {
 /// Number of the figures of a job.
 pub(super) const FIGURES: usize = 13;
 
-/// What the order of a job is computed from, besides its drawing.
+/// What is needed to compute the order of a job, besides its drawing.
 #[cfg(feature = "early-ink")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Unordered {
     /// The strokes that are drawn first.
-    pub(super) first: First,
+    pub(super) first: FirstStrokes,
     /// The options of the order.
     pub(super) options: order::Options,
 }
@@ -79,9 +79,9 @@ pub struct Job<I = u16> {
     stored: Stored<I>,
     /// Number of segments in the tour, which lies behind the drawing.
     legs: usize,
-    /// What the ordering has achieved: lengths and lifts.
+    /// The result of the ordering: lengths and lifts.
     report: order::Report,
-    /// What the order will be computed from that is not known yet beyond the first strokes.
+    /// What is needed to compute the order beyond the first strokes, while it is not known.
     #[cfg(feature = "early-ink")]
     unordered: Option<Unordered>,
     /// Number of faces that were left out because they have no area.
@@ -219,7 +219,7 @@ impl<I: Index> Job<I> {
         self.strokes_of(None, words, cursor, ends)
     }
 
-    /// The same, but if `begun` is given, the strokes of that.
+    /// Returns the strokes of `begun` if it is given, and otherwise those of the job.
     #[cfg(feature = "early-ink")]
     #[inline(always)] // Where steps are planned.
     pub(super) fn strokes_of<'a>(

@@ -14,7 +14,7 @@ use crate::index::Index;
 use crate::machine::StrokeTime;
 use crate::model::Model;
 #[cfg(feature = "early-ink")]
-use crate::order::First;
+use crate::order::FirstStrokes;
 #[cfg(not(feature = "early-ink"))]
 use crate::order::Leg;
 use crate::order::{self, TimeModel};
@@ -23,8 +23,8 @@ use crate::protocol::CommandError;
 use crate::stage::{Cancel, Stage};
 use crate::view::{Camera, View};
 
-/// What a job is computed from, and the working memory in which that is done. Each stage (each part
-/// of the computation) borrows it.
+/// The inputs of the computation of a job, and the working memory in which it takes place. Each
+/// stage (each part of the computation) borrows it.
 pub(in crate::plotter) struct Pipeline<'p, I> {
     /// The model, which is not changed.
     pub model: &'p Model<'p, I>,
@@ -32,9 +32,10 @@ pub(in crate::plotter) struct Pipeline<'p, I> {
     pub options: &'p PlotOptions,
     /// The steps per millimetre on the page, in which the drawing is measured.
     pub steps: StepsPerMillimetre,
-    /// How fast the machine travels and the order is improved, by which its default effort ends.
+    /// The speed of the machine and of the search for a better order, which determine how long the
+    /// search pays.
     pub time_model: TimeModel,
-    /// How long strokes take, if some are chosen that are drawn before the order of the others is
+    /// The durations of strokes, if some strokes are to be drawn before the order of the others is
     /// known.
     #[cfg(feature = "early-ink")]
     pub early: Option<StrokeTime>,
@@ -99,7 +100,7 @@ impl<I: Index> Pipeline<'_, I> {
                     stored.split_mut(words).map_err(CommandError::DrawingTooLarge)?;
                 order::choose_first(points, segments, order, time, scratch, *cancel)?
             }
-            None => First::default(),
+            None => FirstStrokes::default(),
         };
         let Found { degenerate_faces, joined_edges, .. } = *found;
         let report = order::Report::default();

@@ -33,7 +33,7 @@ pub struct Cursor<I = u16> {
     /// Index in the tour of the first segment of the stroke, or, while a closed stroke goes on
     /// beyond its end, of the segment along which it does so.
     first: usize,
-    /// How much further it goes on.
+    /// The distance that is left to draw beyond the end.
     beyond: PathLength,
 }
 
@@ -62,14 +62,14 @@ pub struct Strokes<'a, I = u16> {
     /// Whether more strokes follow, of which the order is not known yet.
     #[cfg(feature = "early-ink")]
     pub(in crate::plotter) has_more: bool,
-    /// How far the strokes have been handed over.
+    /// The position up to which the strokes have been handed over.
     pub(in crate::plotter) cursor: &'a mut Cursor<I>,
     /// By how much the strokes are made longer, if they are.
     pub(super) ends: Option<StrokeEnds>,
-    /// How far the strokes have come, if they are sent while they are drawn.
+    /// The progress of strokes that are sent while they are drawn, if they are.
     #[cfg(feature = "stream")]
     pub(in crate::plotter) streamed: Option<&'a Streamed>,
-    /// The working memory, where they lie.
+    /// The working memory, in which these strokes lie.
     #[cfg(feature = "stream")]
     pub(in crate::plotter) ring: &'a [u64],
 }
@@ -102,7 +102,8 @@ impl<'a, I: Index> Strokes<'a, I> {
         ends.is_some_and(|(start, end)| start == end)
     }
 
-    /// Where the stroke that begins with this segment of the tour begins: early, if it is open.
+    /// Returns where the stroke that begins with this segment of the tour begins. An open stroke
+    /// begins earlier than its segment, by the length that is added.
     #[inline(never)] // Without such settings, this is never called.
     fn early(&self, ends: &StrokeEnds, index: usize) -> Option<PagePoint> {
         let (segment, numbers) = self.leg(index)?;
@@ -114,8 +115,8 @@ impl<'a, I: Index> Strokes<'a, I> {
         Some(ends.along([to, from], from, ends.lead))
     }
 
-    /// Where this segment of the tour ends: late, if an open stroke ends with it. Behind a closed
-    /// one, its beginning follows.
+    /// Returns where this segment of the tour ends. If it is the last one of an open stroke, it
+    /// ends later, by the length that is added; a closed stroke continues along its beginning.
     #[inline(never)] // Without such settings, this is never called.
     fn late(&mut self, ends: &StrokeEnds, index: usize) -> Option<PagePoint> {
         let (segment, numbers) = self.leg(index)?;
@@ -246,9 +247,9 @@ impl<I: Index> Strokes<'_, I> {
         }
     }
 
-    /// Lets the path begin within this stroke, at the last one of so many points that are passed
-    /// along the whole path, if it lies there; else with the stroke, as [`Strokes::begin_at`] does.
-    /// `distance` and `length` are the machine's
+    /// Lets the path begin within this stroke, at the last one of the `points` that are passed
+    /// along the whole path, if it lies in this stroke. Otherwise the path begins with the stroke,
+    /// as with [`Strokes::begin_at`]. `distance` and `length` are the machine's
     /// [`point_distance`](crate::machine::Machine::point_distance) and
     /// [`length`](crate::machine::Machine::length). Returns the number of points before the path.
     pub fn begin_at_point(
@@ -271,8 +272,8 @@ impl<I: Index> Strokes<'_, I> {
                 }
                 begun += 1;
             }
-            let way = at.map_or(0, |at| length([at, target.point]));
-            let is_last_point = walk.pass(target, way) && walk.passed == points;
+            let distance = at.map_or(0, |at| length([at, target.point]));
+            let is_last_point = walk.pass(target, distance) && walk.passed == points;
             let leg = self.cursor.leg;
             // A point where the stroke ends, or where it goes on beyond its end, is none.
             if is_last_point && begun > stroke && !self.ends_stroke(leg.saturating_sub(1)) {

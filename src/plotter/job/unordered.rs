@@ -3,11 +3,11 @@
 use super::{Job, Unordered};
 use crate::drawing::Drawing;
 use crate::index::Index;
-use crate::order::{self, Effort, First, Leg, Method, Options, Shape, TimeModel};
+use crate::order::{self, Effort, FirstStrokes, Leg, Method, Options, Shape, TimeModel};
 use crate::protocol::CommandError;
 use crate::stage::{Cancel, Scratch, items};
 
-/// What of a job the machine may read while its order is being computed.
+/// The part of a job that the machine may read while the order of the job is being computed.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::plotter) struct Begun<'d, I> {
     /// The drawing.
@@ -23,7 +23,7 @@ impl Unordered {
     /// This as numbers, which [`Unordered::from_words`] reads.
     pub(in crate::plotter) fn words(self) -> [u32; UNORDERED_WORDS] {
         let Self { first, options } = self;
-        let First { segments, odd_points, parts, strokes_left, spare_milliseconds } = first;
+        let FirstStrokes { segments, odd_points, parts, strokes_left, spare_milliseconds } = first;
         let Options { method, effort, lift_cost, .. } = options;
         let method = match method {
             Method::Auto => 0,
@@ -53,7 +53,7 @@ impl Unordered {
         ]
     }
 
-    /// What has these numbers; `None` if nothing has. The path is open.
+    /// Restores the value from these words; `None` if they hold none. The path is open.
     pub(in crate::plotter) fn from_words(words: [u32; UNORDERED_WORDS]) -> Option<Self> {
         let [segments, odd_points, parts, strokes_left, spare_milliseconds, rest @ ..] = words;
         let segments = usize::try_from(segments).ok()?;
@@ -69,7 +69,7 @@ impl Unordered {
             1 => Effort::Units(speed),
             _ => return None,
         };
-        let first = First { segments, odd_points, parts, strokes_left, spare_milliseconds };
+        let first = FirstStrokes { segments, odd_points, parts, strokes_left, spare_milliseconds };
         let options = Options { method, shape: Shape::OpenPath, effort, lift_cost };
         Some(Self { first, options })
     }
@@ -95,8 +95,8 @@ impl<I: Index> Job<I> {
         (Begun { drawing, drawn }, self.unordered.is_some())
     }
 
-    /// The strokes that are drawn first, and what the order of the others is computed from; `None`
-    /// if it is known.
+    /// Returns the strokes that are drawn first, and what is needed to order the others; `None` if
+    /// the order is known.
     pub(in crate::plotter) fn unordered(&self) -> Option<Unordered> {
         self.unordered
     }

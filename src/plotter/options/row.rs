@@ -20,7 +20,7 @@ pub struct PlotOption {
     pub name: &'static str,
     /// The alternatives for the value: words as they are written, and placeholders in capitals.
     pub values: &'static [&'static str],
-    /// What the option says, as `$` explains it.
+    /// The explanation of the option in the reply to `$`.
     pub help: &'static str,
     /// The kind of its value, and where the value lies.
     pub(super) kind: Kind,
@@ -67,14 +67,14 @@ pub(super) enum Kind {
     Continued,
 }
 
-/// What the client shows of an option besides its name, its values and its default.
+/// The client's description of an option, apart from its name, values and default.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Flag {
     /// The heading below which the client's help lists it.
     pub heading: &'static str,
     /// What the client's help says.
     pub help: &'static str,
-    /// What each word of a choice means. Empty if the option is no choice.
+    /// The meaning of each word of a choice. Empty if the option is no choice.
     pub choices: &'static [&'static str],
     /// Which values are valid, for the client's message. Empty if the kind of the value says it.
     pub range: &'static str,
@@ -129,7 +129,7 @@ impl PlotOption {
 
     /// Shows the option with its value, as `$options` lists it.
     pub(super) fn line<'a>(&'a self, options: &'a PlotOptions) -> impl fmt::Display + use<'a> {
-        Line(self, options)
+        OptionLine(self, options)
     }
 
     /// Writes the value that the option has in `options`.
@@ -196,9 +196,9 @@ impl fmt::Display for Usage<'_> {
 }
 
 /// Shows an option with its present value, as `$options` lists it.
-struct Line<'a>(&'a PlotOption, &'a PlotOptions);
+struct OptionLine<'a>(&'a PlotOption, &'a PlotOptions);
 
-impl fmt::Display for Line<'_> {
+impl fmt::Display for OptionLine<'_> {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(formatter, "${}=", self.0.name)?;
         self.0.show(self.1, formatter)

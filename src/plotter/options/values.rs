@@ -91,7 +91,7 @@ impl ProjectionChoice {
     }
 }
 
-/// What decides which lines of the model are hidden (`$see`).
+/// The part of the model that decides which lines are hidden (`$see`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum VisibilityMode {
@@ -106,16 +106,17 @@ pub enum VisibilityMode {
     Edges,
 }
 
-/// What becomes of hidden lines (`$hidden`).
+/// The treatment of hidden lines (`$hidden`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub enum HiddenLines {
-    /// They are not drawn.
+    /// Hidden lines are not drawn.
     #[default]
     Erased,
-    /// They are drawn as lines of this type. Full ones, like the visible lines, give a wire frame.
+    /// Hidden lines are drawn with this line type. With full lines, like the visible ones, the
+    /// result is a wire frame.
     Drawn(LineType),
-    /// They are drawn with this pen, counted from 0.
+    /// Hidden lines are drawn with this pen, counted from 0.
     Pen(u8),
 }
 

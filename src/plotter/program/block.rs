@@ -4,18 +4,18 @@ use super::{Motion, Plane};
 use crate::fixed::Decimal;
 use crate::protocol::{BlockError, CommandError, GCode, Word};
 
-/// What a line does beside setting modes and moving.
+/// The action of a line besides setting modes and moving.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Action {
-    /// Nothing else.
+    /// No other action.
     None,
     /// G4: a dwell.
     Dwell,
     /// G10: sets a coordinate system.
     SetSystem,
-    /// G28 or G30: goes to a kept position.
+    /// G28 or G30: moves to a stored position.
     GoToStored(StoredPosition),
-    /// G28.1 or G30.1: keeps the present position.
+    /// G28.1 or G30.1: stores the current position.
     StorePosition(StoredPosition),
     /// G53: coordinates are those of the machine.
     Machine,
@@ -33,12 +33,12 @@ pub(super) enum Action {
     Position,
 }
 
-/// A position that is kept.
+/// The positions that a program can store and return to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::plotter) enum StoredPosition {
-    /// That of G28.
+    /// The position of G28, where the pen is parked.
     Park,
-    /// That of G30.
+    /// The position of G30.
     Second,
 }
 
@@ -53,7 +53,7 @@ pub(super) enum Flow {
     End,
 }
 
-/// What uses the X, Y and Z of a line.
+/// The purpose of X, Y and Z in a line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum AxisUse {
     None,
@@ -83,7 +83,7 @@ pub(super) struct Block {
     pub(super) inverse_time: Option<bool>,
     pub(super) inches: Option<bool>,
     pub(super) system: Option<u8>,
-    /// 3, 4 or 5.
+    /// The number of M3, M4 or M5, if the line has one.
     pub(super) spindle: Option<u8>,
     /// 7, 8 or 9.
     pub(super) coolant: Option<u8>,
@@ -194,7 +194,7 @@ impl Block {
 
     fn take_g(&mut self, number: Decimal) -> Result<(), CommandError> {
         let unknown = Err(CommandError::UnsupportedWord(b'G'));
-        // In hundredths: G28.1 is 2810.
+        // Numbers are compared in hundredths: G28.1 is 2810.
         let Ok(hundredths) = number.to_hundredths() else { return unknown };
         let (whole, part) = (hundredths / 100, hundredths % 100);
         let mut has_part = false;

@@ -54,7 +54,7 @@ pub(super) struct Program {
     speed: Millimetres,
     /// F in mm/min, 0 if none is set.
     feed: Millimetres,
-    /// F of the present move in mm/min, 0 if none is set.
+    /// F of the current move in mm/min, 0 if none is set.
     move_feed: Millimetres,
     /// The end of the last move, as the lines give it.
     at: MachinePosition,
@@ -62,7 +62,7 @@ pub(super) struct Program {
     shift: MachinePosition,
     /// The shift of Z by G43.1.
     tool_length: Millimetres,
-    /// What the program has said of the pen.
+    /// What the program has shown of how it moves the pen.
     pen: pen::PenState,
 }
 
@@ -115,7 +115,7 @@ pub(super) enum Order {
     Line(PagePoint),
     /// A move along an arc.
     Arc(Arc),
-    /// The pen goes down where it stands.
+    /// Lowers the pen at the current position.
     Lower,
     /// A dwell, in units of 2^-16 s.
     Dwell(u32),
@@ -136,7 +136,7 @@ pub(super) enum Order {
     Position,
 }
 
-/// What an interpreter must know beside the line.
+/// The state outside the program that its interpreter needs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Context<'c> {
     /// The settings of the machine.
@@ -384,7 +384,7 @@ impl Program {
         }
         self.at = [x, y, z];
         if !block.has_any(b"XY") && block.action != Action::Machine {
-            // Z alone moves nothing but the pen.
+            // A move along Z alone only moves the pen.
             return Ok(Order::Nothing);
         }
         self.draws = self.begin_move(rule);
@@ -468,7 +468,7 @@ impl Program {
     }
 }
 
-/// A number that is not a length; one beyond the range is its end.
+/// Converts a number that is not a length, limiting it to the range.
 fn clamped(number: Decimal) -> Millimetres {
     number.to_millimetres().unwrap_or(Millimetres::MAX)
 }

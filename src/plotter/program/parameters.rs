@@ -13,7 +13,7 @@ pub(in crate::plotter) const TEXT_LIMIT: usize = 32;
 /// A text that is kept.
 pub(in crate::plotter) type Text = heapless::String<TEXT_LIMIT, u8>;
 
-/// What stays when a program ends.
+/// The parameters that are kept when a program ends.
 #[derive(Debug, Clone)]
 pub(in crate::plotter) struct Parameters {
     /// The origins of G54 to G59.

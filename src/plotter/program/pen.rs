@@ -5,7 +5,7 @@ use super::{Motion, Program};
 use crate::fixed::Millimetres;
 use crate::machine::{Setting, Settings, Value};
 
-/// What moves the pen.
+/// The words of a program that move the pen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PenRule {
     /// What a program shows: Z, M3 and M5, or both. As long as it has shown neither, G1 to G3 draw.
@@ -52,10 +52,10 @@ fn is_down_by(speed: Millimetres, settings: &Settings) -> bool {
     if settings.is_on(Setting::PenSBelow) { speed <= at } else { speed >= at }
 }
 
-/// What a program has said of the pen, and what it drew.
+/// What a program has shown of how it moves the pen, and what it has drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct PenState {
-    /// The number of lines so far; more than 255 count as 255.
+    /// The number of lines of the program that have come; more than 255 count as 255.
     lines: u8,
     /// Whether M3 or M4 has come.
     has_on: bool,
@@ -153,7 +153,7 @@ impl Program {
         }
     }
 
-    /// Whether a move of the present kind draws. The move is counted.
+    /// Counts a move, and returns whether a move of the current kind draws.
     pub(super) fn begin_move(&mut self, rule: PenRule) -> bool {
         self.pen.waits = false;
         let is_feed = self.motion != Motion::Rapid;
@@ -179,7 +179,8 @@ impl Program {
         self.pen.has_servo
     }
 
-    /// Whether a dot waits that M3 and M5 without a move between ask for. It waits no more.
+    /// Returns whether M3 and M5 without a move between them ask for a dot. The request is then
+    /// forgotten.
     pub(super) fn take_dot(&mut self) -> bool {
         core::mem::take(&mut self.pen.waits)
     }
@@ -189,8 +190,8 @@ impl Program {
         self.pen.waits |= waits;
     }
 
-    /// Ends the program, whose modes stay: what it has shown of the pen is forgotten, unless the
-    /// pen is down. Returns what there is to say.
+    /// Ends the program, whose modes stay. What it has shown of the pen is forgotten, unless the
+    /// pen is down. Returns what the user is to be told.
     pub(in crate::plotter) fn end(&mut self, settings: &Settings) -> Option<&'static str> {
         let rule = PenRule::of(settings);
         let pen = &self.pen;

@@ -1,6 +1,6 @@
 //! Computes a drawing of a model in flash part by part: one pass over the tiles for each pen.
 
-use super::parts::Search;
+use super::parts::DrawingSearch;
 use crate::drawing::StepsPerMillimetre;
 use crate::drawing::{Bounds, LineType, PackedLine, PagePoint, Stored, build_graph};
 use crate::index::Index;
@@ -16,11 +16,11 @@ use crate::view::View;
 use crate::visibility::{SinkFull, Stretch, StretchSink, VisibilityError};
 use core::iter;
 
-/// The part of the working memory that holds the lines of a part is one in this many words.
+/// The lines of a part take at most the working memory divided by this number.
 const LINE_SHARE: usize = 8;
 
-/// A part has lines of more than one tile until it has so many. Fewer would make the way between
-/// the parts long.
+/// A part takes further tiles until it has at least this many lines. With fewer, the pen would
+/// travel far between the parts.
 const ENOUGH_LINES: usize = 64;
 
 /// The number of positions that are looked at between two checks for cancelling.
@@ -39,7 +39,7 @@ pub(super) fn prepare(
     steps: StepsPerMillimetre,
     words: &mut [u64],
     cancel: &mut dyn Cancel,
-) -> Result<(Search, [PagePoint; 2]), CommandError> {
+) -> Result<(DrawingSearch, [PagePoint; 2]), CommandError> {
     cancel.enter(Stage::View);
     let camera = options.camera(model).ok_or(CommandError::NothingToPlot)?;
     cancel.check()?;
@@ -88,7 +88,8 @@ pub(super) fn prepare(
     let pens = of_model | of_hidden | u32::from(has_title);
     let pen = pens.trailing_zeros() as u8;
     let pens = pens & pens.wrapping_sub(1);
-    let search = Search { view, map, options: *options, tiles, pens, pen, around, has_title };
+    let search =
+        DrawingSearch { view, map, options: *options, tiles, pens, pen, around, has_title };
     Ok((search, [least, greatest]))
 }
 
@@ -107,7 +108,8 @@ fn each_title_line(
     drawn.map_err(|SinkFull| StoredModelError::TooDense.into())
 }
 
-/// A part that has been computed, and the first of the working memory's words that it takes.
+/// A part that has been computed, and the index of the first word of the working memory that it
+/// takes.
 pub(super) type Computed<I> = (Job<I>, usize);
 
 /// Computes the next part: its strokes in their order, which then lie in `words`. `at` is where
@@ -118,7 +120,7 @@ pub(super) type Computed<I> = (Job<I>, usize);
 #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
 pub(super) fn next_part<I: Index>(
     model: &StoredModel<'_>,
-    search: &mut Search,
+    search: &mut DrawingSearch,
     steps: StepsPerMillimetre,
     order: order::Options,
     words: &mut [u64],
@@ -158,12 +160,12 @@ pub(super) fn next_part<I: Index>(
 #[inline(never)] // Inlined, its frame would take stack in the rest of the computation.
 fn find_lines(
     model: &StoredModel<'_>,
-    search: &mut Search,
+    search: &mut DrawingSearch,
     words: &mut [u64],
     cancel: &mut dyn Cancel,
 ) -> Result<usize, CommandError> {
     cancel.enter(Stage::Visibility);
-    let Search { view, map, options, tiles: paused, pen, .. } = search;
+    let DrawingSearch { view, map, options, tiles: paused, pen, .. } = search;
     let too_dense = CommandError::Stored(StoredModelError::TooDense);
     let room = words.len() / LINE_SHARE;
     let (index, rest) = words.split_at_mut_checked(paused.index_words()).ok_or(too_dense)?;
@@ -233,12 +235,12 @@ fn order_lines<I: Index>(
     let ends = (point(tour.first(), false), point(tour.last(), true));
     if let (Some(at), (Some(first), Some(last))) = (at, ends) {
         // The end that is nearer to where the pen is comes first.
-        let ways = [first, last].map(|end| order::length(at, end));
-        if ways[1] < ways[0] {
+        let distances = [first, last].map(|end| order::length(at, end));
+        if distances[1] < distances[0] {
             tour.reverse();
             tour.iter_mut().for_each(|leg| *leg = leg.flipped());
         }
-        report.pen_up += u64::from(ways[0].min(ways[1]));
+        report.pen_up += u64::from(distances[0].min(distances[1]));
         report.lifts += 1;
     }
     Ok(Some(Job::of(stored, tour.len(), report)))

@@ -12,7 +12,7 @@ mod parts;
 mod serve;
 
 pub(super) use parts::Parts;
-pub(super) use serve::Tended;
+pub(super) use serve::PartsProgress;
 
 use super::reply::Reply;
 use super::{Board, Inner};
@@ -22,11 +22,11 @@ use crate::model::{StoredModel, Upload, UploadError};
 use crate::protocol::{Command, CommandError, StoredModelError};
 use crate::storage::area::{Area, AreaFlash};
 
-/// What the flash holds.
+/// The state of the model in flash.
 #[derive(Debug, Default)]
 #[expect(clippy::large_enum_variant, reason = "without an allocator it lies here anyway")]
-pub(super) enum Large {
-    /// No model: the one in memory counts.
+pub(super) enum FlashModel {
+    /// There is no model in flash, and the one in memory counts.
     #[default]
     Nothing,
     /// A model that is still coming.
@@ -55,15 +55,15 @@ fn flash_of<B: Board>(board: &mut B) -> Result<(Area<'static>, &mut dyn AreaFlas
 impl<I: Index> Inner<'_, I> {
     /// Whether the model lies in flash, or goes there.
     pub(super) fn is_in_flash(&self) -> bool {
-        !matches!(self.large, Large::Nothing)
+        !matches!(self.large, FlashModel::Nothing)
     }
 
-    /// Looks for a model that the flash keeps, and tells the user of it.
+    /// Looks for a model in flash, and tells the user of it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn find_stored<B: Board>(&mut self, board: &mut B) {
         let Some((area, _)) = board.model_flash() else { return };
         let Some(model) = StoredModel::new(area) else { return };
-        self.large = Large::Whole;
+        self.large = FlashModel::Whole;
         Reply(board).line(format_args!(
             "[MSG:the flash keeps a model of {} vertices: $plot draws it, $clear removes it]",
             model.vertex_count()
@@ -106,14 +106,14 @@ impl<I: Index> Inner<'_, I> {
             }
             Command::Pen { .. } if self.options.one_pen => return Ok(Some(command)),
             Command::Pen { .. } => {}
-            _ if is_edit || is_curve && matches!(self.large, Large::Whole) => {
+            _ if is_edit || is_curve && matches!(self.large, FlashModel::Whole) => {
                 return Err(StoredModelError::Unchangeable.into());
             }
             _ if is_curve => return Err(StoredModelError::NoCurves.into()),
             _ if grows => {}
             _ => return Ok(Some(command)),
         }
-        let Large::Upload(upload) = &mut self.large else {
+        let FlashModel::Upload(upload) = &mut self.large else {
             return Err(StoredModelError::Unchangeable.into());
         };
         if !is_at_rest(self.machine.state(), self.machine.is_stopped()) {
@@ -128,7 +128,7 @@ impl<I: Index> Inner<'_, I> {
             _ => Ok(()),
         };
         if outcome == Err(UploadError::Flash) {
-            self.large = Large::Nothing;
+            self.large = FlashModel::Nothing;
         }
         Ok(outcome.map(|()| None)?)
     }
@@ -155,7 +155,7 @@ impl<I: Index> Inner<'_, I> {
             return Err(CommandError::Busy);
         }
         let (area, flash) = flash_of(board)?;
-        self.large = Large::Upload(Upload::begin(&self.model, area, flash)?);
+        self.large = FlashModel::Upload(Upload::begin(&self.model, area, flash)?);
         self.copy_words = 0;
         self.model.clear();
         Reply(board).line(format_args!(
@@ -175,7 +175,7 @@ impl<I: Index> Inner<'_, I> {
         }
         let (area, flash) = flash_of(board)?;
         area.clear(flash).map_err(|_| StoredModelError::NotWritten)?;
-        self.large = Large::Nothing;
+        self.large = FlashModel::Nothing;
         Reply(board).line(format_args!("[MSG:the model in flash is removed]"));
         Ok(())
     }
@@ -188,11 +188,11 @@ impl<I: Index> Inner<'_, I> {
     ) -> Result<StoredModel<'static>, CommandError> {
         let (area, flash) = flash_of(board)?;
         match core::mem::take(&mut self.large) {
-            Large::Upload(upload) => drop(upload.finish(area, flash)?),
-            Large::Whole | Large::Nothing => {}
+            FlashModel::Upload(upload) => drop(upload.finish(area, flash)?),
+            FlashModel::Whole | FlashModel::Nothing => {}
         }
         let model = StoredModel::new(area).ok_or(StoredModelError::Damaged)?;
-        self.large = Large::Whole;
+        self.large = FlashModel::Whole;
         Ok(model)
     }
 

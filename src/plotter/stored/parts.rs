@@ -1,9 +1,9 @@
 //! The strokes of a drawing that is computed and drawn part by part.
 //!
-//! The memory of the model, which lies in flash, is a ring of targets, as the working memory is for
-//! strokes that a computer sends. A part is handed to it as a whole if it fits; the machine draws
-//! it from there while the next part is computed. Where the next part is late, the machine waits
-//! with the pen raised.
+//! The memory of the model, which lies in flash, serves as a ring of targets, as the working memory
+//! does for strokes that a computer sends. A part is handed to the ring as a whole if it fits, and
+//! the machine draws it from there while the next part is computed. If the next part is late, the
+//! machine waits with the pen raised.
 
 use crate::drawing::{PageMap, PagePoint};
 use crate::machine::{JobSize, Target};
@@ -14,18 +14,18 @@ use crate::protocol::StreamedTarget;
 use crate::tiles::PausedTiles;
 use crate::view::View;
 
-/// What is the same for all parts of a drawing, and how far the search has come.
+/// The state that all parts of a drawing share, and the progress of the search for its lines.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Search {
+pub(super) struct DrawingSearch {
     /// The camera.
     pub view: View,
     /// The map to the page.
     pub map: PageMap,
-    /// What is drawn and how. The user's options do not change meanwhile.
+    /// The options of the drawing. Changes by the user do not affect it.
     pub options: PlotOptions,
     /// The tiles that are left of this pass.
     pub tiles: PausedTiles,
-    /// One bit for each pen that has a pass of its own behind this one.
+    /// One bit for each pen that has a pass of its own after this one.
     pub pens: u32,
     /// The pen of this pass, from 0.
     pub pen: u8,
@@ -37,27 +37,28 @@ pub(super) struct Search {
 
 /// A part whose strokes lie in the working memory, in their order.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Part<I> {
+pub(super) struct ComputedPart<I> {
     /// The strokes.
     pub job: Job<I>,
-    /// How far they have been handed to the ring.
+    /// The position up to which the strokes have been handed to the ring.
     pub cursor: Cursor<I>,
-    /// The number of targets that have not.
+    /// The number of targets that have not been handed to the ring.
     pub left: usize,
-    /// The first word of the working memory that it takes.
+    /// The first word of the working memory that the part takes.
     pub begin: usize,
 }
 
 /// A drawing that is computed and drawn part by part.
 #[derive(Debug)]
 pub(in crate::plotter) struct Parts<I = u16> {
-    /// What is left to compute; `None` if no such drawing is on its way, or all is computed.
-    pub(super) search: Option<Search>,
+    /// What is left to compute; `None` if no drawing in parts is in progress, or all of it is
+    /// computed.
+    pub(super) search: Option<DrawingSearch>,
     /// The part that has been computed.
-    pub(super) part: Option<Part<I>>,
+    pub(super) part: Option<ComputedPart<I>>,
     /// The last target that has come to the ring.
     pub(super) last: StreamedTarget,
-    /// Whether such a drawing is on its way.
+    /// Whether a drawing in parts is in progress.
     pub(super) is_active: bool,
 }
 
@@ -70,7 +71,7 @@ impl<I> Default for Parts<I> {
 }
 
 impl<I> Parts<I> {
-    /// Whether such a drawing is on its way.
+    /// Whether a drawing in parts is in progress.
     #[inline(always)] // It is called in every turn of the main loop.
     pub(in crate::plotter) fn is_active(&self) -> bool {
         self.is_active
@@ -88,7 +89,7 @@ impl<I> Parts<I> {
         &mut self,
         (streamed, read): (&mut Streamed, usize),
         ring: &mut [u64],
-        mut next: impl FnMut(&mut Part<I>) -> Option<StreamedTarget>,
+        mut next: impl FnMut(&mut ComputedPart<I>) -> Option<StreamedTarget>,
         length: impl Fn([PagePoint; 2]) -> u64,
     ) -> JobSize {
         let mut size = JobSize::default();
@@ -104,12 +105,12 @@ impl<I> Parts<I> {
             };
             streamed.put(ring, next);
             let StreamedTarget { target: last, pen } = core::mem::replace(&mut self.last, next);
-            let way = length([last.point, next.target.point]);
+            let distance = length([last.point, next.target.point]);
             if next.target.ink.is_some() {
-                size.drawn += way;
+                size.drawn += distance;
                 size.strokes += u32::from(last.ink.is_none() || pen != next.pen);
             } else {
-                size.travelled += way;
+                size.travelled += distance;
             }
             part.left -= 1;
         }

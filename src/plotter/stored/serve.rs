@@ -2,7 +2,7 @@
 //! others, while the machine draws.
 
 use super::compute::{Computed, next_part, prepare};
-use super::parts::{Part, Search};
+use super::parts::{ComputedPart, DrawingSearch};
 use crate::drawing::PagePoint;
 use crate::fixed::Millimetres;
 use crate::index::Index;
@@ -18,9 +18,9 @@ use crate::plotter::{
 use crate::protocol::{CommandError, RealTime, StoredModelError, StreamedTarget};
 use crate::stage::{Aborted, Cancel};
 
-/// How the work on a drawing in parts goes on.
+/// The result of working on a drawing in parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::plotter) enum Tended {
+pub(in crate::plotter) enum PartsProgress {
     /// There is nothing to do now.
     Idle,
     /// A part has been computed.
@@ -81,13 +81,13 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// The options of the order of each part.
-    fn order_of_parts(&self, search: &Search) -> order::Options {
+    fn order_of_parts(&self, search: &DrawingSearch) -> order::Options {
         let settings = self.machine.settings();
         search.options.order(settings.page_steps(), settings.time_model(self.units_per_second()))
     }
 
     /// Notes what has been computed.
-    fn take_part(&mut self, search: Search, part: Option<Computed<I>>) {
+    fn take_part(&mut self, search: DrawingSearch, part: Option<Computed<I>>) {
         self.parts.search = part.is_some().then_some(search);
         if part.is_none() {
             self.streamed.end_here();
@@ -101,7 +101,7 @@ impl<I: Index> Inner<'_, I> {
             let mut cursor = Cursor::default();
             let mut strokes = job.strokes(words, &mut cursor, ends);
             let left = core::iter::from_fn(|| strokes.next_target()).count();
-            Part { job, cursor: Cursor::default(), left, begin }
+            ComputedPart { job, cursor: Cursor::default(), left, begin }
         });
     }
 
@@ -124,41 +124,41 @@ impl<I: Index> Inner<'_, I> {
 
     /// Computes the next part of a drawing, or hands what is computed to the machine.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
-    pub(in crate::plotter) fn tend_parts<B: Board>(&mut self, board: &mut B) -> Tended {
+    pub(in crate::plotter) fn tend_parts<B: Board>(&mut self, board: &mut B) -> PartsProgress {
         if !matches!(self.machine.state(), State::Run | State::Hold { .. }) {
             self.end_parts();
-            return Tended::Idle;
+            return PartsProgress::Idle;
         }
         if self.parts.part.is_some() {
             self.feed_part();
-            return Tended::Idle;
+            return PartsProgress::Idle;
         }
-        let Some(mut search) = self.parts.search else { return Tended::Idle };
+        let Some(mut search) = self.parts.search else { return PartsProgress::Idle };
         let model = board.model_flash().and_then(|(area, _)| StoredModel::new(area));
         let Some(model) = model else {
             self.give_up(StoredModelError::Damaged.into(), board);
-            return Tended::Busy;
+            return PartsProgress::Busy;
         };
         let steps = self.machine.settings().page_steps();
         let order = self.order_of_parts(&search);
         let at = Some(self.parts.last.target.point);
         // The machine goes on meanwhile, and does not use this memory.
         let words = core::mem::take(&mut self.words);
-        let mut server = Server { inner: self, board, is_status_due: false, ends: None };
+        let mut server = PartCancel { inner: self, board, is_status_due: false, ends: None };
         let part = next_part(&model, &mut search, steps, order, words, at, &mut server);
         let ends = server.ends;
         self.words = words;
         match (ends, part) {
-            (Some(Ends::ByUser), _) => return Tended::Aborted,
+            (Some(EarlyEnd::ByUser), _) => return PartsProgress::Aborted,
             // The machine has reported why.
-            (Some(Ends::ByMachine), _) => self.end_parts(),
+            (Some(EarlyEnd::ByMachine), _) => self.end_parts(),
             (None, Ok(part)) => {
                 self.take_part(search, part);
                 self.feed_part();
             }
             (None, Err(error)) => self.give_up(error, board),
         }
-        Tended::Busy
+        PartsProgress::Busy
     }
 
     /// Gives the job up because its next part cannot be computed.
@@ -195,35 +195,35 @@ fn beyond(
     ]
 }
 
-/// Why a computation has ended early.
+/// The reasons why a computation has ended early.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Ends {
+enum EarlyEnd {
     /// The user has given the job up.
     ByUser,
-    /// The machine draws no longer: it is in alarm.
+    /// The machine no longer draws, because it is in alarm.
     ByMachine,
 }
 
 /// Keeps the machine and the serial line going while the next part is computed.
-struct Server<'s, 'm, I, B> {
-    /// The plotter, but for its working memory.
+struct PartCancel<'s, 'm, I, B> {
+    /// The plotter without its working memory.
     inner: &'s mut Inner<'m, I>,
     /// The board.
     board: &'s mut B,
     /// Whether a status report was asked for and waits for room in the output.
     is_status_due: bool,
-    /// Why the computation ends, if it does.
-    ends: Option<Ends>,
+    /// The reason why the computation is to end, if it is.
+    ends: Option<EarlyEnd>,
 }
 
-impl<I: Index, B: Board> Cancel for Server<'_, '_, I, B> {
+impl<I: Index, B: Board> Cancel for PartCancel<'_, '_, I, B> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn check(&mut self) -> Result<(), Aborted> {
         let Self { inner, board, is_status_due, ends } = self;
         let requests = board.take_real_time();
         report::greet_opened(inner.machine.state(), inner.resumption, *board);
         if requests.has(RealTime::ABORT) {
-            *ends = Some(Ends::ByUser);
+            *ends = Some(EarlyEnd::ByUser);
             return Err(Aborted);
         }
         inner.act(requests);
@@ -238,7 +238,7 @@ impl<I: Index, B: Board> Cancel for Server<'_, '_, I, B> {
         if matches!(inner.machine.state(), State::Run | State::Hold { .. }) {
             return Ok(());
         }
-        *ends = Some(Ends::ByMachine);
+        *ends = Some(EarlyEnd::ByMachine);
         Err(Aborted)
     }
 }

@@ -156,7 +156,7 @@ pub enum CommandError {
     /// A line of strokes is not written as one.
     #[cfg(feature = "stream")]
     NotStrokes,
-    /// No strokes are expected, or not so many.
+    /// No strokes are expected, or fewer than were sent.
     #[cfg(feature = "stream")]
     NoStream,
     /// A stroke leads beyond the bounds that were said before.

@@ -6,11 +6,12 @@ use core::fmt;
 /// Why something is not done with a model in flash.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoredModelError {
-    /// It is complete, so it cannot be added to, edited, listed or taken back.
+    /// The model is complete, so it cannot be extended, edited, listed or undone.
     Unchangeable,
-    /// It is too large for the memory, and the flash holds no curves.
+    /// The model is too large for the memory, and the flash holds no curves.
     NoCurves,
-    /// It is drawn with hidden lines removed among faces only, and not as a flat plan.
+    /// A model in flash can be drawn only with hidden lines removed by faces, and not as a flat
+    /// plan.
     FacesOnly,
     /// A job draws it, so it and the options stay as they are.
     Drawing,

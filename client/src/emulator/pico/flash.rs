@@ -14,7 +14,7 @@ const LOW_BITS: u32 = 24;
 /// The erasure of a sector, or the writing of a page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FlashOperation {
-    /// When it began, on the board's clock.
+    /// The time at which the operation began, on the board's clock.
     pub began: Duration,
     /// Whether a sector is erased.
     pub is_erasure: bool,

@@ -61,7 +61,7 @@ const NO_TIMES: [u8; 10] = [
     INTERRUPTS_END,
 ];
 
-/// What the reader threads have learnt from the emulator.
+/// The state of the emulator, as the reader threads have learnt it.
 #[derive(Default)]
 pub(super) struct State {
     pub(super) serial: VecDeque<u8>,

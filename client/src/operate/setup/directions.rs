@@ -8,17 +8,17 @@ use penup::machine::Setting;
 /// The length of the moves that show a direction, in mm.
 const SHORT: f64 = 10.0;
 
-/// Where the pen went, as the user saw it.
+/// The direction in which the user saw the pen go.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Way {
+enum SeenDirection {
     Right,
     Left,
     Up,
     Down,
 }
 
-impl Way {
-    /// The words for it, of which one letter is enough.
+impl SeenDirection {
+    /// The words for the directions. Their first letters are enough.
     const WORDS: [(&'static str, Self); 4] =
         [("right", Self::Right), ("left", Self::Left), ("up", Self::Up), ("down", Self::Down)];
 
@@ -38,7 +38,7 @@ impl Way {
 /// On a CoreXY the motors a and b turn by x + y and x - y. On a polargraph, the way to the right
 /// makes the left belt longer and the right one shorter, and the way up makes both shorter; that is
 /// enough to tell what the pen does mostly, wherever it hangs between the motors.
-fn inverted([x, y]: [Way; 2], machine: Machine) -> Option<u8> {
+fn inverted([x, y]: [SeenDirection; 2], machine: Machine) -> Option<u8> {
     let seen = [x.vector(), y.vector()];
     (0..4).find(|bits| {
         let sign = |bit: u8| if bits & bit == 0 { 1 } else { -1 };
@@ -86,18 +86,20 @@ impl Setup<'_> {
     }
 
     /// Moves the pen, asks which way it went, and moves it back.
-    fn observe(&mut self, sender: &mut Sender<'_>, by: [f64; 2]) -> Result<Way, End> {
+    fn observe(&mut self, sender: &mut Sender<'_>, by: [f64; 2]) -> Result<SeenDirection, End> {
         loop {
             jog(sender, by)?;
-            let mut words: Vec<(&str, Option<Way>)> =
-                Way::WORDS.iter().map(|(word, way)| (*word, Some(*way))).collect();
+            let mut words: Vec<(&str, Option<SeenDirection>)> = SeenDirection::WORDS
+                .iter()
+                .map(|(word, direction)| (*word, Some(*direction)))
+                .collect();
             words.push(("not at all", None));
             let question =
                 "Which way did the pen go? (right, left, up: away from you, down, not at all)";
-            let way = self.answers.choose(question, &words);
+            let direction = self.answers.choose(question, &words);
             jog(sender, by.map(|part| -part))?;
-            match way? {
-                Some(way) => return Ok(way),
+            match direction? {
+                Some(direction) => return Ok(direction),
                 None => {
                     say(
                         "Is the motor supply on? If a motor hums or trembles, its coils are mixed \
@@ -115,7 +117,7 @@ impl Setup<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use Way::{Down, Left, Right, Up};
+    use SeenDirection::{Down, Left, Right, Up};
 
     #[test]
     fn directions_are_inverted_as_the_pen_was_seen_to_go() {

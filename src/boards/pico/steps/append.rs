@@ -65,7 +65,7 @@ impl EventQueue for Steps {
     }
 
     /// Appends steps of a train. It takes 17 cycles per step, or more if the step may be braked.
-    #[unsafe(link_section = ".data.in_ram")] // As above.
+    #[unsafe(link_section = ".data.in_ram")] // In RAM, so that it does not wait for flash.
     fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         let Some(room) = self.room.checked_sub(count) else {
             return train.push_each(count, |event| self.push(event));

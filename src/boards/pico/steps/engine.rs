@@ -22,14 +22,14 @@ pub mod target {
 }
 /// The bits of a word that hold the address.
 pub const TARGETS: u32 = 7 << 5;
-/// A word that only waits takes this many ticks more than the count that it carries.
+/// The ticks that a word that only waits takes in addition to the count that it carries.
 pub const WAIT_TICKS: u32 = 2;
-/// A word that moves the pen takes this many ticks more than the count that it carries.
+/// The ticks that a word that moves the pen takes in addition to the count that it carries.
 pub const PEN_TICKS: u32 = 3;
-/// A word that pulses a step pin takes this many ticks more than the count that it carries and the
-/// width of the pulse together.
+/// The ticks that a word that pulses a step pin takes in addition to the count that it carries and
+/// the width of the pulse.
 pub const PULSE_TICKS: u32 = 2;
-/// A pulse is this many ticks wider than the count that the state machine gets for its width.
+/// The ticks by which a pulse is wider than the count that the state machine gets for its width.
 const WIDTH_TICKS: u32 = 2;
 
 /// The bit that lets state machine 0 run.

@@ -15,7 +15,7 @@ use crate::machine::{Setting, Settings, Value};
 use crate::motion::LimitsError;
 use crate::step::Line;
 
-/// What sets a polargraph apart from the other kinds.
+/// The properties that distinguish a polargraph from the other kinds.
 pub(super) const PROPERTIES: Properties = Properties {
     steps_per_mm: [Setting::StepsPerMmX; 2],
     // A belt never moves faster than the pen, but its length may change much more slowly.
@@ -157,7 +157,7 @@ struct FineLine {
 /// A point on a [`FineLine`].
 #[derive(Clone, Copy)]
 struct FinePoint {
-    /// Its coordinates, from the left anchor to the right and downward.
+    /// The coordinates of the point, to the right of the left anchor and below it.
     position: [i32; 2],
     /// The lengths of both belts, in units of 2^-`bits` steps.
     belts: [i32; 2],

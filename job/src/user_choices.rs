@@ -12,12 +12,12 @@ const MARGIN: &str = "margin";
 const FIT: &str = "fit";
 const UP: &str = "up";
 const PROJECTION: &str = "projection";
-/// What is up where nobody says so.
+/// The upward direction if nobody chooses one.
 const UPRIGHT: [f64; 3] = [0.0, 0.0, 1.0];
 
-/// What the user wishes, before a file is read.
+/// The choices that the user makes before a file is read.
 #[derive(Debug, Clone)]
-pub struct Wishes {
+pub struct UserChoices {
     /// The options of the plotter's library.
     pub settings: Settings,
     /// The direction from which the model is seen, if one is chosen.
@@ -26,7 +26,7 @@ pub struct Wishes {
     pub has_margin: bool,
 }
 
-/// What a file says about its page.
+/// The page that a file asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FilePage {
     /// The page that the file has; `None` if it has none.
@@ -37,7 +37,7 @@ pub struct FilePage {
     pub is_plan: bool,
 }
 
-impl Wishes {
+impl UserChoices {
     /// The settings for a file of these `lines`. Where the user does not say otherwise, a file that
     /// has a page is drawn on that, and at true size no margin is kept free: so its plan keeps its
     /// place.
@@ -62,8 +62,8 @@ impl Wishes {
         Ok(settings)
     }
 
-    /// Chooses the eye if the user gives a direction, or says what is up: the plotter's own choice
-    /// is made for models with z up.
+    /// Chooses the eye if the user gives a direction, or says which way is up, because the
+    /// plotter's own choice is made for models with z up.
     fn set_eye(
         &self,
         page: &FilePage,
