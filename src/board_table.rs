@@ -214,7 +214,7 @@ pub const LM3S6965: BoardRow = BoardRow {
     model_flash: 0,
     emulator: Emulator::Qemu { machine: "lm3s6965evb" },
     flashing: None,
-    // There is no flash left for it.
+    // The flash of the chip has no room for this feature.
     early_ink: false,
 };
 

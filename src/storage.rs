@@ -18,7 +18,7 @@
 //!
 //! What becomes known of a state only later can be [added](Slots::add) behind it, without erasing
 //! anything, if [room was left](Writer::leave_room). It begins with a page of its own, with a
-//! header as that of a slot, in whose second word stands the checksum of the state.
+//! header as that of a slot, whose second word is the checksum of the state.
 //!
 //! How far the work that a state describes has come can be kept beside it, in a [`Log`].
 
@@ -150,8 +150,8 @@ impl Slots {
         self.write_into_erased(flash, 0)
     }
 
-    /// Does the same where this many bytes of the slot that is to be written, whole sectors from its
-    /// beginning on, have been erased by [`Slots::erase_ahead`] and not been written since.
+    /// Does the same where this many bytes of the slot that is to be written, whole sectors from
+    /// its beginning on, have been erased by [`Slots::erase_ahead`] and not been written since.
     ///
     /// # Errors
     /// As [`Slots::write`].

@@ -58,7 +58,7 @@ impl FarEnd {
     }
 }
 
-/// Opens what stands at the far end.
+/// Opens the plotter at the far end.
 pub type Open = Box<dyn Fn() -> Result<FarEnd, Error> + Send + Sync>;
 
 /// What a page asks of an emulated board.
@@ -128,7 +128,8 @@ impl Bridge {
         };
         let frame = CloseFrame { code, reason: reason.into() };
         let closed = socket.close(Some(frame)).and_then(|()| {
-            // The rest of what is refused is read, so that closing does not take the reason away.
+            // The rest of the refused data is read, because otherwise closing would discard the
+            // reason before the page receives it.
             let stream = socket.get_mut();
             stream.set_read_timeout(Some(Duration::from_secs(2)))?;
             io::copy(stream, &mut io::sink())?;

@@ -123,7 +123,7 @@ pub fn choose(known: &Known, job: &dyn Lines, compute: Compute) -> Result<Choice
         return here(plotter, Some(reason));
     }
     let rehearsed = match known.board {
-        // With the memory and the numbers of that board.
+        // The rehearsal has the memory and the number widths of that board.
         Some(board) => {
             let mut plotter = InMemory::<u16>::new(Room::of_board(board), settings);
             if plotter.take(job) { plotter.rehearse() } else { Ok(()) }

@@ -16,7 +16,7 @@ const BLOCKS: usize = penup::board_table::PICO.memory.blocks;
 const PLACE_ERROR: f64 = 4e-6;
 /// The number of columns of a plot. Each shows the least and the greatest value in its time.
 const COLUMNS: usize = 1200;
-/// The time in seconds between two steps from which on the machine stands.
+/// The time in seconds between two steps from which on the machine is at rest.
 const STANDSTILL: f64 = 0.1;
 /// The height of one of the three plots, and the space between them.
 const HEIGHT: f64 = 220.0;

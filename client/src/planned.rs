@@ -157,7 +157,8 @@ impl Board for PlannedBoard {
         if self.pins.halt_is_due() {
             self.steps.halt();
         }
-        // Nothing waits there, but the clock goes on, and an order to halt is carried out.
+        // No events wait at the board in memory, but its clock must advance, and it must obey an
+        // order to halt.
         self.board.pass(self.steps.now.saturating_sub(self.board.trace().now()));
     }
 }

@@ -115,7 +115,8 @@ impl Progress for Bar {
     }
 
     fn drawn(&mut self, status: &Status) {
-        // The time that a stroke takes goes by its ink, which older firmware does not report.
+        // Progress is measured by ink, because this determines the duration of a stroke. Older
+        // firmware does not report ink.
         let ink = status.ink.filter(|(_, all)| *all > 0);
         let (done, all) = ink.or(status.strokes).unwrap_or_default();
         self.show("Drawing", how_far(status), done, all);

@@ -202,7 +202,8 @@ impl<W: Wire> Rejoining<W> {
         let is_new = self.gone.is_none();
         self.gone = Some(LostPlotter { since, why, last_attempt: now });
         if why == Why::Port {
-            // An open port keeps its name from the plotter that comes back.
+            // The port is closed, because as long as it is open, a plotter that comes back gets
+            // another name.
             self.wire = None;
         }
         if is_new {

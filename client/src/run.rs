@@ -319,7 +319,7 @@ fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
     let mut options = PlotOptions::default();
     let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
     for (name, value) in &settings.values {
-        // What the plotter refuses is told when the job is sent.
+        // If the plotter refuses an option, the user is told when the job is sent.
         let _ = options.set(name, value);
     }
     let name = |line: String| Some(line.strip_prefix('$')?.split('=').next()?.to_owned());

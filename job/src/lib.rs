@@ -2,15 +2,14 @@
 //! plotter, what the plotter answers, and what it then draws.
 //!
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
-//! has the words of the serial line, and reads the replies. [`wishes`] makes settings of what a
-//! user wishes and a file says, and [`view`] says from where a model is seen. [`twin`] computes
-//! what the plotter must then contain, and [`room`] the memory that takes. [`machine_settings`]
-//! makes the machine that a computer simulates. [`streamed`] makes lines
-//! of what this computer has computed, and [`relooped`] lets their closed strokes begin elsewhere.
-//! [`pins`] and [`watch`] follow the pen to its [`path`], whose
-//! steps [`straight`] makes lines of, and of which [`sampled`] keeps what a page shows. [`strokes`]
-//! and [`results`] tell what was drawn, [`picture`] shows it, and [`export`] writes it for other
-//! machines.
+//! has the words of the serial line, and reads the replies. [`user_choices`] turns the choices of
+//! the user and the properties of a file into settings, and [`view`] says from where a model is
+//! seen. [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
+//! [`machine_settings`] makes the machine that a computer simulates. [`streamed`] makes lines of
+//! what this computer has computed, and [`relooped`] lets their closed strokes begin elsewhere.
+//! [`pins`] and [`watch`] follow the pen to its [`path`], whose steps [`straight`] makes lines of,
+//! and of which [`sampled`] keeps what a page shows. [`strokes`] and [`results`] tell what was
+//! drawn, [`picture`] shows it, and [`export`] writes it for other machines.
 //!
 //! Nothing here opens a file or a port, starts a thread, or reads a clock.
 

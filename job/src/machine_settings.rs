@@ -94,7 +94,7 @@ pub fn is_grid(settings: &Settings) -> bool {
 
 fn set(settings: &mut Settings, assigned: &AssignedSetting) -> Result<(), SettingError> {
     let setting = Setting::numbered(assigned.number).ok_or(SettingError::Unknown)?;
-    // As a plotter reads it.
+    // The value is parsed as a plotter parses it.
     let value = Decimal::parse(&assigned.value).ok();
     let value = value.and_then(|value| value.to_millimetres().ok());
     settings.set(setting, value.ok_or(SettingError::OutOfRange(setting))?)

@@ -123,7 +123,7 @@ pub enum Reply {
 pub struct Status {
     /// The state without its sub-state: Idle, Run, Hold, Alarm and so on.
     pub state: String,
-    /// Whether the machine stands in a feed hold (`Hold:0`), no longer slowing down.
+    /// Whether the machine is at rest in a feed hold (`Hold:0`), no longer slowing down.
     pub is_standing: bool,
     /// The numbers of `Strokes:done/all`, which is reported during a drawing.
     pub strokes: Option<(u64, u64)>,

@@ -95,7 +95,7 @@ impl StreamedJob {
             Form::Strokes => job.write_strokes(path),
             Form::GCode => job.write_gcode(settings, path)?,
         }
-        // An i32 of nine digits numbers the lines.
+        // Lines are numbered by an i32 of at most nine digits.
         if job.begins.len() > 999_999_000 {
             return Err(StreamError::TooLong);
         }
@@ -136,7 +136,8 @@ impl StreamedJob {
         let steps = settings.page_steps();
         let mut failure = None;
         let (mut pen, mut motion, mut count) = (None, "", 0);
-        // Millimetres, absolute, without the arcs' planes and times of others.
+        // The modes are set to millimetres, absolute positions, speeds in mm/min and the usual
+        // plane, whatever an earlier program has left.
         self.push_line("G21G90G94G17", 0);
         for_each(path, &mut |StreamedTarget { target, pen: number }| {
             if pen.is_some_and(|pen| pen != number) {
@@ -150,7 +151,7 @@ impl StreamedJob {
                 Some(_) => failure = Some(StreamError::LineType),
             }
             let next = if target.ink.is_some() { "G1" } else { "G0" };
-            // A block in the machine's own coordinates, whatever the others are.
+            // Each block is in the machine's own coordinates, whatever coordinate system is chosen.
             let mut line = String::from("G53");
             if next != motion {
                 line += next;
@@ -164,7 +165,7 @@ impl StreamedJob {
                     let read = Decimal::parse(text).ok().and_then(|mm| mm.to_millimetres().ok());
                     read.is_some_and(|mm| to_steps(mm, steps) == step)
                 });
-                // Steps are no finer than 1/4000 mm, of which five decimals name each.
+                // Steps are no finer than 1/4000 mm, so five decimals suffice to name each of them.
                 let _ = write!(line, "{}", written.unwrap_or_else(|| format!("{exact:.6}")));
             }
             self.push_line(&line, count);
@@ -218,7 +219,8 @@ impl StreamedJob {
         self.pens.get(..count).unwrap_or_default()
     }
 
-    /// Returns the share of the strokes that the first `lines` lines contain, 0 to 1.
+    /// Returns the share of the targets of the drawing that the first `lines` lines contain, 0 to
+    /// 1.
     pub fn share(&self, lines: usize) -> f64 {
         let targets = self.begins.get(lines + self.skipped).map_or(self.targets(), |(_, n)| *n);
         f64::from(targets) / f64::from(self.targets().max(1))

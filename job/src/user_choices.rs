@@ -1,4 +1,4 @@
-//! The settings of a job, from what the user wishes and what the file says.
+//! Turns the choices of the user and the properties of a file into the settings of a job.
 
 use crate::Settings;
 use crate::view::{self, THREE_QUARTER, Viewpoint, turned_upright};

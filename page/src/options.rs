@@ -219,7 +219,7 @@ impl NamedValues {
         if let (Some(named), false) = (self.page()?, source.is_arranged) {
             page.sheet = named;
         }
-        let settings = self.wishes()?.settings_for(&page, &*source.lines);
+        let settings = self.choices()?.settings_for(&page, &*source.lines);
         settings.map_err(|reason| for_page(&sentence(&reason)))
     }
 
@@ -254,8 +254,8 @@ impl NamedValues {
         Ok(machine)
     }
 
-    /// What the user wishes.
-    fn wishes(&self) -> Result<UserChoices, String> {
+    /// The choices of the user.
+    fn choices(&self) -> Result<UserChoices, String> {
         let flags = OPTIONS.iter().filter(|option| option.flag.get().is_some());
         let mut values: Vec<_> = flags
             .filter_map(|option| {

@@ -546,8 +546,8 @@ impl Session {
         self.ask_for_pen(status);
     }
 
-    /// Tells the user once that the machine stands and waits for a pen. The first reports may come
-    /// before the last moves are done; later ones do not.
+    /// Tells the user once that the machine is at rest and waits for a pen. The first reports may
+    /// come before the last moves are done; later ones do not.
     fn ask_for_pen(&mut self, status: &Status) {
         let (pen, position, times) = &mut self.holds;
         if (*pen, &*position) == (status.pen_wanted, &status.position) {

@@ -80,9 +80,9 @@ struct Drawing<'d, 'a> {
 #[derive(Debug, Clone, Copy)]
 struct Placement<'a> {
     to_page: Affine,
-    /// The layer and the line type of entities that take these from the block that contains them.
+    /// The layer of entities that take it from the block that contains them.
     layer: &'a str,
-    /// The line type of such entities.
+    /// The line type of entities that take it from the block that contains them.
     line_type: &'a str,
     /// The number of nested blocks that contain the entities.
     depth: usize,

@@ -85,7 +85,7 @@ impl SourceFile {
     /// # Errors
     /// The format is unknown, or the file contains something that no plotter accepts.
     pub fn new(name: String, bytes: Vec<u8>) -> Result<Self, ReadError> {
-        // What arranges plans is left out of a program that only calls this.
+        // A program that only calls this function does not contain the code that arranges plans.
         let (size, contents) = read(name, bytes, &Arrangement::default())?;
         let Contents { body, page, bounds, notes } = contents;
         Ok(match body {

@@ -164,7 +164,7 @@ impl ShadedArea {
 
     /// The rows that lie between two heights, of `count`.
     fn rows_between(&self, low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
-        // What lies beyond the rows is below the first one, or saturates.
+        // A height beyond the rows gives a negative number, or saturates.
         let number = |height: f64| ((height - self.low) / self.row).floor();
         if number(high) < 0.0 || number(low) > count as f64 {
             return 0..0;
@@ -213,7 +213,7 @@ impl ShadedArea {
                 let side = minus(end, begin);
                 let to_begin = minus(begin, from);
                 let across = cross(direction, side);
-                // Where they lie in one line, the ends of the side divide it.
+                // If both lie in one line, the ends of the side divide it.
                 for corner in [begin, end] {
                     let to_corner = minus(corner, from);
                     if cross(direction, to_corner).abs() <= TOLERANCE * square.sqrt() {

@@ -107,7 +107,7 @@ pub fn for_client(text: &str) -> String {
             }
             None => (None, rest),
         };
-        // On the command line an option is used, not sent.
+        // On the command line an option is "used", and not "sent".
         if translated.ends_with("send ") {
             translated.truncate(translated.len() - "send ".len());
             translated.push_str("use ");

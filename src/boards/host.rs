@@ -617,8 +617,7 @@ impl Board for HostBoard<'_> {
         self.kept.as_mut()?.progress(notes)
     }
 
-    /// # Panics
-    /// What writes it does, when something moves.
+    /// # Panics The returned writer panics if something moves.
     #[cfg(feature = "tiles")]
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         let state = self.state;

@@ -140,7 +140,7 @@ pub enum SolidError {
     /// The solid is not convex: a vertex lies inside the solid that the others span, deeper than
     /// the precision.
     VertexInside {
-        /// The number of the first such vertex, counted from 0.
+        /// The number of the first vertex inside, counted from 0.
         vertex: u32,
         /// The number of such vertices.
         count: usize,

@@ -166,7 +166,7 @@ impl PageMap {
         let shift = k - 32 + unit_bits as i32;
         let (up, down) = (shift.max(0), (-shift).max(0));
         let a = numerator.map(|numerator| {
-            // Below 2^42 by the choice of k.
+            // The quotient is below 2^42 by the choice of k.
             divide(numerator << up, denominator << down) as i64
         });
         let b = [0, 1].map(|axis: usize| {
@@ -310,7 +310,7 @@ impl PageMap {
 /// Returns the point at parameter `along` of the edge from `p` to `q`, in homogeneous image
 /// coordinates.
 fn between(p: Vertex, q: Vertex, along: EdgeParameter, projection: Projection) -> [i64; 3] {
-    // Of the ratio 31 bits are kept. They are exact to 2^-10 steps on the longest edge that a page
+    // The ratio is kept in 31 bits, which are exact to 2^-10 steps on the longest edge that a page
     // can hold.
     let shift = (64 - along.denominator.leading_zeros()).saturating_sub(31);
     let denominator = (along.denominator >> shift).max(1) as i64;

@@ -291,8 +291,8 @@ impl Frame {
         self.scale = match *numbers {
             [] => None,
             [x1, x2, y1, y2] if x1 != x2 && y1 != y2 => Some([x1, x2, y1, y2]),
-            // HP-GL/2 knows two more kinds: units of the same length on both axes, and units of
-            // which this many plotter units are one.
+            // HP-GL/2 knows two more kinds of scaling: units of the same length on both axes, and a
+            // given number of plotter units for each user unit.
             [x1, x2, y1, y2, kind, ..] if kind == UNIT && x1 != x2 && y1 != y2 => {
                 isotropic([x1, x2, y1, y2], width, height)
             }

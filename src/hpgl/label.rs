@@ -83,8 +83,8 @@ impl TextStyle {
         frame.turned(distance.rotated(self.sine_and_cosine(frame)))
     }
 
-    /// The distance on the page of this many letters and this many lines up, in units of 2^-16. `None`
-    /// beyond the range.
+    /// The distance on the page of this many letters and this many lines up, in units of 2^-16.
+    /// `None` beyond the range.
     pub(super) fn spaces(&self, frame: &Frame, [columns, lines]: [i64; 2]) -> Option<Point> {
         let [width, height] = self.letter(frame);
         let times = |count: i64, length: i64, halves: i64| {

@@ -68,7 +68,7 @@ impl LineStyle {
     pub(super) fn next_part(&mut self, stroke: &mut Stroke, pattern: i64) -> Option<DashPart> {
         let index = self.number.and_then(|number| usize::from(number).checked_sub(1));
         let Some(parts) = index.and_then(|index| PATTERNS.get(index)) else {
-            // Dots at the ends of lines only.
+            // This line type has dots only, at the ends of lines.
             let is_over = core::mem::replace(&mut stroke.done, i64::MAX) == i64::MAX;
             return (!is_over).then_some(DashPart::Dot(stroke.to));
         };

@@ -29,7 +29,7 @@ pub(super) enum Parsed {
 }
 
 impl Number {
-    /// Before the first byte.
+    /// The state before the first byte.
     pub(super) const ZERO: Self = Self {
         has_begun: false,
         has_digit: false,

@@ -43,7 +43,7 @@ impl ArcStep {
         if index >= self.chords {
             return None;
         }
-        // Below 2^53, so exact.
+        // The product is below 2^53, so the conversion is exact.
         let turned = self.sweep * i64::from(index + 1);
         let degrees = turned as f64 / (65536.0 * f64::from(self.chords));
         self.radius.rotated(sine_and_cosine(degrees)).plus(self.center)

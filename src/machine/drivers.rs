@@ -1,5 +1,5 @@
-//! The drivers at rest: they are switched off when the machine has stood for a while (`$1`), and on
-//! again by the first event of the next move.
+//! The drivers at rest: they are switched off when the machine has been at rest for a while (`$1`),
+//! and on again by the first event of the next move.
 
 use super::state::Activity;
 use super::{Alarm, Machine, Setting};
@@ -24,7 +24,7 @@ impl Machine<'_> {
             return self.alarm(Alarm::Queue);
         }
         self.released_at = self.runner.ticks();
-        // As after sleep: the motors had no current.
+        // The motors have no current, as during sleep.
         self.forget_backlash();
         if self.settings.is_on(Setting::Tool) {
             self.runner.forget_lift();

@@ -350,7 +350,7 @@ impl Machine<'_> {
     }
 
     /// Begins to measure a path that starts at the machine's present position.
-    // Without the feature it has one caller, as the others.
+    // Without the feature it has only one caller, into which it is inlined.
     #[cfg_attr(not(feature = "early-ink"), inline(always))]
     #[cfg_attr(feature = "early-ink", inline(never))]
     pub fn begin_measuring(&self) -> Measured {

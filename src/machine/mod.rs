@@ -211,7 +211,7 @@ impl<'m> Machine<'m> {
     fn replace(&mut self, settings: Settings) {
         let (page, before) = (self.position(), self.settings.kinematics());
         let backlash = self.backlash_steps();
-        // While a path waits, only heights of the pen change.
+        // While a path waits, only the heights of the pen may be changed.
         #[cfg(feature = "spread-backlash")]
         let spreads_backlash = (self.spreads_backlash()
             || settings.is_on(Setting::BacklashDistance))
@@ -430,8 +430,7 @@ impl<'m> Machine<'m> {
 
     /// Declares that the pen has been put at the page's origin by hand.
     ///
-    /// # Errors
-    /// [`MachineError::State`] unless the machine is idle and stands.
+    /// # Errors [`MachineError::State`] unless the machine is idle and at rest.
     #[cfg(feature = "resume")]
     pub fn declare_origin(&mut self) -> Result<(), MachineError> {
         if !matches!(self.activity, Activity::Idle) || !self.is_stopped() {

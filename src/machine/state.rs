@@ -116,7 +116,8 @@ pub(super) enum Source {
         /// The first target to which the new pen draws.
         first: Target,
     },
-    /// From a path whose next targets have not come yet. The machine stands with the pen raised.
+    /// From a path whose next targets have not come yet. The machine is at rest with the pen
+    /// raised.
     #[cfg(any(feature = "stream", feature = "early-ink"))]
     PendingTarget(super::PendingTarget),
     /// The moves come from a path that was read to its end.

@@ -67,7 +67,7 @@ impl Machine<'_> {
         u32::try_from(left / 10 / u64::from(self.percent.max(1))).unwrap_or(u32::MAX)
     }
 
-    /// The speed that is planned, in mm/min; 0 while the machine stands.
+    /// The speed that is planned, in mm/min; 0 while the machine is at rest.
     pub fn speed(&self) -> Value {
         if self.is_stopped() { Value::ZERO } else { self.runner.speed() }
     }

@@ -34,7 +34,8 @@ impl StrokeEnds {
     ) -> PagePoint {
         let whole = self.length(from, to).map_or(0, |length| i64::from(length.to_bits()));
         let part = |from: i32, to: i32| {
-            // Steps below 2^22 times a length below 2^22: 10 mm. Rounded half away from zero.
+            // The product of less than 2^22 steps and a length below 2^22 (10 mm) fits. The
+            // quotient is rounded half away from zero.
             let product = 2 * i64::from(to.wrapping_sub(from)) * i64::from(length.to_bits());
             let rounded = (product + product.signum() * whole).checked_div(2 * whole);
             rounded.unwrap_or(0) as i32

@@ -1,8 +1,8 @@
 //! Which strokes of a job have been drawn at the pins, so that a board can keep it.
 //!
-//! While it is on, the machine plans nothing behind a stroke before that stroke has been noted. It
-//! stands there with the pen raised, in the dwell that follows each stroke anyway, and no step
-//! waits in the queue. So the board may write to its flash, which stops everything else for a
+//! While strokes are noted, the machine plans nothing after a stroke before that stroke has been
+//! noted. It rests there with the pen raised, in the dwell that follows each stroke anyway, and no
+//! step waits in the queue. So the board may write to its flash, which stops everything else for a
 //! moment.
 
 use super::Machine;
@@ -83,8 +83,8 @@ impl Machine<'_> {
         let open = self.log.open?;
         let over = self.strokes_over(open);
         let is_raised = self.runner.is_pen_up_at(self.pins.ticks());
-        // Strokes shorter than a step of the motors are none for the motion planner, so the end of
-        // the path counts.
+        // The motion planner does not count strokes that are shorter than a motor step, so the end
+        // of the path counts.
         let is_end = open.is_whole && self.is_stopped();
         let strokes =
             if is_end { self.progress.size().strokes } else { over.wrapping_sub(open.begin) };

@@ -62,7 +62,7 @@ impl Machine<'_> {
     /// How much of a stroke is drawn from one point at which the machine rests to the next, in
     /// 2^-18 mm; 0 if it does not rest.
     pub fn point_distance(&self) -> u64 {
-        // From units of 2^-16 m.
+        // Converts units of 2^-16 m.
         u64::from(self.settings.get(Setting::PointDistance).to_bits().unsigned_abs()) * 4000
     }
 
@@ -131,8 +131,8 @@ impl Machine<'_> {
         self.rest == StrokeRest::Planned
     }
 
-    /// If the machine stands at a point within a stroke that is not noted yet: how many points are
-    /// passed. [`Machine::point_noted`] lets it go on.
+    /// Returns how many points have been passed if the machine rests at a point within a stroke
+    /// that is not noted yet. [`Machine::point_noted`] lets it continue.
     #[inline(always)] // It is called in every turn of the main loop.
     pub fn point_to_note(&self) -> Option<u32> {
         (self.rest == StrokeRest::Planned && self.is_stopped()).then_some(self.points.passed)

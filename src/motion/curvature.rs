@@ -126,7 +126,8 @@ impl Curvature {
 fn path_point(limits: &Limits, point: PagePoint) -> PathPoint {
     let [step_x, step_y] = limits.step_length;
     let along = |steps: i32, step: u32| {
-        // Steps within ±2^21 of less than 2^-1 mm; clamped where no page reaches.
+        // Coordinates are within ±2^21 steps of less than 2^-1 mm. They are clamped beyond the size
+        // of any page.
         let bits = (i64::from(steps) * i64::from(step)) >> (32 - FRACTION_BITS);
         bits.clamp(-(1 << 26), 1 << 26) as i32
     };
@@ -136,7 +137,7 @@ fn path_point(limits: &Limits, point: PagePoint) -> PathPoint {
 /// Computes the limit that results from the circle through three points.
 #[inline(always)] // For the same reason as `extend`.
 fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint) -> Circle {
-    // Within ±2^28, so products of two stay below 2^57.
+    // All differences are within ±2^28, so products of two stay below 2^57.
     let (ax, ay) = (middle.x - first.x, middle.y - first.y);
     let (bx, by) = (last.x - middle.x, last.y - middle.y);
     let (cx, cy) = (last.x - first.x, last.y - first.y);

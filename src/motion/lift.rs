@@ -30,14 +30,14 @@ impl LiftRule {
         Self {
             travel: travel.max(1),
             least_ticks: TICKS_PER_SECOND.div_ceil(rate.max(1)),
-            // Below 2^45.
+            // The square is below 2^45.
             square: second * second / u64::from(acceleration.max(20)),
         }
     }
 
     /// The number of steps below the stop at which the pen has a `height` of 0 to 127.
     pub fn steps(self, height: u8) -> i32 {
-        // Below 2^25.
+        // The product is below 2^25.
         self.travel * i32::from(height) / 127
     }
 

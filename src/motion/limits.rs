@@ -171,7 +171,7 @@ impl Limits {
             acceleration: slice_acceleration(settings.acceleration_mm_per_s2),
             jerk: None,
             junction_deviation: {
-                // At most 1 mm; a unit of it is four units of the length.
+                // The deviation is at most 1 mm, and a unit of it is four units of the length.
                 let deviation = settings.junction_deviation_mm.to_bits().unsigned_abs();
                 PathLength::from_bits(deviation << 2)
             },
@@ -237,7 +237,8 @@ impl Limits {
     /// The stopping distance of `speed`, v²/2a, limited to the greatest value of its type.
     pub(super) fn stopping_distance(&self, speed: SliceSpeed) -> PathLength {
         let squared = u64::from(speed.to_bits()) * u64::from(speed.to_bits());
-        // 2^-64 mm² over 2^-32 mm is 2^-32 mm; 14 bits more than a length has.
+        // Units of 2^-64 mm² divided by units of 2^-32 mm give units of 2^-32 mm, which are 14 bits
+        // finer than those of a length.
         let twice = 2 * u64::from(self.acceleration.to_bits());
         let bits = squared.checked_div(twice).unwrap_or(u64::MAX) >> 14;
         PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
@@ -274,7 +275,7 @@ impl Limits {
     /// The length of a move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.
     pub fn length(&self, dx: i32, dy: i32) -> Option<PathLength> {
         let [step_x, step_y] = self.step_length;
-        // Each at most 2^22 * 2^31 = 2^53 units of 2^-32 mm.
+        // Each component is at most 2^22 * 2^31 = 2^53 units of 2^-32 mm.
         let x = u64::from(dx.unsigned_abs()) * u64::from(step_x.to_bits());
         let y = u64::from(dy.unsigned_abs()) * u64::from(step_y.to_bits());
         let bits = hypotenuse(x, y);
@@ -311,14 +312,15 @@ fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
         return Err(LimitsError::Speed);
     }
     let bits = u64::from(mm_per_min.to_bits().unsigned_abs());
-    // 2^-16 mm/min to 2^-32 mm/slice: below 2^31 * 2^28.
+    // Converts 2^-16 mm/min to 2^-32 mm/slice. The product is below 2^31 * 2^28.
     let speed = (bits << 16) * u64::from(SLICE_TICKS) / (60 * u64::from(TICKS_PER_SECOND));
     Ok(SliceSpeed::from_bits((speed as u32).max(1)))
 }
 
 /// Converts mm per slice to mm/min.
 pub(super) fn mm_per_min(speed: SliceSpeed) -> Millimetres {
-    // 2^-32 mm/slice to 2^-16 mm/min: below 2^32 * 2^31, and then shifted down.
+    // Converts 2^-32 mm/slice to 2^-16 mm/min. The product is below 2^32 * 2^31 before it is
+    // shifted.
     let bits = (u64::from(speed.to_bits()) * (60 * u64::from(TICKS_PER_SECOND))) >> 16;
     let bits = (bits + u64::from(SLICE_TICKS) / 2) / u64::from(SLICE_TICKS);
     Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))

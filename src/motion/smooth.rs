@@ -345,7 +345,7 @@ impl Interval {
             let stays_at_rest = before == 0 && self.speed == 0 && self.growth <= 0;
             if !stays_at_rest {
                 let slices = u32::from(slices);
-                // Speeds are at most 0.09.
+                // The sums fit, because speeds are at most 0.09 mm per slice.
                 self.rest.distance += before.midpoint(self.speed) * slices;
                 self.rest.time += Slice::TIME * slices;
             }
@@ -544,7 +544,7 @@ impl PathLimits<'_, '_> {
                 if end >= enough {
                     return true;
                 }
-                // A limit behind a lower one does not bind.
+                // A limit after a lower one has no effect.
                 if limit < lowest && exceeds(fastest, limit) {
                     lowest = limit;
                     let limit = self.limits.speed(limit).to_bits();

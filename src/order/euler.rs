@@ -107,7 +107,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
                     route[finished] = last;
                     here = self.network.start(last);
                 } else {
-                    // The pen came here by a pen-up move: go back along it.
+                    // The pen came here by a pen-up move, so the search returns along it.
                     here = self.network.end(last);
                 }
             } else {

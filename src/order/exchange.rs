@@ -143,8 +143,8 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         })
     }
 
-    /// Returns the scratch memory needed for this many stations, chains, and legs including the gap,
-    /// in bytes. The cache of distances takes whatever else there is.
+    /// Returns the scratch memory needed for this many stations, chains, and legs including the
+    /// gap, in bytes. The cache of distances takes whatever else there is.
     pub const fn bytes(stations: usize, chains: usize, legs: usize) -> usize {
         Incidence::<I>::bytes(stations, chains)
             + Scratch::bytes_for::<I>(legs)

@@ -82,7 +82,7 @@ impl<I: Index> Nearest<I> {
         }
     }
 
-    /// Returns the distance of the farther one.
+    /// Returns the distance of the farther of the two points.
     fn farthest(&self) -> u32 {
         self.0[1].0
     }

@@ -43,8 +43,8 @@ const KICKS_BETWEEN_TURNS: u32 = 64;
 const FIRST_TOURS_PERCENT: u64 = 48;
 /// With [`Effort::Auto`], the gain is compared with the work after each such part of a second.
 const WINDOWS_PER_SECOND: u64 = 8;
-/// Where a tour has few moves, the gain is compared with the work as soon as each move had this many
-/// units of work.
+/// Where a tour has few moves, the gain is compared with the work as soon as each move had this
+/// many units of work.
 const WINDOW_UNITS_PER_MOVE: u64 = 800;
 /// With [`Effort::Auto`], another first tour is made if the last one took at most this part of the
 /// time in which the pen travels, or of a second. A further one seldom saves more.
@@ -159,7 +159,7 @@ enum Until {
 impl Until {
     /// Returns the units of work that may be spent.
     fn budget(self) -> u64 {
-        // The work that has no such limit ends by itself long before this.
+        // Work without a limit ends by itself long before this number of units.
         if let Self::Spent(units) = self { units } else { u64::MAX >> 1 }
     }
 }

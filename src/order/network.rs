@@ -73,15 +73,15 @@ pub(super) struct Anchor {
 }
 
 impl Anchor {
-    /// The path begins at `place`, and this many units of work are done while the strokes before are
-    /// drawn.
+    /// The path begins at `place`, and this many units of work are done while the strokes before
+    /// are drawn.
     #[cfg(feature = "early-ink")]
     pub const fn new(place: PagePoint, free_units: u64) -> Self {
         Self { place: Some(place), free_units }
     }
 
     /// The units of work for which the pen does not wait.
-    #[inline(always)] // As below.
+    #[inline(always)] // Without the feature, what depends on it is left out.
     pub const fn free_units(self) -> u64 {
         #[cfg(feature = "early-ink")]
         return self.free_units;
@@ -139,8 +139,8 @@ impl<'a, I: Index> Network<'a, I> {
         I::new(self.ends.len())
     }
 
-    /// The number by which the place is known from which the pen comes to the path, as a station
-    /// that has no chains and is not counted; `None` if the path may begin anywhere.
+    /// The number of the point from which the pen comes to the path. It serves as a station, but
+    /// has no chains and is not counted. `None` if the path may begin anywhere.
     #[inline(always)] // Without the feature `early-ink`, what depends on it is left out.
     pub fn anchor(&self) -> Option<I> {
         self.anchor.place().map(|_| even_part())

@@ -109,7 +109,7 @@ pub trait Board {
     }
     /// Adds the concatenation of `parts` to the state of `record` that was saved last, for which
     /// there is [room](Board::save_with_room). The call may block for some milliseconds, so it is
-    /// only made while the machine stands with the pen raised and no step waits.
+    /// only made while the machine is at rest with the pen raised and no step waits.
     ///
     /// # Errors
     /// [`NotStored`] if the flash does not take it; nothing is then added.
@@ -147,7 +147,7 @@ pub trait Board {
         Err(NotStored)
     }
     /// Keeps that this many strokes of the job have been drawn. The call may block for a few
-    /// milliseconds, so it is only made while the machine stands with the pen raised and no
+    /// milliseconds, so it is only made while the machine is at rest with the pen raised and no
     /// step waits.
     ///
     /// # Errors
@@ -157,7 +157,7 @@ pub trait Board {
         Err(NotStored)
     }
     /// Keeps that this many points within strokes of the job have been passed. The call may block
-    /// for a few milliseconds, so it is only made while the machine stands and no step waits.
+    /// for a few milliseconds, so it is only made while the machine is at rest and no step waits.
     ///
     /// # Errors
     /// [`NotStored`] if the flash does not take it.

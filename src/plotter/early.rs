@@ -11,8 +11,8 @@
 //!
 //! A board with flash keeps the drawing and the first strokes before the pen moves, with all that
 //! the order is computed from. When the order is known, it is [added](super::Board::add) to that
-//! while the machine stands with the pen raised, and only then the other strokes are drawn. After a
-//! loss of power before that, the same order is computed again.
+//! while the machine is at rest with the pen raised, and only then the other strokes are drawn.
+//! After a loss of power before that, the same order is computed again.
 
 use super::job::{Begun, Pipeline, Unordered};
 use super::listener::{Listener, MeasuredStrokes};
@@ -178,8 +178,8 @@ impl<I: Index> Inner<'_, I> {
         let time_model = settings.time_model(order::TimeModel::BOARD);
         let order::Options { method, shape, effort, .. } =
             self.options.order(settings.page_steps(), time_model);
-        // A pen that moves while the machine does, and strokes that are longer than they are drawn,
-        // depend on what comes behind. The exact method may need more memory than there is.
+        // If the pen moves while the machine does, or if strokes are made longer, the end of a
+        // stroke depends on what follows. The exact method may need more memory than there is.
         let may_begin = shape == Shape::OpenPath
             && effort != Effort::Units(0)
             && method != Method::Exact

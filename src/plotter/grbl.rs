@@ -67,7 +67,7 @@ impl<I: Index> Inner<'_, I> {
         }
     }
 
-    /// Switches the drivers off if the machine has stood for as long as `$1` says.
+    /// Switches the drivers off if the machine has been at rest for as long as `$1` says.
     #[cfg(feature = "driver-pins")]
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn watch_drivers<B: Board>(&mut self, board: &mut B) {
@@ -256,7 +256,8 @@ impl<I: Index> Inner<'_, I> {
         let _ = self.program.end(self.machine.settings());
     }
 
-    /// Sets the origin of a coordinate system, which is kept once the machine stands, if `waits`.
+    /// Sets the origin of a coordinate system, which is kept once the machine is at rest, if
+    /// `waits`.
     pub(super) fn set_system(&mut self, index: usize, origin: MachinePosition, waits: bool) {
         if let Some(system) = self.parameters.systems.get_mut(index) {
             *system = origin;
@@ -267,7 +268,7 @@ impl<I: Index> Inner<'_, I> {
         }
     }
 
-    /// Sets the position of G28 or G30, which is kept once the machine stands, if `waits`.
+    /// Sets the position of G28 or G30, which is kept once the machine is at rest, if `waits`.
     ///
     /// # Errors
     /// [`CommandError::Setting`] for a position of G28 that the settings do not hold.

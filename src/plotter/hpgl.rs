@@ -229,7 +229,7 @@ impl<'m, I: Index> Plotter<'m, I> {
             Ok(()) if travel.is_some() => Outcome::More,
             Ok(()) => Outcome::Done,
             Err(MachineError::State(_)) => Outcome::Waits,
-            // What is clipped stays within the travel.
+            // Lines are clipped to the travel, so no other error is expected.
             Err(_) => Outcome::Refused,
         }
     }

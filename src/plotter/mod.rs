@@ -83,7 +83,8 @@ pub fn run<B: Board, I: Index>(
     memory: MemorySlices<'_, I>,
     pins: &PulserState,
 ) -> ! {
-    // Made here and not in `start`: a returned plotter would be on the stack twice.
+    // The plotter is made here and not in a function that returns it, because then it would be on
+    // the stack twice.
     let mut plotter = Plotter::with_settings(memory, pins, records::load_settings(board));
     plotter.begin(board);
     loop {
@@ -600,7 +601,7 @@ impl<I: Index> Inner<'_, I> {
         self.machine.set_override(100);
         self.machine.set_rapid_override(100);
         match self.machine.state() {
-            // Neither is refused in these states.
+            // Neither call is refused in these states.
             State::Check => drop(self.machine.check(false)),
             State::Sleep => drop(self.machine.unlock()),
             _ => {}

@@ -179,8 +179,9 @@ pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotS
 }
 
 /// A mark at the beginning of a kept job of which only the drawing and the first strokes are known.
-/// Behind its figures stands what the order of the others is computed from, and then the drawing
-/// alone. When the order is known, it is added: the number of strokes, the figures, and the legs.
+/// After its figures come the data from which the order of the other strokes is computed, and then
+/// the drawing alone. When the order is known, it is added: the number of strokes, the figures, and
+/// the legs.
 #[cfg(feature = "early-ink")]
 const BEGUN_LAYOUT: u32 = u32::from_le_bytes(*b"job2");
 /// Number of words before the drawing of a job whose order is not known yet.

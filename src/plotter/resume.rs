@@ -109,7 +109,8 @@ mod with_feature {
         notes.get(index).map_or(0, |word| u32::from_le_bytes(*word))
     }
 
-    /// The notes of a job of this many strokes, with a mark and the three words that tell more of it.
+    /// Returns the notes of a job of this many strokes. `layout` is the mark of their layout, and
+    /// `more` are three words that identify the job.
     #[inline(never)] // It is called in several places, and its loop is unrolled.
     fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
         let [first, second, third] = more;
@@ -375,7 +376,7 @@ mod with_feature {
                 return;
             }
             let strokes = self.machine.status().job.strokes;
-            // The sender of the rest calls it by the number of the whole.
+            // The sender names the rest of a job by the number of the whole job.
             let is_rest = |[done, all]: &[u32; 2]| done < all && strokes == all - done;
             if let Some([drawn, all]) = stopped.filter(is_rest)
                 && let Some((notes, _)) = read(board)
@@ -530,7 +531,7 @@ mod without_feature {
         /// Looks for a job that has stopped: there is none.
         pub(in crate::plotter) const fn find_stopped<B: Board>(&mut self, _: &mut B) {}
 
-        /// Keeps how far the job comes: it is not kept.
+        /// Does nothing, because the progress of jobs is not kept.
         pub(in crate::plotter) const fn keep_progress<B: Board>(
             &mut self,
             _: Option<[u32; 2]>,

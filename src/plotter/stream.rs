@@ -365,7 +365,7 @@ impl<I: Index> Inner<'_, I> {
         Ok(())
     }
 
-    /// Carries out a jog. The line stands alone: the modes that it sets do not affect later lines.
+    /// Carries out a jog. The modes that the line sets do not affect later lines.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn jog(&mut self, line: GCode<'_>) -> Result<(), CommandError> {
         if !matches!(self.machine.state(), State::Idle | State::Jog) {

@@ -3,7 +3,7 @@
 //! The working memory is a ring of targets. The machine reads a stroke once all of it has come, so
 //! that a line that is slower than the pen lets the pen wait between strokes, where it is raised. A
 //! stroke longer than the ring is read once the ring is full. If its rest is late, the pen is
-//! raised where it stands, and goes down there again when the ring is full again.
+//! raised where it is, and is lowered there again when the ring is full again.
 
 use super::reply::Reply;
 use super::{Board, Cursor, Inner, Job, Strokes};

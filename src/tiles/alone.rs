@@ -136,7 +136,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     }
 }
 
-/// Receives no stretch, because none is followed.
+/// A sink that receives nothing, because no stretch is followed.
 struct Nowhere;
 
 impl StretchSink<u16> for Nowhere {

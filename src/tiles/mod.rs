@@ -282,7 +282,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     ) -> Result<bool, VisibilityError> {
         let Some(mut tile) = self.next else { return Ok(false) };
         while !self.follow(tile, scratch.reborrow(), cancel, sink)? {
-            // Only a tile that can be divided is not followed.
+            // If the tile was not followed, it can be divided.
             tile = tile.divided().unwrap_or(tile);
             self.next = Some(tile);
         }

@@ -39,7 +39,7 @@ struct Pairs {
 }
 
 impl Pairs {
-    /// Counts a face.
+    /// Counts a face by its rectangle, as far as pairs with it may belong to `tile`.
     fn add(&mut self, face: Rectangle, tile: Rectangle) {
         let from_left = face.low.x < tile.low.x;
         let from_below = face.low.y < tile.low.y;

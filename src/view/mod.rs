@@ -146,8 +146,8 @@ impl View {
         Self::of_extents(camera, axes, extents, reach(model), model.fraction_bits())
     }
 
-    /// Computes the view of a model that extends so far along the axes of the camera. `reach` is
-    /// what the function of this name returns.
+    /// Computes the view of a model with these extents along the axes of the camera. `reach` is the
+    /// result of the function of this name.
     #[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
     #[cfg_attr(not(feature = "tiles"), inline(always))]
     fn of_extents(

@@ -137,8 +137,8 @@ impl<'a, I: Index> Grid<'a, I> {
         Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
     }
 
-    /// Returns what an edge meets in a cell if no point of the edge is nearer than the coarse depth
-    /// `near`.
+    /// Returns the faces that an edge meets in a cell if no point of the edge is nearer than the
+    /// coarse depth `near`.
     fn view(&self, cell: usize, near: u16) -> CellView<'_, I> {
         let begin = cell.checked_sub(1).map_or(I::ZERO, |before| self.cells[before].end());
         let cell = self.cells[cell];

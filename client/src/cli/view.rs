@@ -27,7 +27,8 @@ const PAGE: &str = "page";
 const TITLE: &str = "title";
 /// The units in which the size of a page may be written, and their lengths in mm.
 const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
-/// The name of the option that keeps room free, which a file with a page of its own does not need.
+/// The name of the option for the margin of the page. A file that sets its own page needs no
+/// margin.
 const MARGIN: &str = "margin";
 /// The name of the option that scales a plan to the page.
 const FIT: &str = "fit";
@@ -43,7 +44,7 @@ const PLAN: &str = "Plan: a drawing of straight lines at one height, in this ord
 /// The arguments of camera, page and order.
 #[derive(Debug, Clone)]
 pub struct ViewArgs {
-    wishes: UserChoices,
+    choices: UserChoices,
     arrangement: Arrangement,
 }
 
@@ -60,7 +61,7 @@ impl ViewArgs {
     pub fn settings_for(&self, file: &SourceFile) -> Result<Settings, String> {
         let page =
             FilePage { own: file.page(), sheet: file.sheet(), is_plan: file.bounds().is_some() };
-        self.wishes.settings_for(&page, file)
+        self.choices.settings_for(&page, file)
     }
 }
 
@@ -141,7 +142,7 @@ impl FromArgMatches for ViewArgs {
             settings.values.push((UP, "0,1,0".to_owned()));
         }
         let has_margin = arrangement.has_margin();
-        Ok(Self { wishes: UserChoices { settings, viewpoint, has_margin }, arrangement })
+        Ok(Self { choices: UserChoices { settings, viewpoint, has_margin }, arrangement })
     }
 
     fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> Result<(), Error> {

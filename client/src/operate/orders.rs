@@ -68,7 +68,7 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
     Ok(done("the rest of the job is drawn", &drawn?))
 }
 
-/// Gives up what the machine does.
+/// Aborts whatever the machine does.
 ///
 /// # Errors
 /// See [`Sender::give_up`].

@@ -143,7 +143,7 @@ impl Setup<'_> {
                  motors off.",
             );
             setup.answers.ask("Press Enter when it is there.")?;
-            // From where it stands now, the pen may go both ways.
+            // From its current position, the pen may go in both directions.
             let limits = value(&settings, Setting::SoftLimits);
             setup.set(sender, Setting::SoftLimits, 0.0)?;
             let done = setup.moving_parts(sender, machine, &settings);

@@ -274,8 +274,8 @@ impl Sender<'_> {
                 }
                 Some(Reply::Status(status)) => {
                     self.fail_if_alarm(&status)?;
-                    // The next part of a drawing is computed while one is drawn; then the plotter
-                    // reads no line.
+                    // While a part of a drawing is drawn, the next one is computed, and meanwhile
+                    // the plotter reads no line.
                     is_computing = status.is_computing;
                     if is_computing {
                         start = self.link.now();

@@ -46,7 +46,7 @@ pub(super) struct FollowedDrawing {
     standstill: Standstill,
     held_since: Option<Instant>,
     is_holding: bool,
-    /// Whether the machine holds, and stands with the pen up.
+    /// Whether the machine is in a hold, at rest with the pen up.
     is_standing: bool,
     /// Whether the user of this program asked for the hold.
     paused_here: bool,
@@ -242,7 +242,7 @@ impl Sender<'_> {
         })
     }
 
-    /// Lets a machine that stands go on if it waits for a pen that is in, or if the user allows it.
+    /// Lets a stopped machine continue if it waits for a pen that is in, or if the user allows it.
     pub(super) fn wait_or_resume(
         &mut self,
         status: &Status,

@@ -48,7 +48,7 @@ impl<'a> Sender<'a> {
         self.find_state()
     }
 
-    /// Pauses the machine, and returns its status when it stands with the pen up. With
+    /// Pauses the machine, and returns its status when it is at rest with the pen up. With
     /// `after_stroke` it first draws to the end of the stroke.
     ///
     /// # Errors
@@ -83,7 +83,7 @@ impl<'a> Sender<'a> {
         let mut standstill = Standstill::default();
         let pen = status.pen_wanted;
         self.wait_watching(&mut |sender, status| {
-            // Another pen is another pause.
+            // If the machine waits for another pen, this is already the next pause.
             if !status.is_holding() || status.pen_wanted != pen {
                 return Ok(true);
             }
@@ -95,7 +95,7 @@ impl<'a> Sender<'a> {
         })
     }
 
-    /// Gives up whatever the machine does. Returns its status when it stands with the pen up.
+    /// Aborts whatever the machine does. Returns its status when it is at rest with the pen up.
     ///
     /// # Errors
     /// The plotter does not confirm it.

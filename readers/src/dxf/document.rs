@@ -235,7 +235,7 @@ pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, LineError
                 document.entities = entities(section).into_iter().filter(is_own).collect();
             }
             Some("OBJECTS") => {
-                // Each belongs to one block that is inserted.
+                // Each object belongs to one block that is inserted.
                 let objects = entities(section);
                 for object in objects.iter().filter(|object| object.kind == "SPATIAL_FILTER") {
                     if object.number(71, 1.0)? == 0.0 {

@@ -95,7 +95,7 @@ pub(super) fn line(entity: &Entity<'_>) -> Result<Option<Writing>, LineError> {
     let run = [Run { text, height }];
     let width = run[0].width();
     let across = entity.number(72, 0.0)? as i64;
-    // Attributes have 74 for what is 73 elsewhere.
+    // The vertical alignment has the code 74 in attributes, and 73 elsewhere.
     let upward = entity.number(if entity.kind == "ATTRIB" { 74 } else { 73 }, 0.0)? as i64;
     let [first, second] = [entity.point(10)?, entity.point(11)?];
     let has_second = entity.text(11).is_some();

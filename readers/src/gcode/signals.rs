@@ -116,7 +116,7 @@ fn by_rapids(moves: &[Move], levels: &[Option<f64>]) -> Option<Division> {
         if gap < SAME {
             continue;
         }
-        // Where G0 goes on the same way at both, the higher one is up.
+        // If G0 moves as far at both levels, the pen is up at the higher one.
         let high_is_up = high[0] >= low[0];
         let agreed = if high_is_up { high[0] + low[1] } else { low[0] + high[1] };
         let is_better = best.as_ref().is_none_or(|(most, widest, _)| {

@@ -95,8 +95,8 @@ pub(super) fn is_regular(line: &str, vertices: usize) -> bool {
     count > 1 && (line.starts_with('l') || first != last)
 }
 
-/// The number of the vertex of a corner such as `3/1/2` or `-1`, where this many came before. `None`
-/// if it is no number. It may be 0 or too large.
+/// The number of the vertex of a corner such as `3/1/2` or `-1`, where this many came before.
+/// `None` if it is no number. It may be 0 or too large.
 fn corner(word: &str, vertices: usize) -> Option<usize> {
     let number: i64 = word.split('/').next()?.parse().ok()?;
     let number = if number < 0 { number.checked_add(vertices as i64 + 1)? } else { number };

@@ -112,7 +112,7 @@ pub(super) fn flatten(
                 }
             }
             PathSegment::Close => {
-                // What follows without a move begins where this part began.
+                // A segment that follows without a move begins where the closed part began.
                 let first = points.first().copied();
                 points.extend(first);
                 end(&mut points);

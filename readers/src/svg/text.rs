@@ -68,7 +68,7 @@ impl TextFonts {
         };
     }
 
-    /// Says which fonts of `texts` are missing, and what letters.
+    /// Returns sentences about the fonts and letters of `texts` that are missing.
     pub(super) fn notes(&self, texts: &[&Text]) -> Vec<String> {
         let chosen = lock(&self.chosen);
         let mut replaced: BTreeMap<Served, usize> = BTreeMap::new();
@@ -94,7 +94,7 @@ impl TextFonts {
         if !chosen.missing_letters.is_empty() {
             let letters: Vec<String> =
                 chosen.missing_letters.iter().take(20).map(char::to_string).collect();
-            // Of each piece of a text, `usvg` asks for the first such letter only.
+            // For each piece of a text, `usvg` asks only for the first missing letter.
             notes.push(format!(
                 "letters are not drawn as such, because no font has them, among them: {}",
                 letters.join(" ")

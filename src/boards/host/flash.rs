@@ -92,7 +92,7 @@ impl ReadNorFlash for CutFlash {
         if let Some(left) = self.garbage_after {
             self.garbage_after = left.checked_sub(1);
             if left == 0 {
-                // All bits may be low, high, or anything.
+                // The bytes may read as 0, as 0xFF, or as anything else.
                 for (at, byte) in (from..).zip(bytes) {
                     *byte = [0, 0xFF, at.wrapping_mul(167) as u8][from % 3];
                 }

@@ -93,8 +93,9 @@ unsafe impl Sync for StoredCell {}
 static STORED: StoredCell = StoredCell(UnsafeCell::new(MaybeUninit::uninit()));
 
 impl Stored {
-    /// Makes the data after this many consecutive faults, the last of them with the message `cause`,
-    /// which is ASCII and at most [`TEXT_BYTES`] long. Without a fault the message is empty.
+    /// Makes the data after this many consecutive faults, the last of them with the message
+    /// `cause`, which is ASCII and at most [`TEXT_BYTES`] long. Without a fault the message is
+    /// empty.
     fn new(faults: u8, cause: &str) -> Self {
         let mut stored = Self { sum: 0, faults, length: cause.len() as u8, text: [0; TEXT_BYTES] };
         for (slot, byte) in stored.text.iter_mut().zip(cause.bytes()) {

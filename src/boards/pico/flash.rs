@@ -276,7 +276,7 @@ impl NorFlash for Flash {
             if (START..END).contains(&to) {
                 let mut page = [0; PAGE_BYTES];
                 page.copy_from_slice(bytes);
-                // What is expected afterwards.
+                // The contents that the page should have afterwards.
                 let mut expected = [0; PAGE_BYTES];
                 for ((at, byte), expected) in (to..).zip(bytes).zip(&mut expected) {
                     *expected = byte_at(at) & byte;

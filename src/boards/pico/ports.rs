@@ -124,8 +124,9 @@ impl Ports {
         Self { lines, last: 0, only_to_opened: false, replies: Replies::All, uart, usb }
     }
 
-    /// Returns the next ordinary byte and the number of its port: see [`SerialInput::read_byte`]. It keeps
-    /// reading a port until nothing waits there or its line ends, then it is the other port's turn.
+    /// Returns the next ordinary byte and the number of its port: see [`SerialInput::read_byte`].
+    /// It keeps reading a port until nothing waits there or its line ends, then it is the other
+    /// port's turn.
     pub fn read_byte(&mut self) -> Option<(usize, u8)> {
         for _ in 0..COUNT {
             let port = self.last % COUNT;

@@ -80,7 +80,7 @@ impl Settings {
                 [value, steps_per_mm[0]].map_each(|it| it.to_bits().unsigned_abs());
             (u64::from(value) * u64::from(per_mm)) >> (2 * Value::FRAC_NBITS)
         };
-        // At most 32767 times 4000.
+        // The products are at most 32767 times 4000.
         let [per_minute, acceleration] =
             [travel_mm_per_min, acceleration_mm_per_s2].map_each(|value| in_steps(value) as u32);
         TimeModel { speed: per_minute / 60, acceleration, units_per_second }

@@ -194,7 +194,7 @@ const fn row(
     (least, greatest, default): (f64, f64, f64),
     whole: bool,
 ) -> SettingInfo {
-    // A value is rounded to the nearest one, as a value that is sent is.
+    // The number is rounded to the nearest value, as a value that is sent is.
     const fn value(number: f64) -> Value {
         let half = if number < 0.0 { -0.5 } else { 0.5 };
         Value::from_bits((number * 65536.0 + half) as i32)

@@ -4,7 +4,7 @@ use super::*;
 use crate::motion::event::tests::Events;
 use crate::motion::limits::tests::settings;
 
-/// A pen that moves while the machine stands.
+/// A pen that moves while the machine is at rest.
 pub(super) const PEN: PenPositions = PenPositions {
     up_height: 0,
     down_height: 100,

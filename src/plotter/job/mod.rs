@@ -162,8 +162,8 @@ impl<I: Index> Job<I> {
         })
     }
 
-    /// The job of a drawing that lies at the front of the working memory, with this many segments in
-    /// the tour behind it.
+    /// The job of a drawing that lies at the front of the working memory, with this many segments
+    /// in the tour behind it.
     #[cfg(feature = "tiles")]
     pub(super) fn of(stored: Stored<I>, legs: usize, report: order::Report) -> Self {
         Self { stored, legs, report, ..Self::default() }

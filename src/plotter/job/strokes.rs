@@ -15,8 +15,8 @@ use crate::plotter::streamed::Streamed;
 /// Position in the strokes of a job: how far they have been handed to the machine.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Cursor<I = u16> {
-    /// Index in the tour of the segment that is being handed over. Of strokes that are sent while
-    /// they are drawn, the number of targets that were handed over.
+    /// Index in the tour of the segment that is being handed over. For strokes that are sent while
+    /// they are drawn, this is the number of targets that were handed over.
     pub(in crate::plotter) leg: usize,
     /// Number of the point at which the pen is, or `None` before the first move, and behind a
     /// stroke that went on beyond its end.
@@ -275,7 +275,7 @@ impl<I: Index> Strokes<'_, I> {
             let distance = at.map_or(0, |at| length([at, target.point]));
             let is_last_point = walk.pass(target, distance) && walk.passed == points;
             let leg = self.cursor.leg;
-            // A point where the stroke ends, or where it goes on beyond its end, is none.
+            // A point at the end of the stroke, or beyond it, is not a point within the stroke.
             if is_last_point && begun > stroke && !self.ends_stroke(leg.saturating_sub(1)) {
                 let within = Some(self.cursor.first);
                 *self.cursor = Cursor { leg, path_start: leg, within, ..Cursor::default() };

@@ -50,7 +50,7 @@ impl Program {
                     StoredPosition::Second => context.parameters.second,
                 };
                 let via = self.destination(block, context)?;
-                // With coordinates, only the axes that are named go on.
+                // If the line has coordinates, only the named axes move to the stored position.
                 let mut end = to;
                 if block.has_any(b"XYZ") {
                     for (axis, &letter) in AXES.iter().enumerate() {

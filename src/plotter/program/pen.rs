@@ -134,7 +134,7 @@ impl Program {
         self.spindle != 5
     }
 
-    /// Whether the pen is down while the machine stands.
+    /// Whether the pen is down while the machine is at rest.
     pub(super) fn is_down_at_rest(&self, rule: PenRule) -> bool {
         let is_on = self.is_on() && !(self.pen.has_speed && self.speed == 0);
         match rule {

@@ -224,7 +224,7 @@ fn order_lines<I: Index>(
         return Ok(None);
     }
     let mut report = order::order(drawing, options, rest, cancel, tour)?;
-    // Nothing is known of the order of the whole.
+    // The bound and the proof hold for a part only, and not for the order of the whole drawing.
     (report.bound, report.optimal) = (0, false);
     let point = |leg: Option<&Leg<I>>, is_end: bool| {
         let leg = leg?;

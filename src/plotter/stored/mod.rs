@@ -4,8 +4,8 @@
 //! after it are written ([`Upload`]). `$plot` writes the record, with which the model is complete:
 //! it then stays through a loss of power, and cannot be changed any more. `$clear` removes it.
 //!
-//! The sectors are erased while the model arrives, so that is refused unless the machine stands.
-//! While the model is drawn ([`parts`]) nothing of its flash is written.
+//! The sectors are erased while the model arrives, so that is refused unless the machine is at
+//! rest. While the model is drawn ([`parts`]) nothing of its flash is written.
 
 mod compute;
 mod parts;

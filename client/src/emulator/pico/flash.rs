@@ -20,7 +20,7 @@ pub struct FlashOperation {
     pub is_erasure: bool,
     /// Where the sector or the page begins in the flash, in bytes.
     pub offset: u32,
-    /// The number of its bytes that become others.
+    /// The number of bytes of the sector or page that change.
     pub changes: u32,
 }
 

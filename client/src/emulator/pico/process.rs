@@ -164,7 +164,7 @@ fn board() -> String {
         "flash": flash.start,
         "vectors": flash.start + boot_loader,
         "ram": ram.start,
-        // Where the records begin in flash.
+        // The address in flash at which the records begin.
         "records": budget.flash + model_flash,
         "steps": [step_x, step_y],
         "directions": [dir_x, dir_y],

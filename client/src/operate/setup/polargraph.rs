@@ -81,7 +81,7 @@ impl Setup<'_> {
             height_of_page.min(height - 1.0),
             [least, height - 1.0],
         )?;
-        // At no time the area may reach up to the motors.
+        // The area must never reach up to the motors, so the order of the two changes matters.
         let mut two = [(Setting::AnchorHeight, height), (Setting::TravelY, page_height)];
         if height <= height_of_page {
             two.reverse();
