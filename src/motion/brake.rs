@@ -344,8 +344,7 @@ pub(crate) enum LengthStart {
     Anew,
 }
 
-/// The state of the brake in the step interrupt: how far the machine is from where it could have
-/// been at rest.
+/// The state of the brake in the step interrupt.
 #[derive(Debug, Default)]
 pub struct Brake {
     /// The units within which the machine can stop from the speed that it may have.

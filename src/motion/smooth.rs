@@ -169,8 +169,8 @@ impl JerkLimit {
     }
 
     /// Returns the speed after the ramp has ended as soon as it can. A ramp that accelerates takes
-    /// at least an interval to end: if less were assumed, the speed would rise and fall for ever
-    /// below a limit that it cannot keep exactly.
+    /// at least an interval to end. If less were assumed, a speed that cannot be kept would be
+    /// allowed, and would rise and fall for ever.
     fn settled(self, state: State) -> u64 {
         let shortest = if state.ramp > 0 { 16 * i32::from(self.slices()) } else { 0 };
         let square = i64::from(state.ramp) * i64::from(state.ramp.abs().max(shortest));

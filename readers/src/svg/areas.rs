@@ -36,7 +36,8 @@ struct Layers {
 /// The reasons why a mask cannot be applied.
 enum MaskError {
     TooManyPoints,
-    /// The mask is partly transparent, which a region cannot represent.
+    /// The mask has an effect that no region can represent, such as partial transparency or a
+    /// filter.
     Soft,
 }
 

@@ -59,7 +59,8 @@ impl TextFonts {
             }),
             select_fallback: Box::new(move |letter, used, database| {
                 let found = fallback(letter, used, database);
-                // Letters without a shape are reported as well, because nothing is drawn for them.
+                // `usvg` also asks for letters without a shape, such as spaces. They are drawn as
+                // nothing, and so are not missing.
                 if found.is_none() && !letter.is_control() && !letter.is_whitespace() {
                     lock(&of_letter).missing_letters.insert(letter);
                 }
