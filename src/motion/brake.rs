@@ -157,7 +157,7 @@ impl Limits {
     /// diagonal one.
     ///
     /// The brake decelerates by 1/32 more than the machine accelerates, so that it never slows a
-    /// plan that is in time. Only above [`BUSY_RATE`] it may decelerate more, up to four times as
+    /// plan that is in time. Only above `BUSY_RATE` it may decelerate more, up to four times as
     /// much.
     pub fn brake(&self, longer: u64, queue: u32) -> BrakeRule {
         let acceleration = u64::from(self.acceleration.to_bits());

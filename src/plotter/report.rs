@@ -237,7 +237,7 @@ impl<I: Index> Inner<'_, I> {
             reply.part(format_args!("|Pen:{}", pen + 1));
         }
         if self.machine.underruns() != 0 {
-            reply.part(format_args!("|PendingTarget:{}", self.machine.underruns()));
+            reply.part(format_args!("|Late:{}", self.machine.underruns()));
         }
         if let Some([done, all]) = stopped {
             reply.part(format_args!("|Stopped:{done}/{all}"));

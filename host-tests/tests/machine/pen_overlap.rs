@@ -128,7 +128,7 @@ fn a_pen_stands_still_on_the_paper_while_the_machine_brakes_and_starts_half_a_st
                 for early in [0.0, 150.0] {
                     let strokes = strokes(early, contact);
                     println!(
-                        "{name}, {jerk} m/s3, on the paper for {contact} of its displacement, overlap \
+                        "{name}, {jerk} m/s3, on the paper for {contact} of its way, overlap \
                          {early} ms: begin {:.1}, corners {:.1}, end {:.1}, all {:.1} ms, at most \
                          {:.0} steps of travels",
                         greatest(&strokes, |stroke| stroke.begin),

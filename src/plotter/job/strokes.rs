@@ -272,8 +272,8 @@ impl<I: Index> Strokes<'_, I> {
                 }
                 begun += 1;
             }
-            let distance = at.map_or(0, |at| length([at, target.point]));
-            let is_last_point = walk.pass(target, distance) && walk.passed == points;
+            let moved = at.map_or(0, |at| length([at, target.point]));
+            let is_last_point = walk.pass(target, moved) && walk.passed == points;
             let leg = self.cursor.leg;
             // A point at the end of the stroke, or beyond it, is not a point within the stroke.
             if is_last_point && begun > stroke && !self.ends_stroke(leg.saturating_sub(1)) {
