@@ -27,8 +27,9 @@ export class Marks {
 }
 
 /**
- * Returns a function that executes instructions until so many cycles have passed, or until one comes
- * that is left to rp2040js, or that bears one of the marks. It returns the cycles that have passed.
+ * Returns a function that executes instructions until this many cycles have passed, or until an
+ * instruction comes that is left to rp2040js, or that bears one of the marks. It returns the cycles
+ * that have passed.
  * `xip` is the cache, and `callCycles` what a POP of the program counter takes beyond what rp2040js
  * counts.
  */
