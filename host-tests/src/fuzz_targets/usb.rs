@@ -37,7 +37,7 @@ const REQUESTS: [[u8; 8]; 16] = [
 /// | p | nothing | |
 /// | a | the bus is reset | |
 /// | b | a packet is sent to the port | its length |
-/// | c | a SETUP packet | the number of the request in [`REQUESTS`] |
+/// | c | a SETUP packet | the number of the request in `REQUESTS` |
 /// | d | a packet is sent to endpoint 0 | its length |
 /// | e | a whole control transfer | the number of the request |
 /// | f | a whole control transfer | the request |
