@@ -40,9 +40,6 @@ pub use board::{Board, NotStored, REPLY_BYTES, Record, Replies, Stored};
 pub use flash_records::{FlashRecords, Layout};
 pub use help::help;
 pub use job::{Cursor, Job, Observer, Strokes, Unobserved};
-// The name that a target of the fuzzer still uses.
-#[doc(hidden)]
-pub use flash_records::FlashRecords as Kept;
 pub use memory::{EMPTY_LOOKAHEAD, HpGlMemory, Memory, MemorySlices};
 pub use options::{
     Flag, HiddenLines, OPTIONS, PlotOption, PlotOptions, ProjectionChoice, VisibilityMode,

@@ -5,7 +5,7 @@ use crate::whole_jobs::job_lines;
 use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH};
 use penup::machine::{Contacts, EventRing, PulserState, Settings, Value};
 use penup::motion::EventQueue;
-use penup::plotter::{Board, EMPTY_LOOKAHEAD, Kept, Memory, Plotter, Record, Stored};
+use penup::plotter::{Board, EMPTY_LOOKAHEAD, FlashRecords, Memory, Plotter, Record, Stored};
 use penup::protocol::RealTime;
 use penup::storage::NOTE_BYTES;
 use std::sync::OnceLock;
@@ -60,15 +60,15 @@ fn resume_job(input: &[u8]) {
     if flags & 1 != 0 {
         notes[usize::from(flags) % length] ^= drawn;
     }
-    let mut kept = Kept::new(empty_flash(), LAYOUT);
-    if kept.save(Record::Job, &[job]).is_err() {
+    let mut records = FlashRecords::new(empty_flash(), LAYOUT);
+    if records.save(Record::Job, &[job]).is_err() {
         return;
     }
-    if kept.begin_progress(&notes[..length], u32::from(strokes)).is_ok() {
+    if records.begin_progress(&notes[..length], u32::from(strokes)).is_ok() {
         // It may be more than there are.
-        let _ = kept.note_progress(u32::from(drawn));
+        let _ = records.note_progress(u32::from(drawn));
     }
-    go_on(kept.flash);
+    go_on(records.flash);
 }
 
 /// Goes on with a sound job in a flash in which some bytes differ: four of the input say where, and
