@@ -106,7 +106,7 @@ fn act(host: &mut Host<'_>, action: u8, rest: &mut impl Iterator<Item = u8>) {
     }
 }
 
-/// A request of [`REQUESTS`].
+/// A request of `REQUESTS`.
 fn known(number: u8) -> [u8; 8] {
     REQUESTS[usize::from(number) % REQUESTS.len()]
 }
