@@ -659,6 +659,10 @@ let flashWaits = 0;
 let interruptTimes = null;
 
 function timeInterrupts() {
+  if (interruptTimes) {
+    interruptTimes.forget();
+    return;
+  }
   interruptTimes = new InterruptTimes(now, () => flashWaits);
   interruptTimes.attach(core);
 }

@@ -18,6 +18,11 @@ export class InterruptTimes {
     this.masks = new Map();
   }
 
+  forget() {
+    this.handlers.clear();
+    this.masks.clear();
+  }
+
   /** Measures the core of a chip that begins now. Whatever was not over by then does not count. */
   attach(core) {
     const { now, flashWaits } = this;
