@@ -51,5 +51,7 @@ pub mod gear_train;
 pub mod spiral;
 pub mod step_edges;
 pub mod usb_bus;
+#[path = "../../src/boards/pico/usb/endpoints.rs"]
+pub mod usb_endpoints;
 pub mod usb_host;
 pub mod usb_port;

@@ -9,7 +9,8 @@
 //!
 //! What is left out: time, and the errata E5 and E15, which the emulated Pico has.
 
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use crate::usb_endpoints::{Buffers, control_word};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use usb_device::bus::{PollResult, UsbBus};
 use usb_device::endpoint::{EndpointAddress, EndpointType};
 use usb_device::{Result, UsbDirection, UsbError};
@@ -24,8 +25,8 @@ const ALL_TAKEN: u32 = 0x5555_5555;
 const SENT_TO_0: u32 = 1 << 1;
 
 /// The controller, with the driver before it and the cable behind it.
-#[derive(Default)]
-pub struct Bus(Mutex<Controller>);
+#[derive(Clone, Default)]
+pub struct Bus(Arc<Mutex<Controller>>);
 
 /// What a device answers a host that asks for a packet.
 #[derive(Debug, PartialEq, Eq)]
@@ -86,6 +87,25 @@ impl Buffer {
         bytes: [0; GREATEST_PACKET],
         setups: 0,
     };
+
+    /// The control word, without the length.
+    fn control(&self) -> u32 {
+        let bits = [
+            (self.is_available, control_word::AVAILABLE),
+            (self.is_stalled, control_word::STALL),
+            (self.is_data_1, control_word::IS_DATA_1),
+            (self.is_full, control_word::FULL),
+        ];
+        bits.into_iter().filter(|(is_set, _)| *is_set).fold(0, |word, (_, bit)| word | bit)
+    }
+
+    /// Changes the control word, but for the length.
+    fn put_control(&mut self, word: u32) {
+        self.is_available = word & control_word::AVAILABLE != 0;
+        self.is_stalled = word & control_word::STALL != 0;
+        self.is_data_1 = word & control_word::IS_DATA_1 != 0;
+        self.is_full = word & control_word::FULL != 0;
+    }
 }
 
 /// The registers, and what the driver remembers.
@@ -229,57 +249,45 @@ impl Bus {
         self.controller().address
     }
 
-    /// Whether the driver has not seen the last SETUP packet yet.
-    pub fn has_setup(&self) -> bool {
-        self.controller().has_setup
-    }
-
-    /// Whether the next packet of an endpoint has the data toggle DATA1, or must have it.
-    pub fn is_data_1_next(&self, endpoint: EndpointAddress) -> bool {
-        let controller = self.controller();
-        let buffer = &controller.buffers[buffer_of(endpoint)];
-        // The driver flips it when it writes a packet, or reads one.
-        let flips = if endpoint.is_in() { !buffer.is_available } else { buffer.is_full };
-        buffer.is_data_1 != flips
-    }
-}
-
-/// What the firmware reads and writes past the driver.
-impl Bus {
     /// Whether the controller interrupts the processor.
     pub fn has_interrupt(&self) -> bool {
         let controller = self.controller();
         let has_event = controller.is_reset || controller.is_suspended || controller.is_resumed;
         has_event || controller.has_setup || controller.finished != 0
     }
+}
 
-    /// Whether the controller interrupts for ever, because endpoint 0 holds data that nobody reads.
-    pub fn is_held_up(&self) -> bool {
-        let controller = self.controller();
-        let buffer = &controller.buffers[1];
-        controller.finished == SENT_TO_0 && buffer.is_full && buffer.length > 0
+impl Buffers for Bus {
+    fn finished(&self) -> u32 {
+        self.controller().finished
     }
 
-    /// Clears the interrupt of a packet that the host has sent, and that waits in its buffer.
-    pub fn clear_received(&self, endpoint: EndpointAddress) {
-        self.controller().finished &= !(1 << buffer_of(endpoint));
+    fn clear_finished(&self, bits: u32) {
+        self.controller().finished &= !bits;
     }
 
-    /// Takes back a packet that the host has not taken. Returns whether there was one.
-    pub fn take_back(&self, endpoint: EndpointAddress) -> bool {
-        let (mut controller, number) = (self.controller(), buffer_of(endpoint));
-        let is_taken = controller.finished & 1 << number != 0;
-        let buffer = &mut controller.buffers[number];
-        if !buffer.is_available {
-            return false;
-        }
-        buffer.is_available = false;
-        if !is_taken {
-            buffer.is_full = false;
-            buffer.is_data_1 = !buffer.is_data_1;
-        }
-        !is_taken
+    fn control(&self, buffer: usize) -> u32 {
+        self.controller().buffers[buffer].control()
     }
+
+    fn put_control(&self, buffer: usize, word: u32) {
+        self.controller().buffers[buffer].put_control(word);
+    }
+
+    fn setup(&self) -> [u32; 2] {
+        let [a, b, c, d, e, f, g, h] = self.controller().setup;
+        [u32::from_le_bytes([a, b, c, d]), u32::from_le_bytes([e, f, g, h])]
+    }
+
+    fn has_setup(&self) -> bool {
+        self.controller().has_setup
+    }
+
+    fn arm_stall(&self) {
+        self.controller().is_stall_armed = [true; 2];
+    }
+
+    fn wait_for_packet(&self) {}
 }
 
 impl UsbBus for Bus {

@@ -2,26 +2,20 @@
 //!
 //! It keeps its own data toggles, as a real host does, and drops a packet that has the wrong one.
 //! It acts as USB 2.0 wants, or breaks transfers off, or sends what no host sends; then it checks
-//! only what the device still owes it. Four things are left out, because the crates do not keep
-//! them:
+//! only what the device still owes it. Three things are left out:
 //!
-//! - `usb-device` neither takes nor refuses a request with more than 128 bytes of data from the
-//!   host. Nothing is promised of such a transfer. If its data come, they are never read, and the
-//!   controller interrupts until the next SETUP packet. The same holds for data that no request
-//!   has announced.
 //! - `rp2040-hal` takes back the answer to a broken-off request when it sees the next SETUP packet.
 //!   A host that asks before gets the old answer, and may lose the data that it sends. Nothing is
 //!   promised of such a transfer.
-//! - Neither begins anew with DATA0 when the host configures the device again or lifts a halt (USB
-//!   2.0, sections 9.1.1.5 and 9.4.5). So behind each such request one packet may be lost each way,
-//!   just where the toggles differ, but no more, and none is repeated.
+//! - A host that breaks off a request behind which packets begin anew with DATA0 does not know
+//!   whether it was carried out. Behind each such request one packet may be lost each way, but no
+//!   more, and none is repeated.
 //! - `rp2040-hal` keeps a SETUP packet that it has not seen when the host resets the bus. So that
 //!   request is still carried out behind the reset, and may configure the device or open the port.
 
 use crate::usb_bus::{Answer, Handshake};
+use crate::usb_endpoints::Buffers;
 use crate::usb_port::{MANUFACTURER, PACKET, PRODUCT, Port, VENDOR_AND_PRODUCT};
-use usb_device::UsbDirection;
-use usb_device::endpoint::EndpointAddress;
 
 /// The number of endpoints in each direction.
 const ENDPOINTS: usize = 16;
@@ -29,8 +23,6 @@ const ENDPOINTS: usize = 16;
 pub const FROM_PORT: usize = 2;
 /// The endpoint to which the host sends bytes for the port.
 pub const TO_PORT: usize = 1;
-/// The most data of a request that the device takes.
-const MOST_DATA: usize = 128;
 /// The port reads packets while this many bytes wait at most.
 const ROOM_UP_TO: usize = 446;
 /// How often the device is served until its interrupts end, or it answers.
@@ -77,6 +69,17 @@ impl Transfer {
         self.request[0] & 0x80 != 0
     }
 
+    /// The endpoints, and the sides of them, whose packets begin anew with DATA0 behind the request.
+    fn begins_anew(&self) -> Vec<(usize, usize)> {
+        let of_port = [(FROM_PORT, IN), (TO_PORT, OUT)];
+        match self.request {
+            [0x00, 9, 0 | 1, 0, ..] | [0x01, 11, 0, 0, 1, 0, ..] => of_port.to_vec(),
+            [0x02, 1, 0, 0, address, ..] if address & 0x8F == 0x82 => vec![of_port[0]],
+            [0x02, 1, 0, 0, address, ..] if address & 0x8F == 0x01 => vec![of_port[1]],
+            _ => Vec::new(),
+        }
+    }
+
     /// The greatest number of bytes of data, or the exact one if the host sends them.
     fn length(&self) -> usize {
         usize::from(u16::from_le_bytes([self.request[6], self.request[7]]))
@@ -93,8 +96,8 @@ pub struct Host<'p> {
     transfer: Transfer,
     /// For each endpoint, whether its next packet to the host and from it is DATA1.
     is_data_1: [[bool; 2]; ENDPOINTS],
-    /// For each endpoint, whether its next packet to the host and from it may be lost.
-    may_lose: [[bool; 2]; ENDPOINTS],
+    /// For each endpoint, how many packets to the host and from it may be lost.
+    may_lose: [[u32; 2]; ENDPOINTS],
     /// The bytes for the port that the device has accepted since the last reset of the bus.
     accepted: Vec<u8>,
     /// The number of packets that the port has sent, and the host taken, since then.
@@ -117,7 +120,7 @@ impl<'p> Host<'p> {
             is_suspended: false,
             transfer: Transfer::NONE,
             is_data_1: [[false; 2]; ENDPOINTS],
-            may_lose: [[false; 2]; ENDPOINTS],
+            may_lose: [[0; 2]; ENDPOINTS],
             accepted: Vec::new(),
             taken: 0,
             next: 0,
@@ -142,8 +145,7 @@ impl<'p> Host<'p> {
                 return;
             }
         }
-        let is_owed = self.transfer.is_sound || !self.port.bus().is_held_up();
-        assert!(!is_owed, "the controller interrupts for ever");
+        panic!("the controller interrupts for ever");
     }
 
     /// Lets the device work, unless the host is hasty.
@@ -170,7 +172,7 @@ impl<'p> Host<'p> {
         self.port.sent.clear();
         self.taken = 0;
         self.is_data_1 = [[false; 2]; ENDPOINTS];
-        self.may_lose = [[false; 2]; ENDPOINTS];
+        self.may_lose = [[0; 2]; ENDPOINTS];
     }
 
     /// Suspends the bus. It resumes it before the next packet, if not before.
@@ -201,9 +203,9 @@ impl<'p> Host<'p> {
     /// Sends a SETUP packet.
     pub fn set_up(&mut self, request: [u8; 8]) {
         self.resume();
+        self.break_off_anew();
         self.port.bus().set_up(request);
         self.transfer = Transfer { request, moved: 0, is_over: false, is_sound: true };
-        self.transfer.is_sound = self.transfer.is_in() || self.transfer.length() <= MOST_DATA;
         self.is_data_1[0] = [true; 2];
     }
 
@@ -298,29 +300,39 @@ impl<'p> Host<'p> {
         assert!(!(is_owed && is_late), "the device does not go on with {:x?}", transfer.request);
     }
 
-    /// Begins anew with DATA0 where a confirmed request wants it, and notes where the device does
-    /// not.
+    /// Begins anew with DATA0 where a confirmed request wants it.
     fn follow_confirmed(&mut self) {
-        let of_endpoint = usize::from(self.transfer.request[4] & 0x8F);
-        let all = (1..ENDPOINTS).flat_map(|index| [index, index | 0x80]);
-        let anew: Vec<usize> = match self.transfer.request {
-            [0x00, 9, ..] | [0x01, 11, ..] => all.collect(),
-            [0x02, 1, 0, 0, ..] => all.filter(|address| *address == of_endpoint).collect(),
-            _ => return,
-        };
-        for address in anew {
-            let (index, is_in) = (address & 0xF, address & 0x80 != 0);
-            let direction = if is_in { UsbDirection::In } else { UsbDirection::Out };
-            let endpoint = EndpointAddress::from_parts(index, direction);
-            let side = if is_in { IN } else { OUT };
+        for (index, side) in self.transfer.begins_anew() {
             self.is_data_1[index][side] = false;
-            self.may_lose[index][side] = self.port.bus().is_data_1_next(endpoint);
+            // An old answer may have confirmed it before the device has carried it out.
+            let losses = &mut self.may_lose[index][side];
+            *losses = if self.transfer.is_sound { 0 } else { *losses + 1 };
         }
+    }
+
+    /// Breaks off a request behind which packets begin anew, if one is under way, before it
+    /// exchanges packets with those endpoints. It is unknown whether the device has carried it out,
+    /// or still will.
+    fn break_off_anew(&mut self) {
+        if !self.transfer.is_over {
+            for (index, side) in self.transfer.begins_anew() {
+                self.may_lose[index][side] += 1;
+                self.transfer.is_over = true;
+            }
+        }
+    }
+
+    /// Notes that a packet was lost, and fails with `fault` if none may be.
+    fn lose(&mut self, endpoint: usize, side: usize, fault: &str) {
+        let losses = &mut self.may_lose[endpoint][side];
+        assert!(*losses > 0, "{fault}");
+        *losses -= 1;
     }
 
     /// Asks another endpoint than the first for a packet. Only the port has any.
     pub fn ask(&mut self, endpoint: usize) -> Result<Vec<u8>, Answer> {
         self.resume();
+        self.break_off_anew();
         let (bytes, is_data_1) = match self.port.bus().ask(endpoint) {
             Answer::Packet { bytes, is_data_1, .. } => (bytes, is_data_1),
             answer => return Err(answer),
@@ -333,8 +345,7 @@ impl<'p> Host<'p> {
             assert_eq!(self.taken, self.port.sent.len(), "a packet is missing");
             return Ok(bytes);
         }
-        assert!(self.may_lose[endpoint][IN], "a packet from the port has the wrong data toggle");
-        self.may_lose[endpoint][IN] = false;
+        self.lose(endpoint, IN, "a packet from the port has the wrong data toggle");
         self.port.sent.pop();
         Ok(Vec::new())
     }
@@ -342,6 +353,7 @@ impl<'p> Host<'p> {
     /// Sends the port a packet.
     pub fn give(&mut self, packet: &[u8]) -> Handshake {
         self.resume();
+        self.break_off_anew();
         let is_data_1 = self.is_data_1[TO_PORT][OUT];
         let handshake = self.port.bus().give(TO_PORT, is_data_1, packet);
         match handshake {
@@ -350,11 +362,7 @@ impl<'p> Host<'p> {
                 self.is_data_1[TO_PORT][OUT] = !is_data_1;
             }
             Handshake::Dropped => {
-                assert!(
-                    self.may_lose[TO_PORT][OUT],
-                    "the port drops a packet that it acknowledges"
-                );
-                self.may_lose[TO_PORT][OUT] = false;
+                self.lose(TO_PORT, OUT, "the port drops a packet that it acknowledges");
                 self.is_data_1[TO_PORT][OUT] = !is_data_1;
             }
             Handshake::Nak => {

@@ -1,11 +1,13 @@
 //! The Pico's serial port by USB, as its firmware uses the crates `usb-device` and `usbd-serial`,
 //! on a bus made of plain memory.
 //!
-//! [`Port::serve`] does what the function of that name in `src/boards/pico/usb.rs` does. What is
+//! [`Port::serve`] does what the function of that name in `src/boards/pico/usb.rs` does, with the
+//! very code that the firmware has for the buffers of the endpoints (`usb_endpoints`). What is
 //! left out belongs to the chip or to the protocol: the errata E5 and E15, the main loop's queues
 //! and messages, and real-time bytes.
 
 use crate::usb_bus::Bus;
+use crate::usb_endpoints::{self, DataToggles};
 use std::collections::VecDeque;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{
@@ -32,6 +34,7 @@ const MOST_WAITING: usize = 512;
 pub struct Port<'b> {
     device: UsbDevice<'b, Bus>,
     class: CdcAcmClass<'b, Bus>,
+    toggles: DataToggles<Bus>,
     is_up: bool,
     is_open: bool,
     /// Received bytes for which the line's queue has had no room yet.
@@ -62,9 +65,12 @@ impl<'b> Port<'b> {
             .and_then(|builder| builder.max_packet_size_0(64))
             .expect("the strings fit")
             .build();
+        let buffers = device.bus().clone();
+        let endpoints = [class.write_ep().address(), class.read_ep().address()];
         Self {
             device,
             class,
+            toggles: DataToggles::new(buffers, endpoints),
             is_up: false,
             is_open: false,
             waiting: VecDeque::new(),
@@ -109,7 +115,9 @@ impl<'b> Port<'b> {
 
     /// Does all the work of the port.
     pub fn serve(&mut self) {
-        self.device.poll(&mut [&mut self.class]);
+        let unread = usb_endpoints::unread(self.bus());
+        self.device.poll(&mut [&mut self.toggles, &mut self.class]);
+        usb_endpoints::refuse(self.bus(), unread);
         self.follow_state();
         self.follow_port();
         self.receive();
@@ -135,7 +143,7 @@ impl<'b> Port<'b> {
         self.is_open = is_open;
         if !is_open {
             self.forget_sent();
-            if self.bus().take_back(self.class.write_ep().address()) {
+            if usb_endpoints::take_back(self.bus(), self.class.write_ep().address()) {
                 self.sent.pop();
             }
         }
@@ -154,7 +162,7 @@ impl<'b> Port<'b> {
                 self.received.extend(self.waiting.drain(..));
             }
             if MOST_WAITING - self.waiting.len() < PACKET + 2 {
-                return self.bus().clear_received(self.class.read_ep().address());
+                return usb_endpoints::leave(self.bus(), self.class.read_ep().address());
             }
             let mut packet = [0; PACKET];
             let Ok(count) = self.class.read_packet(&mut packet) else { return };

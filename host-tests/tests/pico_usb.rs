@@ -268,6 +268,58 @@ fn a_port_that_is_opened_again_begins_anew_and_is_greeted_alone() -> TestResult 
     Ok(())
 }
 
+/// A program with the rights to the device, or a wrong driver, can send such a request. If nobody
+/// took its data, the controller would interrupt the job for ever.
+#[test]
+fn a_request_with_too_much_data_is_refused_while_a_job_runs() -> TestResult {
+    let lines = job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]);
+    let mut line = begin_on(plugged_in()?, &lines)?;
+    while !line.status()?.starts_with("<Run") {}
+    for _ in 0..3 {
+        line.emulator.0.send_too_much_by_usb()?;
+        pass(&mut line, Duration::from_millis(200))?;
+        assert_eq!(line.emulator.said(), "");
+        assert!(line.status()?.starts_with("<Run"));
+    }
+    let pins = events_until_idle(&mut line)?;
+    assert_same_as_on_the_host(&PICO, &lines, &pins);
+    Ok(())
+}
+
+/// Virtual machines and programs with libusb configure the device again; some drivers lift halts
+/// when a program opens the port. The host then expects packets to begin anew with DATA0.
+#[test]
+fn a_host_that_begins_anew_without_a_reset_loses_no_packet() -> TestResult {
+    let mut line = plugged_in()?;
+    for turn in 0..8 {
+        // With one packet each way, and sometimes another, either data toggle is next.
+        for _ in 0..1 + turn % 2 {
+            assert!(line.status()?.starts_with("<Idle"), "in turn {turn}");
+        }
+        // Sometimes a packet waits for the host.
+        let waits = turn >= 4;
+        if waits {
+            line.emulator.0.let_usb_take(false)?;
+            line.emulator.send(b"$G\n")?;
+            pass(&mut line, Duration::from_millis(10))?;
+        }
+        if turn % 4 < 2 {
+            line.emulator.0.configure_usb_again()?;
+        } else {
+            line.emulator.0.lift_usb_halts()?;
+        }
+        pass(&mut line, Duration::from_millis(10))?;
+        if waits {
+            line.emulator.0.let_usb_take(true)?;
+            assert!(line.hear()?.starts_with("[GC:"), "in turn {turn}");
+            assert_eq!(line.hear()?, "ok", "in turn {turn}");
+        }
+        assert!(line.status()?.starts_with("<Idle"), "in turn {turn}");
+        assert_eq!(line.emulator.said(), "", "in turn {turn}");
+    }
+    Ok(())
+}
+
 #[test]
 fn a_stop_acts_behind_all_that_a_sender_may_have_on_its_way() -> TestResult {
     let lines = job_lines("lattice3.obj", &["$page=60x80", "$margin=5"]);

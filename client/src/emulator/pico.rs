@@ -363,6 +363,33 @@ impl Pico {
         self.send(USB_HOST, if suspends { 4 } else { 5 }, 0)
     }
 
+    /// Makes the USB host send a request with more data than the device has room for. If the device
+    /// does not refuse it within 100 ms, the emulator says so.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn send_too_much_by_usb(&mut self) -> io::Result<()> {
+        self.send(USB_HOST, 9, 0)
+    }
+
+    /// Makes the USB host configure the device again without a reset, so that packets begin anew
+    /// with DATA0 each way.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn configure_usb_again(&mut self) -> io::Result<()> {
+        self.send(USB_HOST, 10, 0)
+    }
+
+    /// Makes the USB host lift the halts of both endpoints of the port, so that packets begin anew
+    /// with DATA0 each way.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn lift_usb_halts(&mut self) -> io::Result<()> {
+        self.send(USB_HOST, 11, 0)
+    }
+
     /// Makes the USB host reset the bus `count` times (at most 255), each for 10 microseconds to 20
     /// milliseconds and 20 microseconds to 100 milliseconds after the one before, and then find the
     /// device again. `seed` decides the times. What was sent and the device has not taken is lost.

@@ -17,6 +17,7 @@
 //! millisecond when a host resets the bus, and [`frame`] for E15.
 
 mod connection;
+mod endpoints;
 mod frame;
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -36,6 +37,7 @@ use usb_device::device::{
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 use self::connection::Connection;
+use self::endpoints::{Buffers, DataToggles};
 use self::frame::Frame;
 pub use self::frame::forget as forget_frame;
 use super::ports::{self, Port, ReceiveSide};
@@ -70,19 +72,13 @@ const TOUCH_RATE: u32 = 1200;
 /// The bit of the controller's interrupts for a reset of the bus.
 const BUS_RESET: u32 = 1 << 12;
 
-/// Bits of the control word of an endpoint's buffer.
-mod buffer {
-    /// The controller has the buffer, and the host may take it.
-    pub const AVAILABLE: u32 = 1 << 10;
-    /// The packet is one of the odd ones (DATA1). Even and odd packets alternate, so that the host
-    /// notices a repeated one.
-    pub const IS_DATA_1: u32 = 1 << 13;
-    /// The bit that says that the buffer holds a packet.
-    pub const FULL: u32 = 1 << 15;
-    /// Cycles of the core after which a packet of 64 bytes that has already begun is over: 60
-    /// microseconds.
-    pub const CYCLES: u32 = 7500;
-}
+/// Cycles of the core after which a packet of 64 bytes that has already begun is over: 60
+/// microseconds.
+const PACKET_CYCLES: u32 = 7500;
+/// In the controller's status, the bit for a request of the host's that was not read.
+const SETUP_RECEIVED: u32 = 1 << 17;
+/// Both directions of endpoint 0, in the register that arms its stalls.
+const BOTH_DIRECTIONS: u32 = 0b11;
 
 /// The USB bus of the driver, which its other parts borrow.
 static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
@@ -110,6 +106,8 @@ struct Device {
     device: UsbDevice<'static, UsbBus>,
     /// The serial port of the driver.
     class: CdcAcmClass<'static, UsbBus>,
+    /// Begins packets anew with DATA0 where the driver does not.
+    toggles: DataToggles<Controller>,
     /// Whether the host has configured the device, so that bytes can be exchanged.
     is_up: bool,
     /// Whether a program has the port open, according to DTR.
@@ -165,6 +163,7 @@ pub fn set_up(
     ))));
     let bus: &UsbBusAllocator<_> = bus;
     let class = CdcAcmClass::new(bus, PACKET as u16);
+    let endpoints = [class.write_ep().address(), class.read_ep().address()];
     let strings = StringDescriptors::default()
         .manufacturer("penup")
         .product("penup pen plotter")
@@ -176,6 +175,7 @@ pub fn set_up(
         let device = Device {
             device: builder.build(),
             class,
+            toggles: DataToggles::new(Controller, endpoints),
             is_up: false,
             is_open: false,
             connection: Connection::new(),
@@ -287,12 +287,13 @@ fn serve() {
     if let (Some(device), Some(receive_side)) = unsafe { (DEVICE.get(), ports::receive_side()) } {
         device.frame.follow();
         // This must be read before polling, which clears it.
-        let took = device.class.write_ep().address().index();
-        let took = USB.buff_status().get() & 1 << (2 * took) != 0;
+        let took = endpoints::is_finished(&Controller, device.class.write_ep().address());
         if device.connection.is_ready() {
             // The driver sees only interrupts that are not masked.
             device.await_bus(false);
-            device.device.poll(&mut [&mut device.class]);
+            let unread = endpoints::unread(&Controller);
+            device.device.poll(&mut [&mut device.toggles, &mut device.class]);
+            endpoints::refuse(&Controller, unread);
         }
         device.await_bus(USB.intr().get() & BUS_RESET != 0);
         device.follow_state();
@@ -346,7 +347,7 @@ impl Device {
         }
         HOST_IS_GONE.store(true, Ordering::Relaxed);
         self.forget_sent();
-        self.take_packet_back();
+        endpoints::take_back(&Controller, self.class.write_ep().address());
         if self.is_in_line {
             // The unfinished line is refused, and the next one is a separate line. There is room,
             // because packets are read only while there are two slots more than they need.
@@ -364,24 +365,6 @@ impl Device {
     fn forget_sent(&mut self) {
         self.packet.clear();
         while self.to_send.dequeue().is_some() {}
-    }
-
-    /// Takes back a packet that the controller holds for the host, unless the host is taking it
-    /// just now.
-    fn take_packet_back(&mut self) {
-        let endpoint = self.class.write_ep().address().index() & 0xF; // the bits of its number
-        let endpoint_buffer = USB_MEMORY.ep_buffer_control(2 * endpoint);
-        let control = endpoint_buffer.get();
-        if control & buffer::AVAILABLE == 0 {
-            return;
-        }
-        endpoint_buffer.put(control & !buffer::AVAILABLE);
-        cortex_m::asm::delay(buffer::CYCLES);
-        if USB.buff_status().get() & 1 << (2 * endpoint) == 0 {
-            // The next packet must have the data toggle of this one, which was never sent; the
-            // driver will flip it.
-            endpoint_buffer.put(control & !(buffer::AVAILABLE | buffer::FULL) ^ buffer::IS_DATA_1);
-        }
     }
 
     /// Notes that the host has taken a packet, so that it is there. If bytes were discarded, those
@@ -417,11 +400,7 @@ impl Device {
                 self.waiting.pop_front();
             }
             if self.waiting.capacity() - self.waiting.len() < PACKET + 2 {
-                // The next packet waits in the controller. Its interrupt is cleared so that it does
-                // not come again and again.
-                let number = self.class.read_ep().address().index();
-                USB.buff_status().put(1 << (2 * number + 1));
-                return;
+                return endpoints::leave(&Controller, self.class.read_ep().address());
             }
             let mut packet = [0; PACKET];
             let Ok(count) = self.class.read_packet(&mut packet) else { return };
@@ -464,6 +443,43 @@ impl Device {
             }
             self.packet.clear();
         }
+    }
+}
+
+/// The registers of the controller's buffers.
+struct Controller;
+
+impl Buffers for Controller {
+    fn finished(&self) -> u32 {
+        USB.buff_status().get()
+    }
+
+    fn clear_finished(&self, bits: u32) {
+        USB.buff_status().put(bits); // Written ones clear.
+    }
+
+    fn control(&self, buffer: usize) -> u32 {
+        USB_MEMORY.ep_buffer_control(buffer).get()
+    }
+
+    fn put_control(&self, buffer: usize, word: u32) {
+        USB_MEMORY.ep_buffer_control(buffer).put(word);
+    }
+
+    fn setup(&self) -> [u32; 2] {
+        [USB_MEMORY.setup_packet_low().get(), USB_MEMORY.setup_packet_high().get()]
+    }
+
+    fn has_setup(&self) -> bool {
+        USB.sie_status().get() & SETUP_RECEIVED != 0
+    }
+
+    fn arm_stall(&self) {
+        USB.ep_stall_arm().set(BOTH_DIRECTIONS);
+    }
+
+    fn wait_for_packet(&self) {
+        cortex_m::asm::delay(PACKET_CYCLES);
     }
 }
 

@@ -58,8 +58,10 @@ const IDLE_TO_CONNECT = 800 * MICROSECOND;
 
 const HOST = {
   PLUGS_IN: 1, STOPS: 2, TAKES: 3, SUSPENDS: 4, RESUMES: 5, UNPLUGS: 6, PLUGS_INTO_BUSY: 7,
-  HAS_NO_POWER: 8,
+  HAS_NO_POWER: 8, SENDS_TOO_MUCH: 9, CONFIGURES_AGAIN: 10, LIFTS_HALTS: 11,
 };
+/** More data of one request than the device has room for. */
+const TOO_MUCH = 200;
 
 /** Numbers from 0 to 1 without a pattern, the same for the same seed. */
 function* numbers(seed) {
@@ -104,7 +106,7 @@ export class Usb {
   resetController() {
     Object.assign(this, {
       address: 0, main: 0, sie: 0, status: 0, buffers: 0, stallArm: 0, muxing: 0, power: 0,
-      direct: 0, override: 0, isStepDue: false,
+      direct: 0, override: 0, isStepDue: false, available: 0,
       enabled: 0, forced: 0, frame: 0, frameBegan: false, isHung: false, raised: false,
     });
     this.isFramed = false;
@@ -244,7 +246,9 @@ export class Usb {
 
   finish(endpoint, isOut, word) {
     this.chip.usbDPRAMView.setUint32(this.control(endpoint, isOut), word, true);
-    this.buffers |= 1 << (2 * endpoint + (isOut ? 1 : 0));
+    const bit = 1 << (2 * endpoint + (isOut ? 1 : 0));
+    this.available &= ~bit;
+    this.buffers |= bit;
     this.interrupt();
   }
 
@@ -252,9 +256,12 @@ export class Usb {
   DPRAMUpdated(offset, value) {
     if (offset < CONTROLS || offset >= CONTROLS_END) return;
     const [endpoint, isOut] = [(offset - CONTROLS) >> 3, (offset & 4) !== 0];
+    const bit = 1 << ((offset - CONTROLS) >> 2);
+    const wasAvailable = (this.available & bit) !== 0;
+    this.available = value & AVAILABLE ? this.available | bit : this.available & ~bit;
     if (endpoint === 0) this.goOnWithTransfer();
     else if (value & AVAILABLE && isOut) this.offer();
-    else if (value & AVAILABLE) {
+    else if (value & AVAILABLE && !wasAvailable) {
       const phase = this.now() - this.frameAt;
       if (this.isFramed && phase >= CRITICAL_FROM && phase <= CRITICAL_TO) {
         const late = phase / MICROSECOND;
@@ -478,6 +485,31 @@ export class Usb {
     this.offer();
   }
 
+  /** Makes a request whose data the device cannot take, so that it must refuse it. */
+  async sendTooMuch() {
+    const began = this.now();
+    const answer = await this.request(
+      [0x21, 0x20, 0, 0, 0, 0, TOO_MUCH, 0], new Array(TOO_MUCH).fill(0x55));
+    if (answer) console.error('the device accepts a request with too much data');
+    else if (this.now() - began > 100 * MILLISECOND) {
+      console.error('the device neither accepts nor refuses a request with too much data');
+    }
+  }
+
+  /** Makes requests behind which packets begin anew with DATA0, each way (USB 2.0, 9.1.1.5 and
+   * 9.4.5). The host lets its other packets rest meanwhile. */
+  async beginAnew(requests) {
+    this.isConfigured = false;
+    await this.pause(MILLISECOND);
+    for (const request of requests) {
+      if (!(await this.request(request))) console.error('the device refuses to begin anew');
+    }
+    this.inToggle = this.outToggle = false;
+    this.isConfigured = true;
+    this.take();
+    this.offer();
+  }
+
   pause(nanos) {
     return { then: (resolve) => this.after(nanos, () => resolve()) };
   }
@@ -497,7 +529,7 @@ export class Usb {
           this.status |= STATUS.SETUP;
           const isIn = (setup[0] & 0x80) !== 0;
           const length = setup[6] | (setup[7] << 8);
-          const transfer = { resolve, isIn, length, data, got: [], toggle: true };
+          const transfer = { resolve, isIn, length, data, sent: 0, got: [], toggle: true };
           transfer.isStatus = !isIn && !length;
           this.transfer = transfer;
           this.interrupt();
@@ -536,11 +568,13 @@ export class Usb {
       return this.endTransfer(null);
     }
     if (isOut) {
-      const data = transfer.isStatus ? [] : transfer.data;
+      const data = transfer.isStatus ? [] : transfer.data.slice(transfer.sent, transfer.sent + PACKET);
       this.chip.usbDPRAM.set(data, 0x100);
       this.finish(0, true, (word & ~(AVAILABLE | LENGTH)) | FULL | data.length);
       if (transfer.isStatus) return this.endTransfer(transfer.got);
-      transfer.isStatus = true;
+      transfer.toggle = !transfer.toggle;
+      transfer.sent += data.length;
+      transfer.isStatus = transfer.sent >= transfer.length;
     } else {
       const length = word & LENGTH;
       transfer.got.push(...this.chip.usbDPRAM.slice(0x100, 0x100 + length));
@@ -574,6 +608,11 @@ export class Usb {
       this.isConfigured = this.isFramed = false;
       this.status = (this.status & ~STATUS.CONNECTED) | STATUS.RESET;
       this.interrupt();
+    } else if (what === HOST.SENDS_TOO_MUCH) this.sendTooMuch();
+    else if (what === HOST.CONFIGURES_AGAIN) this.beginAnew([[0, 9, 1, 0, 0, 0, 0, 0]]);
+    else if (what === HOST.LIFTS_HALTS) {
+      const endpoints = [this.outEndpoint, 0x80 | this.inEndpoint];
+      this.beginAnew(endpoints.map((endpoint) => [2, 1, 0, 0, endpoint, 0, 0, 0]));
     } else if (what === HOST.SUSPENDS) this.suspend();
     else if (what === HOST.RESUMES) this.resume();
     else {
