@@ -2,8 +2,8 @@
 //! that cannot use a port themselves.
 //!
 //! The page speaks by a WebSocket. A binary message holds bytes of the serial line, in either
-//! direction. A text message of the page is an [`Order`] for an emulated board; one to the page is
-//! `{"path":[…]}`, what the pins of that board have drawn, as [`SampledPath`] describes it.
+//! direction. A text message of the page is a [`PageRequest`] to an emulated board; one to the page
+//! is `{"path":[…]}`, what the pins of that board have drawn, as [`SampledPath`] describes it.
 //!
 //! One page at a time holds the plotter; another is refused, and told so. The plotter's line stays
 //! open while no page is there, and what it says meanwhile is dropped, so a page that comes back
@@ -64,7 +64,7 @@ pub type Open = Box<dyn Fn() -> Result<FarEnd, Error> + Send + Sync>;
 /// What a page asks of an emulated board.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "lowercase", deny_unknown_fields)]
-pub enum Order {
+pub enum PageRequest {
     /// The pen with this number, from 1, is in from now on: `{"pen":2}`.
     Pen(u8),
     /// Another drawing begins: `"begin"`.
@@ -75,7 +75,7 @@ pub enum Order {
 #[derive(Debug, PartialEq, Eq)]
 enum ToPlotter {
     Bytes(Vec<u8>),
-    Order(Order),
+    Request(PageRequest),
 }
 
 /// The messages from the plotter to the page.
@@ -178,7 +178,7 @@ impl Bridge {
                     }
                 },
                 Ok(Message::Text(text)) => match serde_json::from_str(&text) {
-                    Ok(order) => ToPlotter::Order(order),
+                    Ok(request) => ToPlotter::Request(request),
                     Err(_) => {
                         let reason = "This text is no order for a plotter: nothing was done.";
                         return refused(CloseCode::Unsupported.into(), reason);
@@ -225,14 +225,14 @@ impl Line {
     /// Opens the plotter's line in a thread of its own: an emulator ends with the thread that
     /// started it.
     fn open(open: &Arc<Open>, listener: &Listener) -> Result<Self, Error> {
-        let (to_plotter, orders) = mpsc::sync_channel(WAITING_MESSAGES);
+        let (to_plotter, messages) = mpsc::sync_channel(WAITING_MESSAGES);
         let (opened, is_open) = mpsc::channel();
         let (open, listener) = (Arc::clone(open), Arc::clone(listener));
         let thread = thread::spawn(move || match open() {
             Ok(mut far) => {
                 // Whoever opens it waits for the answer.
                 let _ = opened.send(Ok(()));
-                let reason = carry(&mut far, &orders, &listener);
+                let reason = carry(&mut far, &messages, &listener);
                 tell(&listener, ToPage::Broken(reason));
             }
             Err(error) => {
@@ -246,22 +246,22 @@ impl Line {
 }
 
 /// Carries bytes in both directions until the line breaks. Returns why it broke.
-fn carry(far: &mut FarEnd, orders: &Receiver<ToPlotter>, listener: &Listener) -> String {
+fn carry(far: &mut FarEnd, messages: &Receiver<ToPlotter>, listener: &Listener) -> String {
     let mut buffer = [0; 4096];
     loop {
         let mut turn = || -> Result<bool, Error> {
             loop {
-                match orders.try_recv() {
+                match messages.try_recv() {
                     Ok(ToPlotter::Bytes(bytes)) => {
                         far.link().send(&bytes).map_err(Error::Link)?;
                     }
-                    Ok(ToPlotter::Order(order)) => {
+                    Ok(ToPlotter::Request(request)) => {
                         if let FarEnd::Board(board) = far {
-                            match order {
-                                Order::Pen(pen) => {
+                            match request {
+                                PageRequest::Pen(pen) => {
                                     board.change_pen(pen).map_err(Error::Link)?;
                                 }
-                                Order::Begin => board.begin_again()?,
+                                PageRequest::Begin => board.begin_again()?,
                             }
                         }
                     }

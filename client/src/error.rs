@@ -175,11 +175,11 @@ pub enum Error {
     #[error(
         "the plotter does not answer ({} s without a byte{})\nIs it powered, is it the right \
          port, and does it run \
-         penup at 115200 baud?", patience.as_secs_f32(), waiting_for(line.as_deref())
+         penup at 115200 baud?", timeout.as_secs_f32(), waiting_for(line.as_deref())
     )]
     Silent {
         /// How long the sender waited.
-        patience: Duration,
+        timeout: Duration,
         /// The line that was not answered; `None` if the plotter had not answered anything yet.
         line: Option<Box<JobLine>>,
     },

@@ -4,7 +4,7 @@
 //! reported, it executes at most one line for each read of the client, and it acts on real-time
 //! bytes even inside a line. Time passes only while the client waits for bytes.
 
-use crate::link::{Answer, Link, Order};
+use crate::link::{Answer, Link, UserRequest};
 use penup::checksum::CRC_16;
 use penup::machine::Settings;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
@@ -83,7 +83,7 @@ pub struct FakePlotter {
     /// The number of vertices that it says it can hold.
     pub most_vertices: usize,
     /// What the user asks for by keys, in order, each after this number of strokes.
-    pub keys: VecDeque<(u64, Order)>,
+    pub keys: VecDeque<(u64, UserRequest)>,
     /// The speeds in percent of those in its settings.
     pub percent: u16,
     /// The states in which it stood after it was told to hold, counted.
@@ -352,12 +352,12 @@ impl Link for FakePlotter {
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         if self.output.is_empty() {
             self.work();
         }
         if self.output.is_empty() {
-            self.clock += patience;
+            self.clock += timeout;
         }
         let count = buffer.len().min(self.output.len());
         for (slot, byte) in buffer.iter_mut().zip(self.output.drain(..count)) {
@@ -372,13 +372,13 @@ impl Link for FakePlotter {
         Ok(self.requested_pens.len() == 2)
     }
 
-    fn order(&mut self) -> Option<Order> {
+    fn request(&mut self) -> Option<UserRequest> {
         // A user looks at what the last key did before the next one.
         let drawn = self.drawn.filter(|_| self.reports >= 3)?;
-        let (_, order) = *self.keys.front().filter(|(stroke, _)| *stroke <= drawn)?;
+        let (_, request) = *self.keys.front().filter(|(stroke, _)| *stroke <= drawn)?;
         self.keys.pop_front();
         self.reports = 0;
-        Some(order)
+        Some(request)
     }
 
     fn ask_to_resume(&mut self, _first: bool) -> io::Result<Answer> {

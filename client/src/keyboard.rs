@@ -5,7 +5,7 @@
 //! ends by Ctrl-C. There is no keyboard where the standard input or the standard error is no
 //! terminal.
 
-use crate::link::Order;
+use crate::link::UserRequest;
 
 /// What the keys do, for the user.
 pub const KEYS: &str = "space pauses and goes on, + and - change the speed, in a pause u and d set \
@@ -16,8 +16,8 @@ pub const KEYS: &str = "space pauses and goes on, + and - change the speed, in a
 pub enum Key {
     /// Enter, which answers a question.
     Enter,
-    /// A key with an order.
-    Order(Order),
+    /// A key with a request.
+    Request(UserRequest),
 }
 
 impl Key {
@@ -25,12 +25,12 @@ impl Key {
     fn of(byte: u8) -> Option<Self> {
         Some(match byte {
             b'\n' | b'\r' => Self::Enter,
-            b' ' => Self::Order(Order::Pause),
-            b'+' => Self::Order(Order::Faster),
-            b'-' => Self::Order(Order::Slower),
-            b'u' | b'U' => Self::Order(Order::PenHigher),
-            b'd' | b'D' => Self::Order(Order::PenLower),
-            b'q' | b'Q' => Self::Order(Order::GiveUp),
+            b' ' => Self::Request(UserRequest::Pause),
+            b'+' => Self::Request(UserRequest::Faster),
+            b'-' => Self::Request(UserRequest::Slower),
+            b'u' | b'U' => Self::Request(UserRequest::PenHigher),
+            b'd' | b'D' => Self::Request(UserRequest::PenLower),
+            b'q' | b'Q' => Self::Request(UserRequest::GiveUp),
             _ => return None,
         })
     }

@@ -28,7 +28,7 @@ pub enum Answer {
 
 /// What a user beside the plotter asks for by a key while it draws.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Order {
+pub enum UserRequest {
     /// Pause, or go on after a pause.
     Pause,
     /// All speeds up by a tenth.
@@ -51,12 +51,12 @@ pub trait Link {
     /// The error that the port reports, for instance that the plotter was unplugged.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits up to `patience` for bytes and writes them to the start of `buffer`. Returns how many
+    /// Waits up to `timeout` for bytes and writes them to the start of `buffer`. Returns how many
     /// there are: 0 if none arrived in time.
     ///
     /// # Errors
     /// The error that the port reports. A timeout is not an error.
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Called repeatedly while the stopped machine waits for pen number `pen`, counted from 1.
     /// Starts or awaits the change of the pen and returns whether the pen is in the holder now.
@@ -76,8 +76,8 @@ pub trait Link {
         Ok(Answer::Nobody)
     }
 
-    /// What the user has asked for since the last call, one order at a time.
-    fn order(&mut self) -> Option<Order> {
+    /// What the user has asked for since the last call, one request at a time.
+    fn request(&mut self) -> Option<UserRequest> {
         None
     }
 
@@ -97,8 +97,8 @@ pub struct SerialLink {
     typed: Option<Receiver<()>>,
     /// The keys of the terminal, once they were taken.
     keyboard: Option<Keyboard>,
-    /// The orders that were typed and not yet asked for.
-    orders: VecDeque<Order>,
+    /// The requests that were typed and not yet asked for.
+    requests: VecDeque<UserRequest>,
     /// Whether Enter was pressed since the last question.
     is_answered: bool,
 }
@@ -127,13 +127,13 @@ impl SerialLink {
         let device = device.to_owned();
         let again = move || serialport::new(device.as_str(), BAUD).open().ok();
         let port = Rejoining::new(port, Box::new(again));
-        let orders = VecDeque::new();
+        let requests = VecDeque::new();
         Ok(Self {
             port,
             requested_pen: None,
             typed: None,
             keyboard: None,
-            orders,
+            requests,
             is_answered: false,
         })
     }
@@ -162,7 +162,7 @@ impl SerialLink {
         while let Some(key) = self.keyboard.as_mut().and_then(Keyboard::key) {
             match key {
                 Key::Enter => self.is_answered = true,
-                Key::Order(order) => self.orders.push_back(order),
+                Key::Request(request) => self.requests.push_back(request),
             }
         }
     }
@@ -174,8 +174,8 @@ impl Link for SerialLink {
         self.port.send(bytes, bytes.contains(&ABORT))
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.port.receive(buffer, patience)
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.port.receive(buffer, timeout)
     }
 
     fn now(&self) -> Instant {
@@ -200,9 +200,9 @@ impl Link for SerialLink {
         ))
     }
 
-    fn order(&mut self) -> Option<Order> {
+    fn request(&mut self) -> Option<UserRequest> {
         self.read_keys();
-        self.orders.pop_front()
+        self.requests.pop_front()
     }
 }
 

@@ -103,8 +103,8 @@ impl Link for Emulated {
         self.emulator.send(bytes)
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.emulator.receive(buffer, patience)
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.emulator.receive(buffer, timeout)
     }
 
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {

@@ -15,7 +15,7 @@ use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress};
 use crate::run::{Outputs, Source, note, read, summary, write_pictures};
-use crate::sender::{Patience, Sender, Stopped};
+use crate::sender::{Sender, Stopped, Timeouts};
 use crate::workspace;
 use penup::index::Index;
 use penup::machine::{self, Setting};
@@ -58,7 +58,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
             // Nobody knows which pass it was.
             Some(report) => (report, 1),
             None => {
-                let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+                let mut sender = Sender::open(&mut link, Timeouts::default(), interrupt)?;
                 let drawn = operate::limits(&mut sender)
                     .and_then(|known| plot.draw(&mut sender, &known, &mut bar));
                 sender.end();
@@ -89,7 +89,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
     };
     let plot = Plot { args, source: &source, file: &file, quiet };
     let drawn =
-        Sender::open(board.as_mut(), Patience::default(), interrupt).and_then(|mut sender| {
+        Sender::open(board.as_mut(), Timeouts::default(), interrupt).and_then(|mut sender| {
             let drawn = plot.draw(&mut sender, &known, &mut bar);
             sender.end();
             drawn
@@ -254,7 +254,7 @@ impl Plot<'_> {
         interrupt: &AtomicBool,
         progress: &mut dyn Progress,
     ) -> Result<Option<Option<JobReport>>, Error> {
-        let Some((mut sender, taken)) = Sender::rejoin(link, Patience::default(), interrupt)?
+        let Some((mut sender, taken)) = Sender::rejoin(link, Timeouts::default(), interrupt)?
         else {
             return Ok(None);
         };
@@ -325,11 +325,11 @@ fn note_keys() {
 pub fn draw(
     link: &mut dyn Link,
     job: &dyn Lines,
-    patience: Patience,
+    timeouts: Timeouts,
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
-    let mut sender = Sender::open(link, patience, interrupt)?;
+    let mut sender = Sender::open(link, timeouts, interrupt)?;
     let drawn = draw_by(&mut sender, job, 1, progress);
     sender.end();
     drawn
@@ -346,7 +346,7 @@ pub fn relooped<I: Index>(
     interrupt: &AtomicBool,
     progress: &mut dyn Progress,
 ) -> Result<(StreamedJob, Option<JobReport>), Error> {
-    let mut sender = Sender::open(plotter, Patience::simulated(), interrupt)?;
+    let mut sender = Sender::open(plotter, Timeouts::simulated(), interrupt)?;
     let sent = sender.stream(job, progress);
     sender.end();
     sent?;

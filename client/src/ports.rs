@@ -21,7 +21,7 @@ pub const PORTS_VARIABLE: &str = "PENUP_PORTS";
 pub const AUTOMATIC: &str = "auto";
 
 /// How long a port is asked for the status. Some boards start anew when their port is opened.
-const PATIENCE: Duration = Duration::from_millis(1500);
+const TIMEOUT: Duration = Duration::from_millis(1500);
 
 /// The time between two questions.
 const PAUSE: Duration = Duration::from_millis(250);
@@ -205,7 +205,7 @@ fn found_at(link: &mut SerialLink) -> io::Result<Found> {
     let start = Instant::now();
     let (mut reader, mut buffer) = (ReplyReader::default(), [0; 256]);
     let mut said: Option<String> = None;
-    while start.elapsed() < PATIENCE {
+    while start.elapsed() < TIMEOUT {
         link.send(&[STATUS_QUERY])?;
         let asked = Instant::now();
         while asked.elapsed() < PAUSE {

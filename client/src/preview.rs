@@ -315,12 +315,12 @@ impl<I: Index> Link for InMemory<I> {
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let patience = match self.began {
-            Some(_) => patience,
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        let timeout = match self.began {
+            Some(_) => timeout,
             None => Duration::from_millis(100),
         };
-        let end = self.board.now() + patience.as_millis() as u64 * MILLISECOND;
+        let end = self.board.now() + timeout.as_millis() as u64 * MILLISECOND;
         let mut sent = Vec::new();
         while sent.is_empty() && self.board.now() < end {
             self.plotter.poll(&mut self.board);

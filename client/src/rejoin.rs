@@ -23,12 +23,12 @@ pub trait Wire: io::Read + io::Write {
     ///
     /// # Errors
     /// The port is gone.
-    fn set_patience(&mut self, patience: Duration) -> io::Result<()>;
+    fn set_io_timeout(&mut self, timeout: Duration) -> io::Result<()>;
 }
 
 impl Wire for Box<dyn serialport::SerialPort> {
-    fn set_patience(&mut self, patience: Duration) -> io::Result<()> {
-        Ok(self.set_timeout(patience)?)
+    fn set_io_timeout(&mut self, timeout: Duration) -> io::Result<()> {
+        Ok(self.set_timeout(timeout)?)
     }
 }
 
@@ -131,25 +131,25 @@ impl<W: Wire> Rejoining<W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(wire) = &mut self.wire else { return Err(gone_for_good()) };
         // This is a generous limit: sending a full receive window takes about 25 ms.
-        wire.set_patience(Duration::from_secs(2))?;
+        wire.set_io_timeout(Duration::from_secs(2))?;
         wire.write_all(bytes)
     }
 
-    /// Waits up to `patience` for bytes, and for a plotter that is gone. Returns 0 if none came.
+    /// Waits up to `timeout` for bytes, and for a plotter that is gone. Returns 0 if none came.
     ///
     /// # Errors
     /// The port is gone, and is not waited for any longer.
-    pub fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    pub fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let begin = Instant::now();
         if self.gone.is_some() {
-            self.look_for(patience)?;
+            self.look_for(timeout)?;
             if self.wire.is_none() {
                 return Ok(0);
             }
         }
-        match self.read(buffer, patience) {
+        match self.read(buffer, timeout) {
             Ok(0) => {
-                self.note_silence(begin, patience);
+                self.note_silence(begin, timeout);
                 Ok(0)
             }
             Ok(count) => {
@@ -165,9 +165,9 @@ impl<W: Wire> Rejoining<W> {
         }
     }
 
-    fn read(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let Some(wire) = &mut self.wire else { return Ok(0) };
-        wire.set_patience(patience)?;
+        wire.set_io_timeout(timeout)?;
         match wire.read(buffer) {
             Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(0),
@@ -183,8 +183,8 @@ impl<W: Wire> Rejoining<W> {
     }
 
     /// Notices that the plotter has fallen silent, or that the computer slept.
-    fn note_silence(&mut self, begin: Instant, patience: Duration) {
-        let slept = begin.elapsed().saturating_sub(patience);
+    fn note_silence(&mut self, begin: Instant, timeout: Duration) {
+        let slept = begin.elapsed().saturating_sub(timeout);
         if slept > SLEEP {
             self.lost += slept;
             self.heard = self.heard.map(|heard| heard + slept);
@@ -224,7 +224,7 @@ impl<W: Wire> Rejoining<W> {
     }
 
     /// Tries to reach the plotter again, after a pause since the last time.
-    fn look_for(&mut self, patience: Duration) -> io::Result<()> {
+    fn look_for(&mut self, timeout: Duration) -> io::Result<()> {
         let Some(mut gone) = self.gone else { return Ok(()) };
         if self.limit.is_some_and(|limit| gone.since.elapsed() > limit) {
             return Err(match gone.why {
@@ -236,7 +236,7 @@ impl<W: Wire> Rejoining<W> {
         }
         if gone.last_attempt.elapsed() < PAUSE {
             if self.wire.is_none() {
-                std::thread::sleep(patience);
+                std::thread::sleep(timeout);
             }
             return Ok(());
         }

@@ -17,7 +17,7 @@ use crate::plot::{draw, plot, relooped};
 use crate::png::png;
 use crate::preview::{Drawn, InMemory};
 use crate::progress::{Bar, duration};
-use crate::sender::{Patience, Sender};
+use crate::sender::{Sender, Timeouts};
 use crate::tape;
 use penup::index::Index;
 use penup::machine::Setting;
@@ -125,7 +125,7 @@ fn show<I: Index>(
         draw_strokes(&mut plotter, Some(&streamed), interrupt, &mut bar)?;
         (Some(streamed), report)
     } else {
-        (None, draw(&mut plotter, &source.job, Patience::simulated(), interrupt, &mut bar)?)
+        (None, draw(&mut plotter, &source.job, Timeouts::simulated(), interrupt, &mut bar)?)
     };
     let mut drawn = plotter.drawn();
     if passes > 1 {
@@ -179,7 +179,7 @@ fn draw_strokes<I: Index>(
     interrupt: &AtomicBool,
     bar: &mut Bar,
 ) -> Result<(), Error> {
-    let mut sender = Sender::open(plotter, Patience::simulated(), interrupt)?;
+    let mut sender = Sender::open(plotter, Timeouts::simulated(), interrupt)?;
     let drawn = match streamed {
         Some(streamed) => sender.draw_streamed(streamed, bar),
         None => sender.plot(bar),
@@ -261,7 +261,7 @@ fn encode_tape(
         InMemory::<u32>::new(Room::for_job(&job), penup::machine::Settings::default());
     {
         let mut bar = Bar::new(quiet);
-        let mut sender = Sender::open(&mut plotter, Patience::simulated(), interrupt)?;
+        let mut sender = Sender::open(&mut plotter, Timeouts::simulated(), interrupt)?;
         sender.stream(&job, &mut bar)?;
         sender.end();
     }

@@ -16,14 +16,14 @@
 mod delivery;
 mod drawing;
 mod orders;
-mod patience;
+mod timeouts;
 mod streaming;
 
-pub use patience::Patience;
 pub use streaming::{Stopped, Taken};
+pub use timeouts::Timeouts;
 
 use crate::error::Error;
-use crate::link::{Link, Order};
+use crate::link::{Link, UserRequest};
 use crate::progress::{Progress, Quiet};
 use penup_job::protocol::{
     ABORT, END, LAST_NUMBER, MODEL, Reply, ReplyReader, STATUS_QUERY, Status, is_penup, numbered,
@@ -48,7 +48,7 @@ const SURE_OF_OTHER_CONTENTS: u32 = 3;
 /// A conversation with a plotter that answered and was idle when it began.
 pub struct Sender<'a> {
     link: &'a mut dyn Link,
-    patience: Patience,
+    timeouts: Timeouts,
     interrupt: &'a AtomicBool,
     reader: ReplyReader,
     replies: VecDeque<Reply>,
@@ -67,7 +67,7 @@ pub struct Sender<'a> {
     /// Whether a machine that is locked after an alarm is no failure.
     allows_alarm: bool,
     /// What the user beside the plotter has asked for and has not been done yet.
-    orders: VecDeque<Order>,
+    requests: VecDeque<UserRequest>,
 }
 
 /// Computes the line to cite in an error; it is called only if there is an error.
@@ -84,20 +84,20 @@ impl<'a> Sender<'a> {
     /// Nothing answers, something other than penup answers, or the plotter is busy.
     pub fn open(
         link: &'a mut dyn Link,
-        patience: Patience,
+        timeouts: Timeouts,
         interrupt: &'a AtomicBool,
     ) -> Result<Self, Error> {
-        let mut sender = Self::new(link, patience, interrupt);
+        let mut sender = Self::new(link, timeouts, interrupt);
         sender.take_over(Status::is_idle)?;
         Ok(sender)
     }
 
     /// A conversation that has not begun.
-    fn new(link: &'a mut dyn Link, patience: Patience, interrupt: &'a AtomicBool) -> Self {
+    fn new(link: &'a mut dyn Link, timeouts: Timeouts, interrupt: &'a AtomicBool) -> Self {
         let now = link.now();
         Self {
             link,
-            patience,
+            timeouts,
             interrupt,
             reader: ReplyReader::default(),
             replies: VecDeque::new(),
@@ -109,7 +109,7 @@ impl<'a> Sender<'a> {
             position: String::new(),
             contents: None,
             allows_alarm: false,
-            orders: VecDeque::new(),
+            requests: VecDeque::new(),
         }
     }
 
@@ -132,7 +132,7 @@ impl<'a> Sender<'a> {
         let start = self.link.now();
         let mut heard = None;
         self.query()?;
-        while self.since(start) < self.patience.silence {
+        while self.since(start) < self.timeouts.silence {
             self.stop_if_interrupted()?;
             match self.listen()? {
                 Some(Reply::Status(status)) => return Ok(status),
@@ -156,11 +156,11 @@ impl<'a> Sender<'a> {
         let start = self.link.now();
         self.last_heard = start;
         let (mut refused, mut knows_numbers) = (0, false);
-        while self.since(start) < self.patience.lost {
+        while self.since(start) < self.timeouts.lost {
             // The first line end terminates what is left of a corrupted line.
             self.send(&format!("\n{}\n", numbered(Some(0), LAST_NUMBER)))?;
             let requested_at = self.link.now();
-            while self.since(requested_at) < self.patience.reply {
+            while self.since(requested_at) < self.timeouts.reply {
                 self.stop_if_interrupted()?;
                 match self.listen()? {
                     Some(Reply::Done(0)) => {
@@ -271,7 +271,7 @@ impl<'a> Sender<'a> {
         // A failure is ignored: the abort of the next sender has the same effect.
         let _ = self.send(&format!("{}\n", numbered(Some(self.done + 1), END)));
         let start = self.link.now();
-        while self.since(start) < self.patience.reply {
+        while self.since(start) < self.timeouts.reply {
             match self.listen() {
                 Ok(Some(Reply::Done(number) | Reply::Refused(number, _)))
                     if number == self.done + 1 =>
@@ -316,11 +316,11 @@ impl<'a> Sender<'a> {
 
     /// Returns the error for a plotter that answers no more.
     fn silent(&self, line: AtLine<'_>) -> Error {
-        Error::Silent { patience: self.patience.silence, line: line().map(Box::new) }
+        Error::Silent { timeout: self.timeouts.silence, line: line().map(Box::new) }
     }
 
     fn fail_if_silent(&self, line: AtLine<'_>) -> Result<(), Error> {
-        if self.since(self.last_heard) > self.patience.silence {
+        if self.since(self.last_heard) > self.timeouts.silence {
             return Err(self.silent(line));
         }
         Ok(())
@@ -328,9 +328,9 @@ impl<'a> Sender<'a> {
 
     /// Stops the machine with the pen up if the user cancelled the job.
     fn stop_if_interrupted(&mut self) -> Result<(), Error> {
-        let order = self.link.order();
-        if !self.interrupt.load(Ordering::Relaxed) && order != Some(Order::GiveUp) {
-            self.orders.extend(order);
+        let request = self.link.request();
+        if !self.interrupt.load(Ordering::Relaxed) && request != Some(UserRequest::GiveUp) {
+            self.requests.extend(request);
             return Ok(());
         }
         Err(match self.abort()? {
@@ -345,7 +345,7 @@ impl<'a> Sender<'a> {
         for _ in 0..3 {
             self.link.send(&[ABORT])?;
             let start = self.link.now();
-            while self.since(start) < self.patience.greeting / 3 {
+            while self.since(start) < self.timeouts.greeting / 3 {
                 if let Some(Reply::Greeting(text)) = self.listen()? {
                     return Ok(Some(text));
                 }
@@ -367,7 +367,7 @@ impl<'a> Sender<'a> {
 
     /// Asks for the status if the last time was long enough ago.
     fn query_if_due(&mut self) -> Result<(), Error> {
-        if self.since(self.last_query) >= self.patience.query {
+        if self.since(self.last_query) >= self.timeouts.query {
             self.query()?;
         }
         Ok(())
@@ -382,7 +382,7 @@ impl<'a> Sender<'a> {
     fn listen(&mut self) -> Result<Option<Reply>, Error> {
         if self.replies.is_empty() {
             let mut buffer = [0; 256];
-            let count = self.link.receive(&mut buffer, self.patience.query / 2)?;
+            let count = self.link.receive(&mut buffer, self.timeouts.query / 2)?;
             if count > 0 {
                 self.last_heard = self.link.now();
             }

@@ -28,7 +28,7 @@ const POLICY: &str = "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; 
 /// The type of a text for people.
 const TEXT: &str = "text/plain; charset=utf-8";
 /// The longest time that a connection may say nothing.
-const PATIENCE: Duration = Duration::from_secs(5);
+const TIMEOUT: Duration = Duration::from_secs(5);
 /// The most bytes of the head of a request.
 const LONGEST_HEAD: usize = 16 << 10;
 /// The most bytes of the file to draw. It is as much as the page opens, which is far more than any
@@ -147,8 +147,8 @@ impl PageServer {
 
     /// Answers the request of one connection, and closes it.
     fn serve(&self, mut connection: TcpStream) -> io::Result<()> {
-        connection.set_read_timeout(Some(PATIENCE))?;
-        connection.set_write_timeout(Some(PATIENCE))?;
+        connection.set_read_timeout(Some(TIMEOUT))?;
+        connection.set_write_timeout(Some(TIMEOUT))?;
         let mut head = Vec::new();
         let (answer, with_content) = loop {
             let mut part = [0; 4096];

@@ -4,16 +4,16 @@
 
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
-use penup_client::link::{Answer, Order};
+use penup_client::link::{Answer, UserRequest};
 use penup_client::progress::{Progress, Quiet};
-use penup_client::sender::{Patience, Sender};
+use penup_client::sender::{Sender, Timeouts};
 use penup_job::protocol::Status;
 use penup_readers::lines::{JobLine, Origin};
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-const PATIENCE: Patience = Patience {
+const TIMEOUTS: Timeouts = Timeouts {
     silence: Duration::from_millis(600),
     lost: Duration::from_millis(1200),
     greeting: Duration::from_millis(600),
@@ -36,7 +36,7 @@ fn lines(count: usize) -> Vec<JobLine> {
 
 fn job(plotter: &mut FakePlotter, count: usize) -> Result<(), Error> {
     let interrupt = AtomicBool::new(false);
-    let mut sender = Sender::open(plotter, PATIENCE, &interrupt)?;
+    let mut sender = Sender::open(plotter, TIMEOUTS, &interrupt)?;
     let mut job = vec![JobLine::command("$clear")];
     job.extend(lines(count));
     sender.stream(&job, &mut Quiet)?;
@@ -80,7 +80,7 @@ fn a_line_longer_than_the_window_goes_alone() {
     let long = JobLine::command(format!("o {}", "x".repeat(245)));
     assert_eq!(long.sent.len(), 247);
     let job = [JobLine::command("v 0 0 0"), long.clone(), long];
-    let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let mut sender = Sender::open(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
     sender.stream(&job, &mut Quiet).expect("all taken");
     assert!(!plotter.overflowed);
     assert_eq!(plotter.lines.len(), 3);
@@ -144,7 +144,7 @@ fn a_plotter_that_answers_slowly_while_it_computes_is_not_asked_for_lines() {
         let mut plotter = FakePlotter::new(Fault::None);
         plotter.reports_while_computing = 300;
         plotter.answers_first = answers_first;
-        plotter.answer_delay = 4 * PATIENCE.reply;
+        plotter.answer_delay = 4 * TIMEOUTS.reply;
         job(&mut plotter, 3).expect("a job without a fault");
         assert!(!plotter.overflowed, "it reads nothing while it computes");
         assert_eq!(plotter.lines.len(), 4);
@@ -231,7 +231,7 @@ fn giving_up_stops_the_machine_and_waits_until_it_says_so() {
         let mut plotter = FakePlotter::new(fault);
         plotter.strokes = 1000;
         let interrupt = AtomicBool::new(false);
-        let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+        let mut sender = Sender::open(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
         let error = sender.plot(&mut GivesUp(&interrupt)).expect_err("it was given up");
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.exit_code(), 130);
@@ -264,7 +264,7 @@ fn progress_counts_lines_then_strokes() {
     let mut plotter = FakePlotter::new(Fault::None);
     let interrupt = AtomicBool::new(false);
     let mut recorder = Recorder::default();
-    let mut sender = Sender::open(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let mut sender = Sender::open(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
     sender.stream(&lines(2), &mut recorder).expect("all taken");
     sender.plot(&mut recorder).expect("drawn");
     assert_eq!(
@@ -278,16 +278,16 @@ fn keys_pause_the_job_change_its_speed_and_give_it_up() {
     let mut plotter = FakePlotter::new(Fault::None);
     plotter.strokes = 20;
     plotter.keys = VecDeque::from([
-        (2, Order::Pause),
-        (2, Order::Pause),
-        (5, Order::Faster),
-        (6, Order::Faster),
-        (7, Order::Slower),
+        (2, UserRequest::Pause),
+        (2, UserRequest::Pause),
+        (5, UserRequest::Faster),
+        (6, UserRequest::Faster),
+        (7, UserRequest::Slower),
     ]);
     job(&mut plotter, 3).expect("a job without a fault");
     assert_eq!((plotter.holds, plotter.percent), (1, 110));
     assert!(plotter.keys.is_empty());
-    plotter.keys = VecDeque::from([(3, Order::GiveUp)]);
+    plotter.keys = VecDeque::from([(3, UserRequest::GiveUp)]);
     let error = job(&mut plotter, 3).expect_err("given up");
     assert!(matches!(error, Error::Interrupted), "{error}");
 }
@@ -297,11 +297,11 @@ fn keys_pause_the_job_change_its_speed_and_give_it_up() {
 fn a_pause_by_a_key_lasts_until_the_next_key() {
     let mut plotter = FakePlotter::new(Fault::None);
     plotter.strokes = 5;
-    plotter.keys = VecDeque::from([(2, Order::Pause), (3, Order::GiveUp)]);
+    plotter.keys = VecDeque::from([(2, UserRequest::Pause), (3, UserRequest::GiveUp)]);
     plotter.user = VecDeque::from([Answer::Yes]);
     plotter.draw_on();
     let interrupt = AtomicBool::new(false);
-    let (mut sender, status) = Sender::join(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let (mut sender, status) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
     assert_eq!(status.state, "Run");
     let mut reports = 0;
     let error = sender.watch(&mut Counter(&mut reports, &interrupt)).expect_err("interrupted");
@@ -328,7 +328,7 @@ fn a_running_job_is_joined_paused_resumed_and_aborted() {
     plotter.draw_on();
     let interrupt = AtomicBool::new(false);
     let aborts = plotter.aborts;
-    let (mut sender, _) = Sender::join(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
     let status = sender.resume().expect_err("it does not hold");
     assert_eq!(status.to_string(), "there is nothing to resume: the plotter reports Run");
     assert!(sender.pause(false).expect("paused").is_standing);
@@ -346,7 +346,7 @@ fn a_job_is_watched_to_its_end() {
     plotter.draw_on();
     let interrupt = AtomicBool::new(false);
     let mut recorder = Recorder::default();
-    let (mut sender, _) = Sender::join(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
     assert_eq!(sender.watch(&mut recorder).expect("drawn").state, "Idle");
     assert_eq!(recorder.0.last().map(String::as_str), Some("stroke 3/3"));
     assert_eq!(plotter.requested_pens, [2, 2]);
@@ -358,7 +358,7 @@ fn after_a_refused_line_the_next_one_is_carried_out() {
     let mut plotter = FakePlotter::new(Fault::ErrorAt(1, 150));
     let interrupt = AtomicBool::new(false);
     let (mut sender, _) =
-        Sender::open_for_orders(&mut plotter, PATIENCE, &interrupt).expect("a plotter");
+        Sender::open_for_orders(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
     let error = sender.ask("$100=0").expect_err("refused");
     assert_eq!((error.exit_code(), matches!(error, Error::Refused { .. })), (4, true));
     sender.ask("$101=80").expect("taken");

@@ -15,7 +15,7 @@ use penup_host_tests::grbl_lines::{agrees, rows};
 /// How long a board is silent that has nothing more to say.
 const SILENCE: Duration = Duration::from_millis(100);
 /// How long a line may take.
-const PATIENCE: Duration = Duration::from_secs(30);
+const TIMEOUT: Duration = Duration::from_secs(30);
 
 /// An emulated board, and what it has said.
 struct Line {
@@ -31,7 +31,7 @@ impl Line {
         may_end: bool,
     ) -> Result<(), Box<dyn Error>> {
         let (began, mut buffer) = (Instant::now(), [0; 256]);
-        while !is_over(&self.heard) && began.elapsed() < PATIENCE {
+        while !is_over(&self.heard) && began.elapsed() < TIMEOUT {
             let count = self.board.receive(&mut buffer, SILENCE)?;
             self.board.pin_changes()?;
             let bytes = buffer.get(..count).unwrap_or_default();

@@ -27,7 +27,7 @@ pub const END_OF_PULSES: u32 = 39;
 pub const PIECE_OF_BRAKE: u32 = 36;
 
 /// How long the board may be silent on a busy computer.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// The calls of a handler: the number of calls for each number of instructions.
 pub type Calls = BTreeMap<usize, usize>;
@@ -97,7 +97,7 @@ impl Counted {
         let log = qemu.0.stderr.take().ok_or("no log")?;
         let counter = thread::spawn(move || count(BufReader::new(log)));
         listener.set_nonblocking(true)?;
-        let deadline = Instant::now() + PATIENCE;
+        let deadline = Instant::now() + TIMEOUT;
         let line = loop {
             match listener.accept() {
                 Ok((line, _)) => break line,
@@ -106,7 +106,7 @@ impl Counted {
             }
         };
         line.set_nonblocking(false)?;
-        line.set_read_timeout(Some(PATIENCE))?;
+        line.set_read_timeout(Some(TIMEOUT))?;
         let mut board = Self { qemu, line: BufReader::new(line), counter };
         board.hear_until("Grbl")?;
         Ok(board)

@@ -10,7 +10,7 @@ use std::error::Error;
 use std::time::Duration;
 
 /// How long a board may compute without output. It may take minutes on a busy computer.
-const PATIENCE: Duration = Duration::from_secs(300);
+const TIMEOUT: Duration = Duration::from_secs(300);
 
 /// Parts of the mangled names of the functions of the Pico's image that `pico_cycles` times: seeing
 /// and hidden lines, hidden lines alone, the pairing of odd points, the improvement of the tour,
@@ -131,7 +131,7 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
                 return Ok(String::from_utf8(line)?.trim().to_owned());
             }
             let mut buffer = [0; 256];
-            let count = self.emulator.receive(&mut buffer, PATIENCE)?;
+            let count = self.emulator.receive(&mut buffer, TIMEOUT)?;
             if count == 0 {
                 return Err("the board is silent".into());
             }

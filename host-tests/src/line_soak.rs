@@ -15,7 +15,7 @@ use penup::board_table::{BoardRow, PICO};
 use penup_client::emulator::{EmulatedBoard, Emulator, Machine, Options, Pico, image_path};
 use penup_client::link::{Answer, Link};
 use penup_client::progress::Quiet;
-use penup_client::sender::{Patience, Sender};
+use penup_client::sender::{Sender, Timeouts};
 use penup_readers::lines::JobLine;
 use std::collections::BTreeSet;
 use std::error::Error;
@@ -240,7 +240,7 @@ impl DamagedLine {
     fn draw(&mut self, job: &Job) -> Result<bool, Box<dyn Error>> {
         self.take_ink()?;
         let interrupt = AtomicBool::new(false);
-        let drawn = Sender::open(self, Patience::default(), &interrupt).and_then(|mut sender| {
+        let drawn = Sender::open(self, Timeouts::default(), &interrupt).and_then(|mut sender| {
             let drawn = sender.stream(&job.sent, &mut Quiet).and_then(|()| sender.plot(&mut Quiet));
             sender.end();
             drawn
@@ -440,12 +440,12 @@ impl Link for DamagedLine {
         self.board.emulator().send(&bytes)
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         // A doubled byte needs a place.
         let most = buffer.len() / 2;
         let heard = if self.heard.is_empty() {
             let mut heard = vec![0; most];
-            let count = self.board.emulator().receive(&mut heard, patience)?;
+            let count = self.board.emulator().receive(&mut heard, timeout)?;
             heard.truncate(count);
             heard
         } else {

@@ -170,8 +170,8 @@ impl Link for NoisyLine {
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        let end = self.now + patience.as_micros() as u64;
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        let end = self.now + timeout.as_micros() as u64;
         if self.now > LONGEST {
             return Err(io::Error::other("the job does not end"));
         }

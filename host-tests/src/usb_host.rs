@@ -225,7 +225,7 @@ impl<'p> Host<'p> {
             }
             answer => {
                 let has_all = self.transfer.moved == self.transfer.length();
-                self.check_patience(self.transfer.is_in() || has_all);
+                self.check_progress(self.transfer.is_in() || has_all);
                 return Err(answer);
             }
         };
@@ -286,7 +286,7 @@ impl<'p> Host<'p> {
             }
             Handshake::Stall => self.transfer.is_over = true,
             Handshake::Nak | Handshake::Nothing => {
-                self.check_patience(is_due && !self.transfer.is_in());
+                self.check_progress(is_due && !self.transfer.is_in());
             }
         }
         handshake
@@ -294,7 +294,7 @@ impl<'p> Host<'p> {
 
     /// Checks that a device that does not answer at endpoint 0 has still something to do, or owes
     /// nothing.
-    fn check_patience(&self, is_owed: bool) {
+    fn check_progress(&self, is_owed: bool) {
         let transfer = &self.transfer;
         let is_late = transfer.is_sound && !transfer.is_over && !self.port.bus().has_interrupt();
         assert!(!(is_owed && is_late), "the device does not go on with {:x?}", transfer.request);
@@ -383,7 +383,7 @@ impl<'p> Host<'p> {
         let mut answer = Vec::new();
         if self.transfer.is_in() {
             loop {
-                match self.ask_patiently() {
+                match self.ask_until_answered() {
                     Ok(packet) => {
                         answer.extend_from_slice(&packet);
                         if packet.len() < PACKET || answer.len() >= self.transfer.length() {
@@ -398,14 +398,14 @@ impl<'p> Host<'p> {
         let packets =
             if self.transfer.is_in() { vec![&data[..0]] } else { data.chunks(PACKET).collect() };
         for packet in packets {
-            match self.give_patiently(packet) {
+            match self.give_until_answered(packet) {
                 Handshake::Ack | Handshake::Dropped => {}
                 Handshake::Stall => return Outcome::Refused,
                 Handshake::Nak | Handshake::Nothing => return Outcome::Unanswered,
             }
         }
         if !self.transfer.is_in() {
-            match self.ask_patiently() {
+            match self.ask_until_answered() {
                 Ok(_) => {}
                 Err(Answer::Stall) => return Outcome::Refused,
                 Err(_) => return Outcome::Unanswered,
@@ -415,7 +415,7 @@ impl<'p> Host<'p> {
     }
 
     /// Asks endpoint 0 until it answers.
-    fn ask_patiently(&mut self) -> Result<Vec<u8>, Answer> {
+    fn ask_until_answered(&mut self) -> Result<Vec<u8>, Answer> {
         for _ in 0..MOST_TURNS {
             let answer = self.ask_control();
             if answer != Err(Answer::Nak) {
@@ -428,7 +428,7 @@ impl<'p> Host<'p> {
     }
 
     /// Sends endpoint 0 a packet until it answers.
-    fn give_patiently(&mut self, packet: &[u8]) -> Handshake {
+    fn give_until_answered(&mut self, packet: &[u8]) -> Handshake {
         for _ in 0..MOST_TURNS {
             let handshake = self.give_control(packet);
             if handshake != Handshake::Nak {

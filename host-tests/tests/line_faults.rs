@@ -7,7 +7,7 @@
 use penup::drawing::PagePoint;
 use penup_client::error::Error;
 use penup_client::progress::Quiet;
-use penup_client::sender::{Patience, Sender};
+use penup_client::sender::{Sender, Timeouts};
 use penup_host_tests::noisy_line::{Damage, Fault, NoisyLine};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
@@ -30,7 +30,7 @@ fn draw(scene: &str, towards: Damage, back: Damage) -> (NoisyLine, Result<(), Er
     let job = ["$clear".to_owned()].into_iter().chain(file).chain(settings);
     let job: Vec<JobLine> = job.map(JobLine::command).collect();
     let interrupt = AtomicBool::new(false);
-    let drawn = Sender::open(&mut line, Patience::default(), &interrupt).and_then(|mut sender| {
+    let drawn = Sender::open(&mut line, Timeouts::default(), &interrupt).and_then(|mut sender| {
         let drawn = sender.stream(&job, &mut Quiet).and_then(|()| sender.plot(&mut Quiet));
         sender.end();
         drawn

@@ -11,7 +11,7 @@ use std::error::Error;
 use std::time::Duration;
 
 /// The interval at which the board is asked whether it has finished.
-const PATIENCE: Duration = Duration::from_millis(50);
+const TIMEOUT: Duration = Duration::from_millis(50);
 
 /// The edges of the step pins in a job on the board, in which no event may be late.
 fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
@@ -23,7 +23,7 @@ fn at_the_pins(lines: &[String]) -> Result<Vec<Edge>, Box<dyn Error>> {
         // The interval is measured by the board's clock. On a slow computer, the board would
         // otherwise have to answer more often, which costs it time.
         let now = line.emulator.clock()?;
-        if now >= asked_at + PATIENCE {
+        if now >= asked_at + TIMEOUT {
             asked_at = now;
             status = line.status()?;
         }

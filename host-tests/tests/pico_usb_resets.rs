@@ -16,7 +16,7 @@ use std::time::Duration;
 type TestResult<T = ()> = Result<T, Box<dyn Error>>;
 
 /// The longest time for which the port may be silent.
-const PATIENCE: Duration = Duration::from_secs(60);
+const TIMEOUT: Duration = Duration::from_secs(60);
 
 /// A board whose USB port is open, and what was heard there.
 struct Plugged {
@@ -41,7 +41,7 @@ impl Plugged {
                 return Ok(String::from_utf8(line)?.trim().to_owned());
             }
             let mut buffer = [0; 256];
-            let count = self.uart.emulator.receive_by_usb(&mut buffer, PATIENCE)?;
+            let count = self.uart.emulator.receive_by_usb(&mut buffer, TIMEOUT)?;
             if count == 0 {
                 return Err("the port is silent".into());
             }

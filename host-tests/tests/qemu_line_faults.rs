@@ -7,7 +7,7 @@ use penup::board_table::LM3S6965;
 use penup_client::link::Link;
 use penup_client::machines::{WatchedPlotter, emulate};
 use penup_client::progress::Quiet;
-use penup_client::sender::{Patience, Sender};
+use penup_client::sender::{Sender, Timeouts};
 use penup_host_tests::damage::damaged;
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
@@ -46,10 +46,10 @@ impl Link for DamagedLine {
         self.plotter.send(&bytes)
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         // A doubled byte needs a place.
         let mut heard = vec![0; buffer.len() / 2];
-        let count = self.plotter.receive(&mut heard, patience)?;
+        let count = self.plotter.receive(&mut heard, timeout)?;
         let bytes = self.damage(&heard[..count]);
         buffer[..bytes.len()].copy_from_slice(&bytes);
         Ok(bytes.len())
@@ -69,7 +69,7 @@ fn draw(scene: &str, one_in: Option<u64>) -> Result<(Vec<Run>, u32), Box<dyn Err
     job.pop();
     let job: Vec<JobLine> = job.into_iter().map(JobLine::command).collect();
     let interrupt = AtomicBool::new(false);
-    let mut sender = Sender::open(&mut line, Patience::default(), &interrupt)?;
+    let mut sender = Sender::open(&mut line, Timeouts::default(), &interrupt)?;
     sender.stream(&job, &mut Quiet)?;
     sender.plot(&mut Quiet)?;
     sender.end();

@@ -5,7 +5,7 @@ use penup::board_table::LM3S6965;
 use penup_client::machines::emulate;
 use penup_client::plot::draw;
 use penup_client::progress::Quiet;
-use penup_client::sender::Patience;
+use penup_client::sender::Timeouts;
 use penup_readers::SourceFile;
 use penup_readers::lines::{JobLine, Lines as _};
 use std::error::Error;
@@ -35,7 +35,7 @@ fn an_inch_of_a_file_is_25_4_mm_of_ink() -> Result<(), Box<dyn Error>> {
         let options = ["$clear", "$view=auto"].map(|option| JobLine::command(option.to_owned()));
         let job: Vec<JobLine> = options.into_iter().chain(file.in_order()).collect();
         let mut board = emulate(&LM3S6965)?;
-        draw(board.as_mut(), &job, Patience::default(), &AtomicBool::new(false), &mut Quiet)?;
+        draw(board.as_mut(), &job, Timeouts::default(), &AtomicBool::new(false), &mut Quiet)?;
         let runs = board.pen_runs()?;
         let inked: Vec<_> = runs.iter().filter(|run| run.pen_down).collect();
         let [run] = inked.as_slice() else { panic!("{name}: {} strokes", inked.len()) };

@@ -11,7 +11,8 @@ use super::format::{Contents, Format};
 use super::plan::Plan;
 use crate::lines::Origin;
 use penup::hpgl::{
-    Dialect, ErrorNumber, FARTHEST, Interpreter, Order, Point, Rectangle, Token, UNIT, UNITS_PER_MM,
+    Action, Dialect, ErrorNumber, FARTHEST, Interpreter, Point, Rectangle, Token, UNIT,
+    UNITS_PER_MM,
 };
 use polygon::{MOST_VERTICES, Vertices};
 use std::collections::BTreeMap;
@@ -101,29 +102,29 @@ impl Reader {
     /// results from it.
     fn push(&mut self, byte: u8, begin: usize) -> Result<(), String> {
         self.interpreter.push(byte);
-        while let Some(order) = self.interpreter.next_order() {
-            match order {
-                Order::Initialize => {
+        while let Some(action) = self.interpreter.next_action() {
+            match action {
+                Action::Initialize => {
                     self.end_stroke();
                     self.interpreter.initialize(self.at, LIMITS);
                 }
-                Order::Line([from, to]) => {
+                Action::Line([from, to]) => {
                     self.begin_at(from, begin);
                     self.stroke.push(to);
                     self.at = to;
                 }
-                Order::Dot(at) => self.begin_at(at, begin),
-                Order::Go(at) => {
+                Action::Dot(at) => self.begin_at(at, begin),
+                Action::Go(at) => {
                     self.end_stroke();
                     self.at = at;
                 }
-                Order::Pen(pen) => {
+                Action::Pen(pen) => {
                     self.end_stroke();
                     // Pen 0 puts the pen away, and the interpreter draws nothing then.
                     self.pen = if pen > 0 { pen.into() } else { self.pen };
                 }
                 // Nobody has asked.
-                Order::Answer(_) | Order::Nothing => continue,
+                Action::Answer(_) | Action::Nothing => continue,
             }
             self.points += 1;
             if self.points > MOST_POINTS {

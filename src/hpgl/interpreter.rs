@@ -1,4 +1,4 @@
-//! The instructions of HP-GL, and the orders that come of them.
+//! The instructions of HP-GL, and the actions that come of them.
 
 use super::coordinates::{Frame, Point, Rectangle, UNIT};
 use super::encoded::Polyline;
@@ -22,7 +22,7 @@ const STEPS: usize = 8;
 
 /// The actions that the interpreter asks of its owner.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Order {
+pub enum Action {
     /// There is nothing to do.
     Nothing,
     /// The interpreter is to be initialized, with the pen where it is.
@@ -306,12 +306,12 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Returns the next order that results from the bytes so far. Take all orders before the next
+    /// Returns the next action that results from the bytes so far. Take all actions before the next
     /// byte comes.
-    pub fn next_order(&mut self) -> Option<Order> {
+    pub fn next_action(&mut self) -> Option<Action> {
         loop {
-            if let Some(order) = self.continue_stroke() {
-                return Some(order);
+            if let Some(action) = self.continue_stroke() {
+                return Some(action);
             }
             if self.stroke.is_some() {
                 continue;
@@ -319,10 +319,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
             let step = self.steps.front()?.clone();
             let index = self.index;
             self.index += 1;
-            let order = match step {
-                Step::Initialize => Some(Order::Initialize),
+            let action = match step {
+                Step::Initialize => Some(Action::Initialize),
                 Step::Fill => match self.next_of_fill(index == 0) {
-                    Some(order) => return Some(order),
+                    Some(action) => return Some(action),
                     None => None,
                 },
                 Step::Edges => match self.polygon_edge(index) {
@@ -350,7 +350,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
                             Point { x: self.at.x + point.x, y: self.at.y + point.y }
                         });
                         match self.ink(line) {
-                            Some(order) => return Some(order),
+                            Some(action) => return Some(action),
                             None => continue,
                         }
                     }
@@ -363,7 +363,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 }
                 Step::Travel(to) => {
                     self.at = to;
-                    self.frame.contains(to).then_some(Order::Go(to))
+                    self.frame.contains(to).then_some(Action::Go(to))
                 }
                 Step::Place(at) => {
                     self.at = at;
@@ -372,14 +372,14 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 Step::Dot => self.ink([self.at; 2]),
                 Step::Pen(pen) => {
                     self.has_no_pen = pen == 0;
-                    Some(Order::Pen(pen))
+                    Some(Action::Pen(pen))
                 }
-                Step::Answer(answer) => Some(Order::Answer(answer)),
+                Step::Answer(answer) => Some(Action::Answer(answer)),
             };
             self.steps.pop_front();
             self.index = 0;
-            if order.is_some() {
-                return order;
+            if action.is_some() {
+                return action;
             }
         }
     }
@@ -392,7 +392,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
 
     /// Returns the next part of the line that is being drawn. `None` if nothing of this part is
     /// drawn, or if the line has ended, which is then forgotten.
-    fn continue_stroke(&mut self) -> Option<Order> {
+    fn continue_stroke(&mut self) -> Option<Action> {
         let mut stroke = self.stroke.take()?;
         if self.line.number.is_none() {
             return self.ink([stroke.from, stroke.to]);
@@ -407,19 +407,19 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// The order for a line or a dot, as far as it lies within the window.
-    pub(super) fn ink(&self, line: [Point; 2]) -> Option<Order> {
+    /// The action for a line or a dot, as far as it lies within the window.
+    pub(super) fn ink(&self, line: [Point; 2]) -> Option<Action> {
         if self.is_lost {
             return None;
         }
         let is_dot = line[0] == line[1];
         let line = self.frame.clip(line)?;
         Some(if self.has_no_pen {
-            Order::Go(line[1])
+            Action::Go(line[1])
         } else if is_dot {
-            Order::Dot(line[0])
+            Action::Dot(line[0])
         } else {
-            Order::Line(line)
+            Action::Line(line)
         })
     }
 }

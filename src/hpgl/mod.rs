@@ -3,7 +3,7 @@
 //! [`Dialect`] follows the bytes of a serial port and tells where HP-GL begins and ends, and which
 //! of its bytes are text. [`Session`] holds what has been received of it, answers the instructions
 //! to the interface (`ESC .`), and hands the other bytes to its [`Interpreter`]. That one turns
-//! them, byte by byte, into [`Order`]s: lines, dots, moves with the pen up, pens and answers. An
+//! them, byte by byte, into [`Action`]s: lines, dots, moves with the pen up, pens and answers. An
 //! instruction is never kept as a whole: a pair of coordinates is drawn as it comes, so an
 //! instruction may have any length.
 //!
@@ -29,7 +29,7 @@ mod tests;
 
 pub use coordinates::{FARTHEST, Point, Rectangle, UNIT, UNITS_PER_MM};
 pub use dialect::{Beginning, Dialect, Token};
-pub use interpreter::{ANSWER_BYTES, Answer, ErrorNumber, Interpreter, Order};
+pub use interpreter::{ANSWER_BYTES, Action, Answer, ErrorNumber, Interpreter};
 pub use polygon::{PolygonBuffer, VERTICES as POLYGON_POINTS, Vertex};
 pub use session::{RECEIVED_BYTES, Session};
 

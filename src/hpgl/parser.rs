@@ -37,7 +37,7 @@ const WITHOUT_EFFECT: &[[u8; 2]] = &[
 
 impl<B: PolygonBuffer> Interpreter<B> {
     /// Takes a byte of HP-GL without instructions to the interface. Before the next byte, take all
-    /// that [`Interpreter::next_order`] returns.
+    /// that [`Interpreter::next_action`] returns.
     pub fn push(&mut self, byte: u8) {
         match self.mode {
             Mode::Code => self.push_code(byte),

@@ -11,7 +11,7 @@
 //! `FP` draw. Its `FT` and the `PT` of HP-GL give the fill types and their defaults.
 
 use super::coordinates::{Point, UNIT, UNITS_PER_MM};
-use super::interpreter::{ErrorNumber, Interpreter, Order, Step};
+use super::interpreter::{Action, ErrorNumber, Interpreter, Step};
 use super::outline::{ArcStep, sine_and_cosine};
 use crate::fixed::{divide_rounding, product};
 
@@ -467,10 +467,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.hatch = hatch;
     }
 
-    /// Returns the next line of a fill; `None` if the shape is filled. [`Order::Nothing`] means
+    /// Returns the next line of a fill; `None` if the shape is filled. [`Action::Nothing`] means
     /// that the line does not lie on the page, or that the search was interrupted because it took
     /// long.
-    pub(super) fn next_of_fill(&mut self, is_first: bool) -> Option<Order> {
+    pub(super) fn next_of_fill(&mut self, is_first: bool) -> Option<Action> {
         if is_first {
             self.begin_hatch(false);
         }
@@ -480,7 +480,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 return None;
             }
             self.begin_hatch(true);
-            return Some(Order::Nothing);
+            return Some(Action::Nothing);
         }
         let y = hatch.base + hatch.line * hatch.pitch;
         // Every other line is drawn backwards, but with fill type 2.
@@ -490,19 +490,19 @@ impl<B: PolygonBuffer> Interpreter<B> {
         let (Some((from, _)), Some((to, _))) = (begin, end) else {
             self.hatch.line += 1;
             self.hatch.crossing = None;
-            return Some(Order::Nothing);
+            return Some(Action::Nothing);
         };
         self.hatch.crossing = end;
         let [from, to] = [from, to].map(|x| Point { x, y }.rotated(hatch.direction));
         if from == to {
-            return Some(Order::Nothing);
+            return Some(Action::Nothing);
         }
         if self.fill.is_solid() {
-            return Some(self.ink([from, to]).unwrap_or(Order::Nothing));
+            return Some(self.ink([from, to]).unwrap_or(Action::Nothing));
         }
         self.at = from;
         self.draw_to(to);
-        Some(Order::Nothing)
+        Some(Action::Nothing)
     }
 
     /// Returns the crossing of the line at `y` that follows another one, or the first one.

@@ -1,7 +1,7 @@
 //! What has been received of HP-GL by one serial port and waits to be carried out.
 
 use super::handshake::{Handshake, InterfaceError, Request};
-use super::interpreter::{Interpreter, Order};
+use super::interpreter::{Action, Interpreter};
 use super::{Answer, Beginning, DAMAGED, ESCAPE, Point, Rectangle, Token};
 
 /// The number of bytes that wait to be carried out, as on the HP 7475A.
@@ -22,8 +22,8 @@ pub struct Session {
     count: u16,
     handshake: Handshake,
     interpreter: Interpreter,
-    /// The order that is being carried out.
-    order: Order,
+    /// The action that is being carried out.
+    action: Action,
     /// Whether bytes were lost since the last call of [`Session::take_loss`].
     has_lost: bool,
 }
@@ -37,7 +37,7 @@ impl Session {
             count: 0,
             handshake: Handshake::new(),
             interpreter: Interpreter::new(),
-            order: Order::Nothing,
+            action: Action::Nothing,
             has_lost: false,
         }
     }
@@ -65,7 +65,7 @@ impl Session {
     pub fn forget(&mut self) {
         (self.first, self.count) = (0, 0);
         self.interpreter.abandon();
-        self.order = Order::Nothing;
+        self.action = Action::Nothing;
     }
 
     /// How many more bytes can be received.
@@ -75,7 +75,7 @@ impl Session {
 
     /// Whether all that was received has been carried out.
     pub fn is_idle(&self) -> bool {
-        self.count == 0 && self.order == Order::Nothing && self.interpreter.is_idle()
+        self.count == 0 && self.action == Action::Nothing && self.interpreter.is_idle()
     }
 
     /// The speed that `VS` has chosen for lines, in cm/s, in units of 2^-16; `None` if it has not.
@@ -127,32 +127,32 @@ impl Session {
         byte
     }
 
-    /// Returns the order that is to be carried out. It stays the same until [`Session::end_order`].
-    /// Even without an order, some bytes may be left.
-    pub fn order(&mut self) -> &Order {
+    /// Returns the action that is to be carried out. It stays the same until
+    /// [`Session::end_action`]. Even without an action, some bytes may be left.
+    pub fn action(&mut self) -> &Action {
         let mut bytes = 0;
-        while self.order == Order::Nothing && bytes < BYTES_AT_ONCE {
+        while self.action == Action::Nothing && bytes < BYTES_AT_ONCE {
             bytes += 1;
-            if let Some(order) = self.interpreter.next_order() {
-                self.order = order;
+            if let Some(action) = self.interpreter.next_action() {
+                self.action = action;
             } else if let Some(byte) = self.take() {
                 self.interpreter.push(byte);
             } else {
                 break;
             }
         }
-        &self.order
+        &self.action
     }
 
-    /// Ends the order.
-    pub fn end_order(&mut self) {
-        self.order = Order::Nothing;
+    /// Ends the action.
+    pub fn end_action(&mut self) {
+        self.action = Action::Nothing;
     }
 
-    /// Ends the order without carrying it out, because the machine is locked.
-    pub fn refuse_order(&mut self) {
+    /// Ends the action without carrying it out, because the machine is locked.
+    pub fn refuse_action(&mut self) {
         self.interpreter.note_locked();
-        self.end_order();
+        self.end_action();
     }
 
     /// Sends an answer of the interpreter.

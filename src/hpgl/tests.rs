@@ -1,7 +1,7 @@
-//! Tests of the interpreter and of the session: bytes in, orders and answers out.
+//! Tests of the interpreter and of the session: bytes in, actions and answers out.
 
 use super::{
-    Beginning, DAMAGED, Dialect, Interpreter, Order, Point, RECEIVED_BYTES, Rectangle, Session,
+    Action, Beginning, DAMAGED, Dialect, Interpreter, Point, RECEIVED_BYTES, Rectangle, Session,
     Token, UNIT,
 };
 use std::format;
@@ -21,15 +21,15 @@ fn units(Point { x, y }: Point) -> String {
     format!("{},{}", unit(x), unit(y))
 }
 
-fn shown(order: &Order) -> String {
-    match order {
-        Order::Nothing => String::from("nothing"),
-        Order::Initialize => String::from("init"),
-        Order::Line([from, to]) => format!("{}>{}", units(*from), units(*to)),
-        Order::Dot(at) => format!("dot {}", units(*at)),
-        Order::Go(to) => format!("go {}", units(*to)),
-        Order::Pen(pen) => format!("pen {pen}"),
-        Order::Answer(answer) => format!("'{answer}'"),
+fn shown(action: &Action) -> String {
+    match action {
+        Action::Nothing => String::from("nothing"),
+        Action::Initialize => String::from("init"),
+        Action::Line([from, to]) => format!("{}>{}", units(*from), units(*to)),
+        Action::Dot(at) => format!("dot {}", units(*at)),
+        Action::Go(to) => format!("go {}", units(*to)),
+        Action::Pen(pen) => format!("pen {pen}"),
+        Action::Answer(answer) => format!("'{answer}'"),
     }
 }
 
@@ -39,21 +39,21 @@ fn interpreter() -> Interpreter {
     interpreter
 }
 
-/// All orders of some bytes.
-fn orders_of(interpreter: &mut Interpreter, bytes: &[u8]) -> Vec<Order> {
-    let mut orders = Vec::new();
+/// All actions of some bytes.
+fn actions_of(interpreter: &mut Interpreter, bytes: &[u8]) -> Vec<Action> {
+    let mut actions = Vec::new();
     for byte in bytes {
         interpreter.push(*byte);
-        while let Some(order) = interpreter.next_order() {
-            orders.push(order);
+        while let Some(action) = interpreter.next_action() {
+            actions.push(action);
         }
     }
-    orders
+    actions
 }
 
-fn orders(bytes: &[u8]) -> String {
-    let orders = orders_of(&mut interpreter(), bytes);
-    orders.iter().map(shown).collect::<Vec<_>>().join(" ")
+fn actions(bytes: &[u8]) -> String {
+    let actions = actions_of(&mut interpreter(), bytes);
+    actions.iter().map(shown).collect::<Vec<_>>().join(" ")
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn instructions_end_with_a_semicolon_a_line_or_the_next_letter() {
         "pu10 20\npd30,40,\n50,60;",
         "PU10,20;PD;PA30,40,50,60;",
     ] {
-        let found = orders(text.as_bytes()).replace(" dot 10,20", "");
+        let found = actions(text.as_bytes()).replace(" dot 10,20", "");
         assert_eq!(found, "go 10,20 10,20>30,40 30,40>50,60", "{text}");
     }
 }
@@ -74,7 +74,7 @@ fn a_pair_is_drawn_as_it_comes() {
     let mut interpreter = interpreter();
     let text = b"PD1,1,2,2,3,3";
     let drawn: Vec<usize> =
-        text.iter().map(|byte| orders_of(&mut interpreter, &[*byte]).len()).collect();
+        text.iter().map(|byte| actions_of(&mut interpreter, &[*byte]).len()).collect();
     // Each is known to be over with the comma behind it.
     assert_eq!(drawn, [0, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
 }
@@ -98,8 +98,8 @@ fn errors_have_the_numbers_of_the_7475() {
         ("SC0,1,0,1;PA8000000,0;", 6),
         ("FS3;AS4;PS4;VS10;", 0),
     ] {
-        let found = orders(format!("{text}OE;OE;").as_bytes());
-        let found: Vec<&str> = found.split(' ').filter(|order| order.starts_with('\'')).collect();
+        let found = actions(format!("{text}OE;OE;").as_bytes());
+        let found: Vec<&str> = found.split(' ').filter(|action| action.starts_with('\'')).collect();
         assert_eq!(found, [format!("'{number}'").as_str(), "'0'"], "{text}");
     }
 }
@@ -107,29 +107,29 @@ fn errors_have_the_numbers_of_the_7475() {
 #[test]
 fn lines_are_clipped_at_the_limits_and_at_the_window() {
     assert_eq!(
-        orders(b"PU100,100;PD20100,100;PA100,200;"),
+        actions(b"PU100,100;PD20100,100;PA100,200;"),
         "go 100,100 100,100>16000,100 16000,120.5>100,200"
     );
-    assert_eq!(orders(b"PU-10,-10;PD-20,50;PA-5,-5;"), "");
-    assert_eq!(orders(b"PU-100,100;PD100,-100;PA100,300;"), "0,0>0,0 100,0>100,300");
-    assert_eq!(orders(b"IW100,100,200,200;PU0,150;PD300,150;"), "100,150>200,150");
-    assert_eq!(orders(b"IW100,100,200,200;IW;PU0,150;PD300,150;"), "go 0,150 0,150>300,150");
+    assert_eq!(actions(b"PU-10,-10;PD-20,50;PA-5,-5;"), "");
+    assert_eq!(actions(b"PU-100,100;PD100,-100;PA100,300;"), "0,0>0,0 100,0>100,300");
+    assert_eq!(actions(b"IW100,100,200,200;PU0,150;PD300,150;"), "100,150>200,150");
+    assert_eq!(actions(b"IW100,100,200,200;IW;PU0,150;PD300,150;"), "go 0,150 0,150>300,150");
 }
 
 #[test]
 fn scales_and_turns() {
-    assert_eq!(orders(b"IP0,0,1000,500;SC0,10,0,10;PU5,5;PD10,0;"), "go 500,250 500,250>1000,0");
-    assert_eq!(orders(b"IP0,0,1000,500;SC10,0,0,10;PU1,1;"), "go 900,50");
-    assert_eq!(orders(b"IP0,0,1000,500;SC0,10,0,10,1;PU5,5;PD10,0;"), "go 500,250 500,250>750,0");
-    assert_eq!(orders(b"IP0,0,1000,500;SC1,2,1,2,2;PU11,1;"), "go 20,0");
-    assert_eq!(orders(b"RO90;PU100,200;PR10,0;"), "go 15800,100 go 15800,110");
-    assert_eq!(orders(b"RO180;PU100,200;"), "go 15900,11800");
+    assert_eq!(actions(b"IP0,0,1000,500;SC0,10,0,10;PU5,5;PD10,0;"), "go 500,250 500,250>1000,0");
+    assert_eq!(actions(b"IP0,0,1000,500;SC10,0,0,10;PU1,1;"), "go 900,50");
+    assert_eq!(actions(b"IP0,0,1000,500;SC0,10,0,10,1;PU5,5;PD10,0;"), "go 500,250 500,250>750,0");
+    assert_eq!(actions(b"IP0,0,1000,500;SC1,2,1,2,2;PU11,1;"), "go 20,0");
+    assert_eq!(actions(b"RO90;PU100,200;PR10,0;"), "go 15800,100 go 15800,110");
+    assert_eq!(actions(b"RO180;PU100,200;"), "go 15900,11800");
     assert_eq!(
-        orders(b"RO270;PU100,200;RO;PU100,200"),
+        actions(b"RO270;PU100,200;RO;PU100,200"),
         "go 200,11900 go 100,200".replace(" go 100,200", "")
     );
     assert_eq!(
-        orders(b"RO90;PU100,200;OA;OC;OH;").split(" '").skip(1).collect::<Vec<_>>(),
+        actions(b"RO90;PU100,200;OA;OC;OH;").split(" '").skip(1).collect::<Vec<_>>(),
         ["100,200,0'", "100,200,0'", "0,0,12000,16000'"]
     );
 }
@@ -147,20 +147,20 @@ fn answers() {
         ("OF;OO;", "'40,40' '0,1,0,0,1,0,0,0'"),
         ("OW;IW1,2,3,4;OW;", "'0,0,16000,12000' '1,2,3,4'"),
     ] {
-        assert_eq!(orders(text.as_bytes()), expected, "{text}");
+        assert_eq!(actions(text.as_bytes()), expected, "{text}");
     }
-    assert_eq!(orders(b"PD10,20OA;OC;OS;"), "0,0>10,20 '10,20,1' '10,20,1' '25'");
-    assert_eq!(orders(b"SC0,1,0,1;PU0.5,0.25;OC;"), "go 5603,2321 '0.5000,0.2500,0'");
+    assert_eq!(actions(b"PD10,20OA;OC;OS;"), "0,0>10,20 '10,20,1' '10,20,1' '25'");
+    assert_eq!(actions(b"SC0,1,0,1;PU0.5,0.25;OC;"), "go 5603,2321 '0.5000,0.2500,0'");
 }
 
 #[test]
 fn a_circle_is_closed_and_within_an_eighth_of_a_unit() {
     let mut interpreter = interpreter();
-    let found = orders_of(&mut interpreter, b"PU4000,4000;CI1000;");
+    let found = actions_of(&mut interpreter, b"PU4000,4000;CI1000;");
     let lines: Vec<[Point; 2]> = found
         .iter()
-        .filter_map(|order| match order {
-            Order::Line(line) => Some(*line),
+        .filter_map(|action| match action {
+            Action::Line(line) => Some(*line),
             _ => None,
         })
         .collect();
@@ -175,14 +175,14 @@ fn a_circle_is_closed_and_within_an_eighth_of_a_unit() {
         assert!(radius((a.x + b.x) / 2, (a.y + b.y) / 2) > 999.87);
     }
     assert!(lines.windows(2).all(|pair| pair[0][1] == pair[1][0]));
-    assert_eq!(orders(b"PU200,100;CI100,120;").split(' ').count(), 2 + 3, "a triangle");
+    assert_eq!(actions(b"PU200,100;CI100,120;").split(' ').count(), 2 + 3, "a triangle");
     assert_eq!(
-        orders(b"PU100,0;PD;AA0,0,90,90;AR0,-100,-90,90;").replace(" dot 100,0", ""),
+        actions(b"PU100,0;PD;AA0,0,90,90;AR0,-100,-90,90;").replace(" dot 100,0", ""),
         "go 100,0 100,0>0,100 0,100>100,0"
     );
     // A second turn draws the same again.
     assert_eq!(
-        orders(b"PU100,100;PD;AA50,100,450,90;PU").split(' ').filter(|o| o.contains('>')).count(),
+        actions(b"PU100,100;PD;AA50,100,450,90;PU").split(' ').filter(|o| o.contains('>')).count(),
         5
     );
 }
@@ -190,16 +190,16 @@ fn a_circle_is_closed_and_within_an_eighth_of_a_unit() {
 #[test]
 fn outlines_and_ticks() {
     assert_eq!(
-        orders(b"PU10,10;EA30,20;ER5,5;").split(' ').skip(2).collect::<Vec<_>>().join(" "),
+        actions(b"PU10,10;EA30,20;ER5,5;").split(' ').skip(2).collect::<Vec<_>>().join(" "),
         "10,10>30,10 30,10>30,20 30,20>10,20 10,20>10,10 10,10>15,10 15,10>15,15 15,15>10,15 \
          10,15>10,10"
     );
     assert_eq!(
-        orders(b"PU100,100;EW10,0,90,90;"),
+        actions(b"PU100,100;EW10,0,90,90;"),
         "go 100,100 100,100>110,100 110,100>100,110 100,110>100,100"
     );
     assert_eq!(
-        orders(b"IP0,0,1000,1000;TL1,2;PU100,100;XT;YT;TL3;XT;"),
+        actions(b"IP0,0,1000,1000;TL1,2;PU100,100;XT;YT;TL3;XT;"),
         "go 100,100 100,80>100,110 80,100>110,100 100,100>100,130"
     );
 }
@@ -209,41 +209,41 @@ fn labels() {
     // An I is one stroke in the middle of its width.
     let size = "SI0.5,0.525;";
     assert_eq!(
-        orders(format!("{size}PU1000,1000;LBI\x03").as_bytes()),
+        actions(format!("{size}PU1000,1000;LBI\x03").as_bytes()),
         "go 1000,1000 1100,1210>1100,1000"
     );
     assert_eq!(
-        orders(format!("{size}PU1000,1000;LBI I\r\nI\x03PD").as_bytes()),
+        actions(format!("{size}PU1000,1000;LBI I\r\nI\x03PD").as_bytes()),
         "go 1000,1000 1100,1210>1100,1000 1700,1210>1700,1000 1100,790>1100,580"
     );
     assert_eq!(
-        orders(format!("{size}DI0,1;PU1000,1000;DT#;LBI#").as_bytes()),
+        actions(format!("{size}DI0,1;PU1000,1000;DT#;LBI#").as_bytes()),
         "go 1000,1000 790,1100>1000,1100"
     );
     assert_eq!(
-        orders(format!("{size}SL1;PU1000,1000;LBI\x03").as_bytes()),
+        actions(format!("{size}SL1;PU1000,1000;LBI\x03").as_bytes()),
         "go 1000,1000 1310,1210>1100,1000"
     );
     assert_eq!(
-        orders(format!("{size}PU1000,1000;LBI\x08I\x03CP;LBI\x03CP1,0.5;LBI\x03").as_bytes()),
+        actions(format!("{size}PU1000,1000;LBI\x08I\x03CP;LBI\x03CP1,0.5;LBI\x03").as_bytes()),
         "go 1000,1000 1100,1210>1100,1000 1100,1210>1100,1000 1100,790>1100,580 1700,1000>1700,790"
     );
     assert_eq!(
-        orders(format!("{size}SMI;PU1000,1000;SM;PU2000,1000;").as_bytes()),
+        actions(format!("{size}SMI;PU1000,1000;SM;PU2000,1000;").as_bytes()),
         "go 1000,1000 1000,1105>1000,895 go 2000,1000"
     );
     // `;`, `?`, `!` and `~` are letters; what HP-GL would obey outside of a label is none.
     let mut interpreter = interpreter();
-    let drawn = orders_of(&mut interpreter, b"LBPU;?!~ \xC3\xA9\x03OA;");
+    let drawn = actions_of(&mut interpreter, b"LBPU;?!~ \xC3\xA9\x03OA;");
     assert!(drawn.len() > 20);
     let mut again = self::interpreter();
-    assert_eq!(orders_of(&mut again, b"OE;").len(), 1);
+    assert_eq!(actions_of(&mut again, b"OE;").len(), 1);
 }
 
 #[test]
 fn pens_and_put_away_pens() {
     assert_eq!(
-        orders(b"SP1;PD9,0;SP0;PD18,0;SP2;PD27,0;SP;SP99;OE;"),
+        actions(b"SP1;PD9,0;SP0;PD18,0;SP2;PD27,0;SP;SP99;OE;"),
         "pen 1 0,0>9,0 pen 0 go 18,0 pen 2 18,0>27,0 pen 0 '3'"
     );
 }
@@ -266,7 +266,7 @@ fn encoded_polylines() {
         number(0),
     ];
     let text = [&b"PU100,100;PE"[..], &bytes, b";PA0,0"].concat();
-    assert_eq!(orders(&text), "go 100,100 100,100>110,110 go 108,113 go 5,6 5,6>6,6");
+    assert_eq!(actions(&text), "go 100,100 100,100>110,110 go 108,113 go 5,6 5,6>6,6");
 }
 
 #[test]
@@ -274,11 +274,11 @@ fn lost_bytes_are_not_drawn_over() {
     let text =
         [&b"PU10,10;PD20,10,3"[..], &[DAMAGED], b"0,10,40,10;PD50,10;PU60,10;PD70,10;PR0,5;"]
             .concat();
-    assert_eq!(orders(&text), "go 10,10 10,10>20,10 go 50,10 go 60,10 60,10>70,10 70,10>70,15");
+    assert_eq!(actions(&text), "go 10,10 10,10>20,10 go 50,10 go 60,10 60,10>70,10 70,10>70,15");
     let relative =
         [&b"PR;PD5,5;"[..], &[DAMAGED], b"PD5,5,5,5;CI10;XT;LBA\x03PA100,100;PD110,100"].concat();
     assert_eq!(
-        orders(&[&relative[..], b";"].concat()),
+        actions(&[&relative[..], b";"].concat()),
         "dot 0,0 0,0>5,5 go 100,100 100,100>110,100".replace("dot 0,0 ", "")
     );
 }
@@ -349,11 +349,11 @@ fn no_bytes_make_it_panic_or_draw_outside() {
             for byte in word.iter().copied().chain((random() % 4 == 0).then_some(random() as u8)) {
                 interpreter.push(byte);
                 let mut count = 0;
-                while let Some(order) = interpreter.next_order() {
-                    let points = match order {
-                        Order::Line(line) => line,
-                        Order::Dot(at) | Order::Go(at) => [at; 2],
-                        Order::Initialize => {
+                while let Some(action) = interpreter.next_action() {
+                    let points = match action {
+                        Action::Line(line) => line,
+                        Action::Dot(at) | Action::Go(at) => [at; 2],
+                        Action::Initialize => {
                             interpreter.initialize(Point::default(), LIMITS);
                             continue;
                         }
@@ -402,20 +402,20 @@ impl Line {
         heard
     }
 
-    /// Carries out at most this many orders. Returns them and the answers.
+    /// Carries out at most this many actions. Returns them and the answers.
     fn work(&mut self, most: usize) -> String {
-        let mut orders = Vec::new();
-        while !self.session.is_idle() && orders.len() < most {
-            let order = self.session.order().clone();
-            match &order {
-                Order::Nothing => continue,
-                Order::Answer(answer) => self.session.answer(answer),
-                Order::Initialize => self.session.initialize(Point::default(), LIMITS),
-                order => orders.push(shown(order)),
+        let mut actions = Vec::new();
+        while !self.session.is_idle() && actions.len() < most {
+            let action = self.session.action().clone();
+            match &action {
+                Action::Nothing => continue,
+                Action::Answer(answer) => self.session.answer(answer),
+                Action::Initialize => self.session.initialize(Point::default(), LIMITS),
+                action => actions.push(shown(action)),
             }
-            self.session.end_order();
+            self.session.end_action();
         }
-        format!("{}|{}", orders.join(" "), self.heard())
+        format!("{}|{}", actions.join(" "), self.heard())
     }
 }
 

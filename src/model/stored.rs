@@ -90,7 +90,7 @@ impl Units {
 
 /// What is known of a model in flash beside its vertices and corners.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Figures {
+pub(super) struct ModelSummary {
     pub faces: usize,
     pub bars: usize,
     pub rounding: Rounding,
@@ -103,8 +103,8 @@ pub(super) struct Figures {
     pub units: Units,
 }
 
-impl Figures {
-    /// The figures as the words of a record.
+impl ModelSummary {
+    /// The summary as the words of a record.
     pub fn words(&self) -> [u32; RECORD_WORDS] {
         let Self { faces, bars, rounding, pens, void_before, bounds: (low, high), units } = self;
         let [decimals, edited] = rounding.numbers();
@@ -117,7 +117,7 @@ impl Figures {
         words
     }
 
-    /// The figures of which these are the words. `None` if they are none.
+    /// The summary of which these are the words. `None` if they are none.
     fn of_words(words: &[u32; RECORD_WORDS]) -> Option<Self> {
         let (head, rest) = words.split_first_chunk::<7>()?;
         let (corners, rest) = rest.split_first_chunk::<6>()?;
@@ -156,15 +156,15 @@ pub struct StoredModel<'f> {
     /// Its record.
     record: AreaRecord,
     /// What the record says.
-    figures: Figures,
+    summary: ModelSummary,
 }
 
 impl<'f> StoredModel<'f> {
     /// The model that lies in an area, if there is one and all of it has been written.
     pub fn new(area: Area<'f>) -> Option<Self> {
         let record = area.record()?;
-        let figures = Figures::of_words(&record.words)?;
-        Some(Self { area, record, figures })
+        let summary = ModelSummary::of_words(&record.words)?;
+        Some(Self { area, record, summary })
     }
 
     /// Whether the flash still holds what was written. `check` is called after each KiB or so.
@@ -187,23 +187,23 @@ impl<'f> StoredModel<'f> {
 
     /// The number of faces.
     pub fn face_count(&self) -> usize {
-        self.figures.faces
+        self.summary.faces
     }
 
     /// The number of bars.
     pub fn bar_count(&self) -> usize {
-        self.figures.bars
+        self.summary.bars
     }
 
     /// One bit for each pen, from the lowest, that an element has.
     pub fn pens(&self) -> u32 {
-        self.figures.pens
+        self.summary.pens
     }
 
     /// Whether it is a plan: it has only bars, and all vertices are at one height.
     pub fn is_plan(&self) -> bool {
-        let (low, high) = self.figures.bounds;
-        self.figures.faces == 0 && self.figures.bars > 0 && low.z == high.z
+        let (low, high) = self.summary.bounds;
+        self.summary.faces == 0 && self.summary.bars > 0 && low.z == high.z
     }
 
     /// The position of a vertex, in units of 2^-[`Positions::fraction_bits`]. A vertex that does
@@ -213,11 +213,11 @@ impl<'f> StoredModel<'f> {
         let at = Area::LOW + 3 * vertex;
         let word = |number: usize| self.area.word(at + number).cast_signed();
         let position = Position { x: word(0), y: word(1), z: word(2) };
-        let (since, fraction_bits) = self.figures.units.last();
+        let (since, fraction_bits) = self.summary.units.last();
         if vertex >= since {
             return position;
         }
-        coarser_position(position, self.figures.units.of(vertex).saturating_sub(fraction_bits))
+        coarser_position(position, self.summary.units.of(vertex).saturating_sub(fraction_bits))
     }
 
     /// The bits of a corner.
@@ -238,7 +238,7 @@ impl<'f> StoredModel<'f> {
     /// The pen, from 0, of the element to which a corner belongs.
     #[inline]
     pub fn pen(&self, corner: usize) -> u8 {
-        if corner < self.figures.void_before {
+        if corner < self.summary.void_before {
             return 0;
         }
         (self.bits(corner) >> VERTEX_BITS) as u8 & ((1 << PEN_BITS) - 1)
@@ -256,7 +256,7 @@ impl<'f> StoredModel<'f> {
                 digest.update(&(i64::from(coordinate) << shift).to_le_bytes());
             }
         }
-        number(&mut digest, (self.figures.faces + self.figures.bars) as u32);
+        number(&mut digest, (self.summary.faces + self.summary.bars) as u32);
         let mut first = 0;
         while first < self.corner_count() {
             let last = (first..self.corner_count()).find(|&corner| self.corner(corner).is_last());
@@ -268,7 +268,7 @@ impl<'f> StoredModel<'f> {
         }
         // There are no curves.
         number(&mut digest, 0);
-        let [decimals, _] = self.figures.rounding.numbers();
+        let [decimals, _] = self.summary.rounding.numbers();
         number(&mut digest, decimals as u32);
         digest.finalize()
     }
@@ -276,11 +276,11 @@ impl<'f> StoredModel<'f> {
 
 impl Positions for StoredModel<'_> {
     fn fraction_bits(&self) -> u32 {
-        self.figures.units.last().1
+        self.summary.units.last().1
     }
 
     fn bounds(&self) -> Option<(Position, Position)> {
-        (self.vertex_count() > 0).then_some(self.figures.bounds)
+        (self.vertex_count() > 0).then_some(self.summary.bounds)
     }
 
     fn positions(&self) -> impl Iterator<Item = Position> {
@@ -288,6 +288,6 @@ impl Positions for StoredModel<'_> {
     }
 
     fn precision(&self) -> Precision {
-        self.figures.rounding.precision(self.fraction_bits())
+        self.summary.rounding.precision(self.fraction_bits())
     }
 }

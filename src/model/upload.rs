@@ -1,7 +1,7 @@
 //! Writes a model that is too large for the memory to flash while it arrives.
 
 use super::pens::PenBook;
-use super::stored::{CORNER_BYTES, Figures, Units, VERTEX_LIMIT, coarser_position, packed};
+use super::stored::{CORNER_BYTES, ModelSummary, Units, VERTEX_LIMIT, coarser_position, packed};
 use super::{
     Corner, Element, FINEST_FRACTION_BITS, Model, ModelError, PenName, Position, StoredModel,
     check_numbers, resolve, truncated,
@@ -44,7 +44,7 @@ pub struct Upload {
     /// The number of corners.
     corners: usize,
     /// What the record will say.
-    figures: Figures,
+    summary: ModelSummary,
     /// The pen of the elements that follow, and the names of the pens.
     pens: PenBook,
 }
@@ -71,7 +71,7 @@ impl Upload {
             writer,
             vertices: 0,
             corners: 0,
-            figures: Figures {
+            summary: ModelSummary {
                 faces: 0,
                 bars: 0,
                 rounding: model.rounding,
@@ -102,7 +102,7 @@ impl Upload {
 
     /// The numbers of vertices, faces, bars and corners that have come.
     pub fn counts(&self) -> [usize; 4] {
-        [self.vertices, self.figures.faces, self.figures.bars, self.corners]
+        [self.vertices, self.summary.faces, self.summary.bars, self.corners]
     }
 
     /// The error that there is no room.
@@ -121,21 +121,21 @@ impl Upload {
         area: Area<'_>,
         flash: &mut dyn AreaFlash,
     ) -> Result<(), UploadError> {
-        let (_, before) = self.figures.units.last();
+        let (_, before) = self.summary.units.last();
         let (position, fraction_bits) = truncated(coordinates, before)?;
         if self.vertices >= VERTEX_LIMIT || !self.writer.has_room(area, size_of::<Position>(), 0) {
             return Err(self.full().into());
         }
         if fraction_bits < before {
-            let (low, high) = &mut self.figures.bounds;
+            let (low, high) = &mut self.summary.bounds;
             for corner in [low, high] {
                 *corner = coarser_position(*corner, before - fraction_bits);
             }
-            self.figures.rounding.coarsen(before - fraction_bits);
-            self.figures.units.coarsen(self.vertices, fraction_bits);
+            self.summary.rounding.coarsen(before - fraction_bits);
+            self.summary.units.coarsen(self.vertices, fraction_bits);
         }
-        self.figures.rounding.write(&coordinates);
-        let (low, high) = &mut self.figures.bounds;
+        self.summary.rounding.write(&coordinates);
+        let (low, high) = &mut self.summary.bounds;
         let Position { x, y, z } = position;
         *low = Position { x: low.x.min(x), y: low.y.min(y), z: low.z.min(z) };
         *high = Position { x: high.x.max(x), y: high.y.max(y), z: high.z.max(z) };
@@ -202,8 +202,8 @@ impl Upload {
         }
         book.choose(name)?;
         if book.by_material != self.pens.by_material {
-            self.figures.void_before = self.corners;
-            self.figures.pens = u32::from(self.corners > 0);
+            self.summary.void_before = self.corners;
+            self.summary.pens = u32::from(self.corners > 0);
         }
         self.pens = book;
         Ok(())
@@ -219,7 +219,7 @@ impl Upload {
         area: Area<'f>,
         flash: &mut dyn AreaFlash,
     ) -> Result<StoredModel<'f>, UploadError> {
-        self.writer.finish(&self.figures.words(), area, flash)?;
+        self.writer.finish(&self.summary.words(), area, flash)?;
         StoredModel::new(area).ok_or(UploadError::Flash)
     }
 
@@ -252,8 +252,8 @@ impl Upload {
             self.writer.push(Side::High, &packed(corner, pen), area, flash)?;
         }
         self.corners += count;
-        *(if of_bar { &mut self.figures.bars } else { &mut self.figures.faces }) += 1;
-        self.figures.pens |= 1u32.checked_shl(pen.into()).unwrap_or(0);
+        *(if of_bar { &mut self.summary.bars } else { &mut self.summary.faces }) += 1;
+        self.summary.pens |= 1u32.checked_shl(pen.into()).unwrap_or(0);
         Ok(())
     }
 }

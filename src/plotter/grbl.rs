@@ -4,7 +4,7 @@
 #[cfg(feature = "early-ink")]
 use super::plot::ANSWER_MICROSECONDS;
 use super::program::{
-    MachinePosition, Order, Parameters, Program, StoredPosition, TEXT_LIMIT, Text,
+    MachineAction, MachinePosition, Parameters, Program, StoredPosition, TEXT_LIMIT, Text,
 };
 use super::reply::Reply;
 use super::stream::Task;
@@ -225,9 +225,9 @@ impl<I: Index> Inner<'_, I> {
     /// The program after a startup line, which may only set modes.
     fn after_startup_line(&self, line: GCode<'_>) -> Result<Program, CommandError> {
         let program = self.program.at(&self.machine, false);
-        let (program, order) = program.after(line, &self.context())?;
-        match order {
-            Order::Nothing => Ok(program),
+        let (program, action) = program.after(line, &self.context())?;
+        match action {
+            MachineAction::Nothing => Ok(program),
             _ => Err(BlockError::NotAtStart.into()),
         }
     }

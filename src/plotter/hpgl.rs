@@ -1,5 +1,5 @@
 //! Carries out HP-GL: it hands the bytes of a serial port to a [`Session`], and the session's
-//! orders to the machine, one at a time, as far as the machine has room for moves.
+//! actions to the machine, one at a time, as far as the machine has room for moves.
 //!
 //! While HP-GL is in force at a port, that port hears nothing but the answers that HP-GL itself
 //! asks for, and the status after `?`. All other replies go to the other port.
@@ -8,7 +8,7 @@ use super::{Board, PORT_LIMIT, Plotter, REPLY_BYTES, Replies, Reply};
 use crate::array::MapEach;
 use crate::drawing::{LineType, PAGE_LIMIT, PagePoint};
 use crate::fixed::{divide_rounding, product};
-use crate::hpgl::{Dialect, Order, Point, Rectangle, Session, Token, UNITS_PER_MM};
+use crate::hpgl::{Action, Dialect, Point, Rectangle, Session, Token, UNITS_PER_MM};
 use crate::index::Index;
 use crate::machine::{Machine, MachineError, Setting, State, Target, Value};
 use crate::protocol::Label;
@@ -21,22 +21,22 @@ pub(super) struct HpGl<'m> {
     /// The port whose HP-GL is carried out.
     port: Option<usize>,
     session: &'m mut Session,
-    /// Whether the user has been asked for the pen that the current order needs.
+    /// Whether the user has been asked for the pen that the current action needs.
     has_asked: bool,
     /// Whether something was to be drawn while the machine was locked. Nothing is drawn then until
     /// the next `IN`.
     was_locked: bool,
 }
 
-/// The result of trying to carry out an order.
+/// The result of trying to carry out an action.
 enum Outcome {
-    /// The order is complete.
+    /// The action is complete.
     Done,
     /// A part of it was carried out.
     More,
-    /// The order has to wait for the machine.
+    /// The action has to wait for the machine.
     Waits,
-    /// The order cannot be carried out.
+    /// The action cannot be carried out.
     Refused,
 }
 
@@ -140,7 +140,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         }
     }
 
-    /// Carries out the next order, if there is one and the machine has room. Returns whether there
+    /// Carries out the next action, if there is one and the machine has room. Returns whether there
     /// was anything to do.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn carry_out_hpgl<B: Board>(&mut self, board: &mut B) -> bool {
@@ -148,7 +148,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         if !board.has_room(REPLY_BYTES) {
             return false;
         }
-        let is_done = self.carry_out_order(board);
+        let is_done = self.carry_out_action(board);
         self.send_hpgl(board);
         if self.hpgl.session.take_loss() {
             Reply(board).line(format_args!("[MSG:bytes of HP-GL were lost: lines are missing]"));
@@ -162,27 +162,27 @@ impl<'m, I: Index> Plotter<'m, I> {
         is_done || is_over
     }
 
-    /// Carries out the next order. Returns whether there was anything to do.
-    fn carry_out_order<B: Board>(&mut self, board: &mut B) -> bool {
-        let order = self.hpgl.session.order().clone();
-        let outcome = match order {
-            Order::Nothing => return !self.hpgl.session.is_idle(),
-            Order::Answer(answer) => {
+    /// Carries out the next action. Returns whether there was anything to do.
+    fn carry_out_action<B: Board>(&mut self, board: &mut B) -> bool {
+        let action = self.hpgl.session.action().clone();
+        let outcome = match action {
+            Action::Nothing => return !self.hpgl.session.is_idle(),
+            Action::Answer(answer) => {
                 self.hpgl.session.answer(&answer);
                 Outcome::Done
             }
-            Order::Initialize => {
+            Action::Initialize => {
                 let (at, limits) = frame(&self.inner.machine);
                 self.hpgl.session.initialize(at, limits);
                 self.hpgl.was_locked = false;
                 Outcome::Done
             }
-            Order::Pen(number) => self.change_pen(number, board),
-            Order::Line(_) | Order::Dot(_) | Order::Go(_) => self.draw_order(order),
+            Action::Pen(number) => self.change_pen(number, board),
+            Action::Line(_) | Action::Dot(_) | Action::Go(_) => self.draw_action(action),
         };
         match outcome {
-            Outcome::Done => self.hpgl.session.end_order(),
-            Outcome::Refused => self.hpgl.session.refuse_order(),
+            Outcome::Done => self.hpgl.session.end_action(),
+            Outcome::Refused => self.hpgl.session.refuse_action(),
             Outcome::More => {}
             Outcome::Waits => return false,
         }
@@ -190,7 +190,7 @@ impl<'m, I: Index> Plotter<'m, I> {
     }
 
     /// Draws a line or a dot, or moves without drawing.
-    fn draw_order(&mut self, order: Order) -> Outcome {
+    fn draw_action(&mut self, action: Action) -> Outcome {
         let machine = &mut self.inner.machine;
         match machine.state() {
             State::Alarm(_) | State::Sleep => self.hpgl.was_locked = true,
@@ -203,10 +203,10 @@ impl<'m, I: Index> Plotter<'m, I> {
         if !machine.has_room() {
             return Outcome::Waits;
         }
-        let (from, to, ink) = match order {
-            Order::Line([from, to]) => (Some(from), to, true),
-            Order::Dot(at) => (Some(at), at, true),
-            Order::Go(to) => (None, to, false),
+        let (from, to, ink) = match action {
+            Action::Line([from, to]) => (Some(from), to, true),
+            Action::Dot(at) => (Some(at), at, true),
+            Action::Go(to) => (None, to, false),
             _ => return Outcome::Done,
         };
         let steps = |point| steps_at(machine, point);

@@ -4,7 +4,7 @@
 //! become a [`Task`], and are answered only when it is done. It also handles real-time requests and
 //! reports alarms.
 
-use super::program::{Context, Order, Program};
+use super::program::{Context, MachineAction, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::BinaryFraction;
@@ -321,15 +321,15 @@ impl<I: Index> Inner<'_, I> {
             State::Jog => return Err(CommandError::Jogging),
             state => state == State::Check,
         };
-        let (program, order) =
+        let (program, action) =
             self.program.at(&self.machine, checking).after(line, &self.context())?;
-        let is_end = matches!(order, Order::End);
+        let is_end = matches!(action, MachineAction::End);
         let machine = &mut self.machine;
         let waits = !checking && !matches!(machine.state(), State::Abort);
-        match order {
-            Order::Nothing | Order::End => {}
-            Order::Line(point) => machine.draw_to(program.target(point), program.feed())?,
-            Order::Arc(arc) => {
+        match action {
+            MachineAction::Nothing | MachineAction::End => {}
+            MachineAction::Line(point) => machine.draw_to(program.target(point), program.feed())?,
+            MachineAction::Arc(arc) => {
                 let (least, most) = arc.bounds();
                 machine.check_travel(0, least)?;
                 machine.check_travel(0, most)?;
@@ -337,23 +337,25 @@ impl<I: Index> Inner<'_, I> {
                     self.task = Some(Task::Arc(machine.end(), arc));
                 }
             }
-            Order::Lower => machine.lower_pen()?,
-            Order::Go([via, to]) => {
+            MachineAction::Lower => machine.lower_pen()?,
+            MachineAction::Go([via, to]) => {
                 machine.check_travel(0, to)?;
                 machine.draw_to(Target { point: via, ink: None }, None)?;
                 if waits && to != via {
                     self.task = Some(Task::Go(to));
                 }
             }
-            Order::Dwell(units) if waits => {
+            MachineAction::Dwell(units) if waits => {
                 let ticks = (u64::from(units) * u64::from(TICKS_PER_SECOND)) >> 16;
                 self.task = Some(Task::Dwell(ticks));
             }
-            Order::Pause { for_pen } if waits => self.task = Some(Task::Pause { for_pen }),
-            Order::Dwell(_) | Order::Pause { .. } => {}
-            Order::SetSystem(index, origin) => self.set_system(index, origin, waits),
-            Order::StorePosition(kept, position) => self.keep_position(kept, position, waits)?,
-            Order::Position => self.report_position(board),
+            MachineAction::Pause { for_pen } if waits => self.task = Some(Task::Pause { for_pen }),
+            MachineAction::Dwell(_) | MachineAction::Pause { .. } => {}
+            MachineAction::SetSystem(index, origin) => self.set_system(index, origin, waits),
+            MachineAction::StorePosition(kept, position) => {
+                self.keep_position(kept, position, waits)?
+            }
+            MachineAction::Position => self.report_position(board),
         }
         self.note_shift(&program);
         self.program = program;

@@ -26,7 +26,7 @@ use crate::index::Index;
 /// One of the two sides of an edge, and the bits of the profile's marks that hold the rank of the
 /// nearest face that begins there. They hold the rank plus one; zero means none.
 #[derive(Clone, Copy)]
-struct Bank {
+struct EdgeSide {
     /// The position of the lowest of the 16 bits that hold the rank.
     shift: u32,
     /// Whether this is the side to the left of the edge, as seen on the page from its start.
@@ -37,10 +37,10 @@ struct Bank {
 const RANK_BITS: u32 = 30;
 /// The bits of a rank.
 const RANKS: usize = (1 << RANK_BITS) - 1;
-const LEFT: Bank = Bank { shift: 4, is_left: true };
-const RIGHT: Bank = Bank { shift: LEFT.shift + RANK_BITS, is_left: false };
+const LEFT: EdgeSide = EdgeSide { shift: 4, is_left: true };
+const RIGHT: EdgeSide = EdgeSide { shift: LEFT.shift + RANK_BITS, is_left: false };
 
-impl Bank {
+impl EdgeSide {
     /// Returns the rank (the number of the face in the order of depth) that `marks` hold for this
     /// side; `None` if they hold none.
     fn get(self, marks: u64) -> Option<usize> {
@@ -66,8 +66,8 @@ struct Touching<I> {
 
 impl<I: Index> Touching<I> {
     /// Returns a corner that lies on the given side of the edge.
-    fn corner(&self, bank: Bank) -> Option<I> {
-        let wanted = if bank.is_left { 1 } else { -1 };
+    fn corner(&self, edge_side: EdgeSide) -> Option<I> {
+        let wanted = if edge_side.is_left { 1 } else { -1 };
         let found = self.sides.iter().position(|&side| side == wanted)?;
         Some(self.corners[found])
     }
@@ -98,18 +98,19 @@ impl<I: Index> EdgeQuery<I> {
                 continue;
             }
             let piece = CrossedPolygon::new(&touching.corners, &touching.sides);
-            for bank in [LEFT, RIGHT] {
+            for edge_side in [LEFT, RIGHT] {
                 let crossings =
-                    piece.crossings(if bank.is_left { piece.left } else { piece.left_or_on });
+                    piece.crossings(if edge_side.is_left { piece.left } else { piece.left_or_on });
                 let passage =
                     self.passage(&around.coarse_projection, piece, crossings, touching.facing);
                 if let Some(passage) = passage {
                     let part: EdgeInterval = self.part(&around.coarse_projection, passage);
                     profile.update(part, &|marks| {
-                        let known = bank.get(marks);
-                        if known.is_none_or(|known| self.is_nearer(around, &touching, known, bank))
+                        let known = edge_side.get(marks);
+                        if known
+                            .is_none_or(|known| self.is_nearer(around, &touching, known, edge_side))
                         {
-                            bank.put(marks, rank)
+                            edge_side.put(marks, rank)
                         } else {
                             marks
                         }
@@ -135,7 +136,8 @@ impl<I: Index> EdgeQuery<I> {
 
     /// Whether the faces recorded on both sides of a piece of this edge lie in one plane.
     pub fn is_within_plane(&self, around: &SceneIndex<'_, I>, marks: u64) -> bool {
-        let beside = |bank: Bank| self.find_touching(around, bank.get(marks)?, bank);
+        let beside =
+            |edge_side: EdgeSide| self.find_touching(around, edge_side.get(marks)?, edge_side);
         let (Some(left), Some(right)) = (beside(LEFT), beside(RIGHT)) else {
             return false;
         };
@@ -150,10 +152,10 @@ impl<I: Index> EdgeQuery<I> {
         around: &SceneIndex<'_, I>,
         touching: &Touching<I>,
         than: usize,
-        bank: Bank,
+        edge_side: EdgeSide,
     ) -> bool {
         let coarse_projection = &around.coarse_projection;
-        match (self.find_touching(around, than, bank), touching.corner(bank)) {
+        match (self.find_touching(around, than, edge_side), touching.corner(edge_side)) {
             (Some(other), Some(corner)) => other.height(coarse_projection, corner) < 0,
             _ => false,
         }
@@ -165,12 +167,12 @@ impl<I: Index> EdgeQuery<I> {
         &self,
         around: &SceneIndex<'_, I>,
         rank: usize,
-        bank: Bank,
+        edge_side: EdgeSide,
     ) -> Option<Touching<I>> {
         around
             .triangles(around.faces.get(rank))
             .filter_map(|triangle| self.touching(&around.coarse_projection, triangle))
-            .find(|touching| touching.corner(bank).is_some())
+            .find(|touching| touching.corner(edge_side).is_some())
     }
 
     /// Returns how a triangle lies beside this edge, or `None` if its plane does not contain the

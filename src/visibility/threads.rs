@@ -28,7 +28,7 @@ use std::vec::Vec;
 const PART: usize = 4096;
 
 /// How long the calling thread waits for a part before it asks whether the user has cancelled.
-const PATIENCE: Duration = Duration::from_millis(20);
+const TIMEOUT: Duration = Duration::from_millis(20);
 
 /// A part of the search.
 #[derive(Debug, Clone)]
@@ -150,7 +150,7 @@ fn hand_over<I: Index>(
     let mut next = 0;
     while next < count {
         cancel.check()?;
-        match receiver.recv_timeout(PATIENCE) {
+        match receiver.recv_timeout(TIMEOUT) {
             Ok((number, found)) => {
                 waiting.insert(number, found);
             }

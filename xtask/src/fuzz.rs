@@ -9,7 +9,7 @@ use crate::command::run;
 /// The longest input, in bytes.
 const LONGEST: u32 = 4096;
 /// The longest time for one input, in seconds; a longer one counts as a hang.
-const PATIENCE: u32 = 60;
+const TIMEOUT: u32 = 60;
 
 /// Fuzzes each target for this many seconds, or only the target with the name `only`. New inputs
 /// that reach new code stay in `fuzz/corpus`; an input that breaks a promise is written to
@@ -41,7 +41,7 @@ pub fn fuzz(seconds: u32, only: Option<&str>) -> Result<()> {
         command.args(["run", target, "--"]).args([
             format!("-max_total_time={seconds}"),
             format!("-max_len={LONGEST}"),
-            format!("-timeout={PATIENCE}"),
+            format!("-timeout={TIMEOUT}"),
             "-print_final_stats=1".to_owned(),
         ]);
         let words = crate::root().join("fuzz/dictionaries").join(format!("{target}.dict"));

@@ -29,7 +29,7 @@ const FEATURES: &str = "host,threads,tiles";
 
 /// The longest time for the tests of one change, in seconds. One that makes them hang is found.
 /// Without a change they take some four seconds on one busy core.
-const PATIENCE: u32 = 60;
+const TIMEOUT: u32 = 60;
 
 /// How many changes of the sample there are to one of the further changes. The sample has a few
 /// less than were asked for, because it is every so manyth change; with the further ones it has
@@ -124,7 +124,7 @@ pub fn run_sample(count: u32, part: Part) -> Result<()> {
         .args(["--sharding", "round-robin", "--shard", &format!("{shard}/{shards}")])
         // For the build as well, which would make the examples anew besides.
         .args(["--cargo-arg", "--lib"])
-        .args(["--timeout", &PATIENCE.to_string(), "--no-shuffle", "--output"])
+        .args(["--timeout", &TIMEOUT.to_string(), "--no-shuffle", "--output"])
         .arg(&output);
     say!("penup: {}", describe(&command))?;
     run(&mut command)

@@ -28,7 +28,7 @@ impl Link for Answers {
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         if self.seen.breaks.swap(false, Ordering::SeqCst) {
             return Err(io::Error::other("the device has been lost"));
         }
@@ -36,7 +36,7 @@ impl Link for Answers {
         buffer[..count].copy_from_slice(&self.waiting[..count]);
         self.waiting.drain(..count);
         if count == 0 {
-            thread::sleep(patience);
+            thread::sleep(timeout);
         }
         Ok(count)
     }

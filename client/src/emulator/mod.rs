@@ -136,12 +136,12 @@ pub trait EmulatedBoard: std::fmt::Debug {
     /// The emulator has ended.
     fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
 
-    /// Waits up to `patience` for bytes from the board and writes them to the start of `buffer`.
+    /// Waits up to `timeout` for bytes from the board and writes them to the start of `buffer`.
     /// Returns how many there are: 0 if none arrived in time.
     ///
     /// # Errors
     /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize>;
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Returns the changes of pins since the last call: all that preceded the last byte that
     /// [`EmulatedBoard::receive`] returned, and perhaps some later ones.
@@ -180,7 +180,7 @@ const BOARD: &BoardRow = &table::LM3S6965;
 
 /// How long QEMU may take to connect after its start, and the trace to catch up with the serial
 /// line.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 impl Emulator {
     /// Boots `image`, an ELF file.
@@ -188,7 +188,7 @@ impl Emulator {
     /// # Errors
     /// See [`EmulatorError`]. No process is left running after an error.
     pub fn start(image: &Path, options: Options) -> Result<Self, EmulatorError> {
-        let (process, line) = Process::start(image, options, PATIENCE)?;
+        let (process, line) = Process::start(image, options, TIMEOUT)?;
         line.set_nodelay(true)?;
         Ok(Self { process, line, received: 0 })
     }
@@ -212,8 +212,8 @@ impl EmulatedBoard for Emulator {
         self.line.write_all(bytes)
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.line.set_read_timeout(Some(patience.max(Duration::from_millis(1))))?;
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.line.set_read_timeout(Some(timeout.max(Duration::from_millis(1))))?;
         match self.line.read(buffer) {
             Ok(0) if !buffer.is_empty() => Err(io::ErrorKind::BrokenPipe.into()),
             Ok(count) => {
@@ -231,11 +231,11 @@ impl EmulatedBoard for Emulator {
 
     fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
         let received = self.received;
-        self.process.with_trace(PATIENCE, |trace| trace.sent() >= received, Trace::take_pins)
+        self.process.with_trace(TIMEOUT, |trace| trace.sent() >= received, Trace::take_pins)
     }
 
     fn clock(&mut self) -> Result<Duration, EmulatorError> {
-        self.process.with_trace(PATIENCE, |_| true, |trace| trace.clock())
+        self.process.with_trace(TIMEOUT, |_| true, |trace| trace.clock())
     }
 
     fn log_lines(&mut self) -> Vec<String> {

@@ -200,7 +200,7 @@ impl Pico {
         self.shared.lock().record_reads = None;
         self.send(READS, 0, 0)?;
         let waits = |state: &mut State| state.record_reads.is_none() && !state.ended;
-        let reads = self.shared.wait_while(super::PATIENCE, waits).record_reads;
+        let reads = self.shared.wait_while(super::TIMEOUT, waits).record_reads;
         reads.ok_or_else(|| EmulatorError::Ended { said: self.said() })
     }
 
@@ -426,8 +426,8 @@ impl Pico {
     ///
     /// # Errors
     /// [`io::ErrorKind::BrokenPipe`] if the emulator has ended.
-    pub fn receive_by_usb(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.receive_from(|state| &mut state.usb, buffer, patience)
+    pub fn receive_by_usb(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.receive_from(|state| &mut state.usb, buffer, timeout)
     }
 
     /// Sends a byte over the serial line in which the UART detects `error`.
@@ -468,10 +468,10 @@ impl Pico {
         &mut self,
         port: impl Fn(&mut State) -> &mut VecDeque<u8>,
         buffer: &mut [u8],
-        patience: Duration,
+        timeout: Duration,
     ) -> io::Result<usize> {
         let waits = |state: &mut State| port(state).is_empty() && !state.ended;
-        let mut state = self.shared.wait_while(patience, waits);
+        let mut state = self.shared.wait_while(timeout, waits);
         if port(&mut state).is_empty() && state.ended {
             return Err(io::ErrorKind::BrokenPipe.into());
         }
@@ -487,7 +487,7 @@ impl Pico {
     /// Waits until the emulator's clock runs.
     fn wait_for_boot(&mut self) -> Result<(), EmulatorError> {
         let waits = |state: &mut State| state.cycles == 0 && !state.ended;
-        if self.shared.wait_while(super::PATIENCE, waits).cycles > 0 {
+        if self.shared.wait_while(super::TIMEOUT, waits).cycles > 0 {
             return Ok(());
         }
         self.running.has_ended(PROGRAM)?;
@@ -503,7 +503,7 @@ impl Pico {
         self.shared.lock().unused_stack = None;
         self.send(STACK, 0, 0)?;
         let waits = |state: &mut State| state.unused_stack.is_none() && !state.ended;
-        let unused = self.shared.wait_while(super::PATIENCE, waits).unused_stack;
+        let unused = self.shared.wait_while(super::TIMEOUT, waits).unused_stack;
         let unused = unused.ok_or_else(|| EmulatorError::Ended { said: self.said() })?;
         Ok(Stack { size: self.stack, deepest: self.stack - (unused as usize).min(self.stack) })
     }
@@ -518,8 +518,8 @@ impl EmulatedBoard for PicoByUsb {
         self.0.send_by_usb(bytes)
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.0.receive_by_usb(buffer, patience)
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.0.receive_by_usb(buffer, timeout)
     }
 
     fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
@@ -548,8 +548,8 @@ impl EmulatedBoard for Pico {
         self.send_to(SERIAL, bytes)
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.receive_from(|state| &mut state.serial, buffer, patience)
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.receive_from(|state| &mut state.serial, buffer, timeout)
     }
 
     fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {

@@ -43,7 +43,7 @@ impl Process {
     pub fn start(
         image: &Path,
         options: Options,
-        patience: Duration,
+        timeout: Duration,
     ) -> Result<(Self, TcpStream), EmulatorError> {
         let bytes = fs::read(image).map_err(|_| EmulatorError::NoImage { path: image.into() })?;
         let table = log::table(&bytes)?;
@@ -67,9 +67,9 @@ impl Process {
         let running = Running::new(child, vec![tracer, logger]);
         let mut process = Self { running, shared, debugger: None };
         // The connections arrive in the order in which the command line names them.
-        let line = process.connect(&listener, patience)?;
+        let line = process.connect(&listener, timeout)?;
         if options.paints_stack {
-            let mut debugger = Debugger::new(process.connect(&listener, patience)?);
+            let mut debugger = Debugger::new(process.connect(&listener, timeout)?);
             let size = stack::size(&bytes)?;
             debugger.write(stack::RAM, &vec![stack::PAINT; size])?;
             debugger.run()?;
@@ -92,10 +92,10 @@ impl Process {
     fn connect(
         &mut self,
         listener: &TcpListener,
-        patience: Duration,
+        timeout: Duration,
     ) -> Result<TcpStream, EmulatorError> {
         listener.set_nonblocking(true)?;
-        let deadline = Instant::now() + patience;
+        let deadline = Instant::now() + timeout;
         loop {
             match listener.accept() {
                 Ok((line, _)) => {
@@ -113,16 +113,16 @@ impl Process {
         }
     }
 
-    /// Waits up to `patience` until `ready` is true of the trace, then runs `work` on it.
+    /// Waits up to `timeout` until `ready` is true of the trace, then runs `work` on it.
     pub fn with_trace<T>(
         &self,
-        patience: Duration,
+        timeout: Duration,
         ready: impl Fn(&Trace) -> bool,
         work: impl FnOnce(&mut Trace) -> T,
     ) -> Result<T, EmulatorError> {
         let waits =
             |state: &mut State| state.error.is_none() && !state.ended && !ready(&state.trace);
-        let mut state = self.shared.wait_while(patience, waits);
+        let mut state = self.shared.wait_while(timeout, waits);
         if let Some(error) = state.error.take() {
             return Err(error.into());
         }

@@ -38,13 +38,13 @@ impl<S> Shared<S> {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Waits while `waits` returns true, but at most for `patience`, and returns the locked state.
+    /// Waits while `waits` returns true, but at most for `timeout`, and returns the locked state.
     pub fn wait_while(
         &self,
-        patience: Duration,
+        timeout: Duration,
         waits: impl FnMut(&mut S) -> bool,
     ) -> MutexGuard<'_, S> {
-        let waited = self.changed.wait_timeout_while(self.lock(), patience, waits);
+        let waited = self.changed.wait_timeout_while(self.lock(), timeout, waits);
         waited.unwrap_or_else(PoisonError::into_inner).0
     }
 

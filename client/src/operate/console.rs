@@ -5,7 +5,7 @@ use crate::cli::PortArgs;
 use crate::error::Error;
 use crate::link::{Link as _, SerialLink};
 use crate::outcome::Outcome;
-use crate::sender::{Patience, Sender};
+use crate::sender::{Sender, Timeouts};
 use penup_job::protocol::{ABORT, Reply, ReplyReader};
 use penup_readers::lines::acts_at_once;
 use serde_json::json;
@@ -37,7 +37,7 @@ const GREETING: &str = "Type lines for the plotter; ? asks for the status, ! hol
 pub fn console(args: &PortArgs, is_json: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(args)?;
     // A client that broke off may have left the plotter in a conversation with checksums.
-    let (_, status) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    let (_, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
     if status.is_idle() {
         link.send(&[ABORT])?;
     }

@@ -21,7 +21,7 @@ use crate::cli::{PlotterArgs, PortArgs};
 use crate::error::Error;
 use crate::link::SerialLink;
 use crate::ports as serial_ports;
-use crate::sender::{Patience, Sender};
+use crate::sender::{Sender, Timeouts};
 use std::sync::atomic::AtomicBool;
 
 /// Opens the port of the plotter.
@@ -37,7 +37,7 @@ fn converse<T>(
     work: impl FnOnce(&mut Sender<'_>) -> Result<T, Error>,
 ) -> Result<T, Error> {
     let mut link = open(&args.port)?;
-    let (mut sender, _) = Sender::open_for_orders(&mut link, Patience::default(), interrupt)?;
+    let (mut sender, _) = Sender::open_for_orders(&mut link, Timeouts::default(), interrupt)?;
     let done = work(&mut sender);
     sender.end();
     done

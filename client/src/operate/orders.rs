@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::outcome::Outcome;
 use crate::progress::{Bar, Progress};
-use crate::sender::{Patience, Sender};
+use crate::sender::{Sender, Timeouts};
 use penup_job::protocol::{HOME, PEN_DOWN, PEN_UP, Status, UNLOCK};
 use std::io::{self, Write as _};
 use std::sync::atomic::AtomicBool;
@@ -26,7 +26,7 @@ fn join<T>(
     work: impl FnOnce(&mut Sender<'_>) -> Result<T, Error>,
 ) -> Result<T, Error> {
     let mut link = open(&args.port)?;
-    let (mut sender, _) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    let (mut sender, _) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
     work(&mut sender)
 }
 
@@ -49,7 +49,7 @@ pub fn pause(args: &PauseArgs, interrupt: &AtomicBool) -> Result<Outcome, Error>
 /// See [`Sender::resume`] and [`Sender::go_on`].
 pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.plotter.port)?;
-    let (mut sender, status) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    let (mut sender, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
     if status.is_holding() || status.stopped.is_none() {
         return Ok(done("it goes on", &sender.resume()?));
     }
@@ -57,7 +57,7 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
     link.rejoin(&args.rejoin, is_quiet);
     link.obey_keys();
     let mut progress = progress(args.plotter.format.json, is_quiet);
-    let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+    let mut sender = Sender::open(&mut link, Timeouts::default(), interrupt)?;
     if sender.stopped_drawing()?.is_some() {
         let reason = "a computer sent this drawing while it was drawn: name its file, with the \
                       same options, in `penup plot FILE --port DEVICE --resume`";
@@ -169,7 +169,7 @@ pub fn watch(args: &WatchArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result
     link.rejoin(&args.rejoin, is_quiet);
     link.obey_keys();
     let mut progress = progress(args.plotter.format.json, is_quiet);
-    let (mut sender, first) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    let (mut sender, first) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
     if first.is_idle() {
         return Ok(Outcome::done("nothing is being drawn", as_json(&first)));
     }
@@ -187,7 +187,7 @@ pub fn again(args: &AgainArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result
     let _moving = MovingPlotter::new();
     link.obey_keys();
     let mut progress = progress(args.plotter.format.json, is_quiet);
-    let mut sender = Sender::open(&mut link, Patience::default(), interrupt)?;
+    let mut sender = Sender::open(&mut link, Timeouts::default(), interrupt)?;
     let drawn = sender.again(progress.as_mut()).and_then(|()| sender.status());
     sender.end();
     let status = drawn?;

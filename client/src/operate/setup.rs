@@ -18,7 +18,7 @@ use crate::link::SerialLink;
 use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
 use crate::progress::Quiet;
-use crate::sender::{Patience, Sender};
+use crate::sender::{Sender, Timeouts};
 use penup::machine::Setting;
 use penup_job::protocol::{CLEAR, HOME, PEN_DOWN, Status};
 use std::sync::atomic::AtomicBool;
@@ -163,7 +163,7 @@ impl Setup<'_> {
         interrupt: &AtomicBool,
         part: impl FnOnce(&mut Self, &mut Sender<'_>) -> Result<T, End>,
     ) -> Result<T, End> {
-        let (mut sender, status) = Sender::open_for_orders(link, Patience::default(), interrupt)?;
+        let (mut sender, status) = Sender::open_for_orders(link, Timeouts::default(), interrupt)?;
         if status.is_alarm() {
             return Err(Error::NotReady { state: status.state }.into());
         }

@@ -6,7 +6,7 @@ use crate::error::Error;
 use crate::outcome::Outcome;
 use crate::ports as serial_ports;
 use crate::progress::duration;
-use crate::sender::{Patience, Sender};
+use crate::sender::{Sender, Timeouts};
 use penup_job::protocol::Status;
 use serde_json::{Value, json};
 use std::sync::atomic::AtomicBool;
@@ -31,7 +31,7 @@ pub fn ports(_: &PortsArgs) -> Result<Outcome, Error> {
 /// Nothing answers, or something other than penup does.
 pub fn status(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.port)?;
-    let (_, status) = Sender::join(&mut link, Patience::default(), interrupt)?;
+    let (_, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
     Ok(Outcome::answer(described(&status), as_json(&status)))
 }
 

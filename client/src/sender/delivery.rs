@@ -150,10 +150,10 @@ impl Sender<'_> {
             }
             self.query_if_due()?;
             let since = delivery.requested_at.unwrap_or(delivery.last_event);
-            if self.since(since) > self.patience.reply && !delivery.reads_no_lines {
+            if self.since(since) > self.timeouts.reply && !delivery.reads_no_lines {
                 self.ask_for_last_number(&mut delivery)?;
             }
-            if self.since(delivery.last_progress) > self.patience.lost {
+            if self.since(delivery.last_progress) > self.timeouts.lost {
                 return Err(Error::LostLine { line: delivery.line(oldest).map(Box::new) });
             }
         }
@@ -257,11 +257,11 @@ impl Sender<'_> {
         self.last_heard = start;
         let mut requested_at = None;
         let mut is_computing = false;
-        while self.since(start) < self.patience.lost {
+        while self.since(start) < self.timeouts.lost {
             self.stop_if_interrupted()?;
             if !is_computing
                 && requested_at
-                    .is_none_or(|requested_at| self.since(requested_at) > self.patience.reply)
+                    .is_none_or(|requested_at| self.since(requested_at) > self.timeouts.reply)
             {
                 requested_at = Some(self.link.now());
                 self.send(&format!("\n{}\n", numbered(None, LAST_NUMBER)))?;

@@ -3,7 +3,7 @@
 
 use super::{MOST_RESTARTS, Sender};
 use crate::error::Error;
-use crate::link::{Answer, Order};
+use crate::link::{Answer, UserRequest};
 use crate::progress::{Progress, Quiet};
 use penup::machine::Setting;
 use penup_job::protocol::{
@@ -173,26 +173,27 @@ impl Sender<'_> {
         numbers: Numbers,
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
-        while let Some(order) = self.orders.pop_front() {
-            let byte = match order {
-                Order::Pause if followed.is_holding => {
+        while let Some(request) = self.requests.pop_front() {
+            let byte = match request {
+                UserRequest::Pause if followed.is_holding => {
                     followed.paused_here = false;
                     followed.held_since = None;
                     RESUME
                 }
-                Order::Pause => {
+                UserRequest::Pause => {
                     followed.paused_here = true;
                     HOLD
                 }
-                Order::Faster => FASTER,
-                Order::Slower => SLOWER,
-                Order::PenHigher | Order::PenLower => {
-                    let by = if order == Order::PenLower { PEN_CHANGE } else { -PEN_CHANGE };
+                UserRequest::Faster => FASTER,
+                UserRequest::Slower => SLOWER,
+                UserRequest::PenHigher | UserRequest::PenLower => {
+                    let by =
+                        if request == UserRequest::PenLower { PEN_CHANGE } else { -PEN_CHANGE };
                     progress.note(&self.move_pen(by, followed, numbers)?);
                     continue;
                 }
-                // This order is carried out where interrupts are handled.
-                Order::GiveUp => continue,
+                // This request is carried out where interrupts are handled.
+                UserRequest::GiveUp => continue,
             };
             self.link.send(&[byte])?;
         }
@@ -315,7 +316,7 @@ impl Sender<'_> {
                 Ok(true)
             }
             Answer::NotYet => Ok(false),
-            Answer::Nobody if self.since(since) > self.patience.hold => Err(Error::Held),
+            Answer::Nobody if self.since(since) > self.timeouts.hold => Err(Error::Held),
             Answer::Nobody => Ok(false),
         }
     }

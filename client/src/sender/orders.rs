@@ -1,7 +1,7 @@
 //! Orders to a machine: pause, resume, give up, and single lines with their answers.
 
 use super::drawing::Standstill;
-use super::{Patience, Sender};
+use super::{Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
 use crate::progress::Quiet;
@@ -16,10 +16,10 @@ impl<'a> Sender<'a> {
     /// Nothing answers, or something other than penup does.
     pub fn join(
         link: &'a mut dyn Link,
-        patience: Patience,
+        timeouts: Timeouts,
         interrupt: &'a AtomicBool,
     ) -> Result<(Self, Status), Error> {
-        let mut sender = Self::new(link, patience, interrupt);
+        let mut sender = Self::new(link, timeouts, interrupt);
         let status = sender.find_state()?;
         Ok((sender, status))
     }
@@ -31,10 +31,10 @@ impl<'a> Sender<'a> {
     /// As [`Sender::open`].
     pub fn open_for_orders(
         link: &'a mut dyn Link,
-        patience: Patience,
+        timeouts: Timeouts,
         interrupt: &'a AtomicBool,
     ) -> Result<(Self, Status), Error> {
-        let mut sender = Self::new(link, patience, interrupt);
+        let mut sender = Self::new(link, timeouts, interrupt);
         sender.allows_alarm = true;
         let status = sender.take_over(|status| status.is_idle() || status.is_alarm())?;
         Ok((sender, status))

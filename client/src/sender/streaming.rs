@@ -1,7 +1,7 @@
 //! Sends a drawing that this computer has computed, while it is drawn.
 
 use super::drawing::FollowedDrawing;
-use super::{Patience, Sender};
+use super::{Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
 use crate::progress::{Progress, Quiet};
@@ -92,10 +92,10 @@ impl<'a> Sender<'a> {
     /// As [`Sender::open`].
     pub fn rejoin(
         link: &'a mut dyn Link,
-        patience: Patience,
+        timeouts: Timeouts,
         interrupt: &'a AtomicBool,
     ) -> Result<Option<(Self, Taken)>, Error> {
-        let mut sender = Self::new(link, patience, interrupt);
+        let mut sender = Self::new(link, timeouts, interrupt);
         let status = sender.find_state()?;
         if status.stream.is_none() {
             return Ok(None);

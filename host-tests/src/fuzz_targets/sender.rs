@@ -2,7 +2,7 @@
 
 use penup_client::link::Link;
 use penup_client::progress::Quiet;
-use penup_client::sender::{Patience, Sender};
+use penup_client::sender::{Sender, Timeouts};
 use penup_readers::lines::JobLine;
 use std::io;
 use std::sync::atomic::AtomicBool;
@@ -15,7 +15,7 @@ pub fn fuzz(input: &[u8]) {
     let job: Vec<JobLine> =
         ["$clear", "v 0 0 0", "v 1 0 0", "v 0 1 0", "f 1 2 3"].map(JobLine::command).into();
     let interrupt = AtomicBool::new(false);
-    let drawn = Sender::open(&mut link, Patience::default(), &interrupt).and_then(|mut sender| {
+    let drawn = Sender::open(&mut link, Timeouts::default(), &interrupt).and_then(|mut sender| {
         sender.stream(&job, &mut Quiet)?;
         sender.plot(&mut Quiet)?;
         sender.end();
@@ -40,8 +40,8 @@ impl Link for Script<'_> {
         Ok(())
     }
 
-    fn receive(&mut self, buffer: &mut [u8], patience: Duration) -> io::Result<usize> {
-        self.passed += patience.max(Duration::from_millis(1));
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.passed += timeout.max(Duration::from_millis(1));
         assert!(self.passed < Duration::from_secs(86_400), "the client never gives up");
         let end = self.rest.iter().position(|byte| *byte == 0).unwrap_or(self.rest.len());
         let count = end.min(buffer.len());

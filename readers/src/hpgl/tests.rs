@@ -215,7 +215,7 @@ fn a_polygon_of_few_points_is_filled_as_by_a_plotter() {
             plotter.push(byte);
             reader.push(byte);
             loop {
-                let (expected, found) = (plotter.next_order(), reader.next_order());
+                let (expected, found) = (plotter.next_action(), reader.next_action());
                 assert_eq!(found, expected, "{case}: {text}");
                 if found.is_none() {
                     break;

@@ -1,7 +1,7 @@
 //! Coordinate systems, shifts and kept positions: G10, G28, G30, G43.1, G53 and G92.
 
 use super::block::{Action, Block, StoredPosition};
-use super::{Context, MachinePosition, Motion, Order, Parameters, Program, steps_at};
+use super::{Context, MachineAction, MachinePosition, Motion, Parameters, Program, steps_at};
 use crate::array::MapEach;
 use crate::fixed::{Decimal, Millimetres};
 use crate::protocol::{BlockError, CommandError};
@@ -10,17 +10,17 @@ use crate::protocol::{BlockError, CommandError};
 const AXES: [u8; 3] = [b'X', b'Y', b'Z'];
 
 impl Program {
-    /// The order of what a line does beside setting modes and moving.
+    /// The action of what a line does beside setting modes and moving.
     pub(super) fn action(
         &mut self,
         block: &Block,
         context: &Context<'_>,
-    ) -> Result<Order, CommandError> {
+    ) -> Result<MachineAction, CommandError> {
         Ok(match block.action {
-            Action::None | Action::Servo | Action::EndShift => Order::Nothing,
-            Action::Position => Order::Position,
+            Action::None | Action::Servo | Action::EndShift => MachineAction::Nothing,
+            Action::Position => MachineAction::Position,
             Action::Machine if matches!(self.motion, Motion::Rapid | Motion::Line) => {
-                Order::Nothing
+                MachineAction::Nothing
             }
             Action::Machine => return Err(BlockError::Absolute.into()),
             Action::Dwell => {
@@ -29,20 +29,20 @@ impl Program {
                 let units = seconds.and_then(|bits| u32::try_from(bits).ok());
                 let units =
                     units.map(|units| units / if self.counts_milliseconds() { 1000 } else { 1 });
-                Order::Dwell(units.ok_or(CommandError::NumberOutOfRange)?)
+                MachineAction::Dwell(units.ok_or(CommandError::NumberOutOfRange)?)
             }
             Action::SetSystem => self.set_system(block, context)?,
             Action::Shift => {
                 let origin = self.parameters_origin(context);
                 let [x, y, z] = self.origin_here(block, origin)?;
                 self.shift = [x, y, z];
-                Order::Nothing
+                MachineAction::Nothing
             }
             Action::StorePosition(kept) => {
                 if block.has_any(b"XYZ") {
                     return Err(BlockError::AxisConflict.into());
                 }
-                Order::StorePosition(kept, self.at)
+                MachineAction::StorePosition(kept, self.at)
             }
             Action::GoToStored(kept) => {
                 let to = match kept {
@@ -60,24 +60,28 @@ impl Program {
                 self.at = end;
                 self.draws = false;
                 let steps = context.settings.page_steps();
-                Order::Go([via, end].map_each(|[x, y, _]| steps_at([x, y], steps)))
+                MachineAction::Go([via, end].map_each(|[x, y, _]| steps_at([x, y], steps)))
             }
             Action::ToolLength => {
                 if !block.has(b'Z') || block.has_any(b"XY") {
                     return Err(BlockError::ToolAxis.into());
                 }
                 self.tool_length = self.coordinate(block, b'Z')?;
-                Order::Nothing
+                MachineAction::Nothing
             }
             Action::EndToolLength => {
                 self.tool_length = Millimetres::ZERO;
-                Order::Nothing
+                MachineAction::Nothing
             }
         })
     }
 
-    /// The order of G10.
-    fn set_system(&self, block: &Block, context: &Context<'_>) -> Result<Order, CommandError> {
+    /// The action of G10.
+    fn set_system(
+        &self,
+        block: &Block,
+        context: &Context<'_>,
+    ) -> Result<MachineAction, CommandError> {
         if !block.has_any(b"XYZ") {
             return Err(BlockError::NoAxis.into());
         }
@@ -108,7 +112,7 @@ impl Program {
             }
             _ => return Err(CommandError::UnsupportedWord(b'L')),
         }
-        Ok(Order::SetSystem(index, origin))
+        Ok(MachineAction::SetSystem(index, origin))
     }
 
     /// The shift with which the present position, less the origin `from`, has the coordinates of

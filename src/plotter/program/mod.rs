@@ -1,5 +1,5 @@
-//! The G-code interpreter: it turns a line of G-code into an order for the machine, given the modes
-//! that earlier lines have set.
+//! The G-code interpreter: it turns a line of G-code into an action for the machine, given the
+//! modes that earlier lines have set.
 //!
 //! Lines are understood as Grbl 1.1 understands them, and refused with its numbers. [`block`] reads
 //! and checks the words of a line, this file gives them their meaning, [`arc`] finds arcs,
@@ -106,9 +106,9 @@ impl Motion {
     }
 }
 
-/// The order of a line: what the machine is to do now.
+/// The action of a line: what the machine is to do now.
 #[derive(Debug, Clone)]
-pub(super) enum Order {
+pub(super) enum MachineAction {
     /// Nothing moves.
     Nothing,
     /// A straight move.
@@ -200,7 +200,7 @@ impl Program {
         self.at[2]
     }
 
-    /// The program after `line`, and the order of that line.
+    /// The program after `line`, and the action of that line.
     ///
     /// # Errors
     /// [`CommandError::UnsupportedWord`] for a word that is not known, [`CommandError::Block`] for
@@ -211,7 +211,7 @@ impl Program {
         mut self,
         line: GCode<'_>,
         context: &Context<'_>,
-    ) -> Result<(Self, Order), CommandError> {
+    ) -> Result<(Self, MachineAction), CommandError> {
         let block = Block::read(line)?;
         let settings = context.settings;
         let rule = PenRule::of(settings);
@@ -219,38 +219,39 @@ impl Program {
         let was_down_at_rest = self.is_down_at_rest(rule);
         self.set_feed(&block)?;
         self.set_modes(&block, settings)?;
-        let mut order = self.action(&block, context)?;
+        let mut action = self.action(&block, context)?;
         self.take_z(&block, settings)?;
-        let is_motion = block.axis_use == AxisUse::Motion && matches!(order, Order::Nothing);
+        let is_motion =
+            block.axis_use == AxisUse::Motion && matches!(action, MachineAction::Nothing);
         if self.motion == Motion::None && block.has_any(b"XYZ") {
             return Err(BlockError::AxisAfterCancel.into());
         }
         if is_motion && !(block.has_any(b"XYZ") || matches!(self.motion, Motion::Arc(_))) {
             // G0 or G1 alone only sets the mode.
         } else if is_motion {
-            order = self.motion(&block, context, rule)?;
+            action = self.motion(&block, context, rule)?;
         } else {
             self.check_used(&block)?;
         }
         if block.action == Action::EndShift {
             self.shift = [Millimetres::ZERO; 3];
         }
-        if matches!(order, Order::Nothing) {
+        if matches!(action, MachineAction::Nothing) {
             let has_dot = block.spindle == Some(5) && self.take_dot();
             if has_dot || (self.is_down_at_rest(rule) && !was_down_at_rest) {
-                order = Order::Lower;
+                action = MachineAction::Lower;
             }
         }
         match block.flow {
             None => {}
             Some(flow) => {
-                if !matches!(order, Order::Nothing | Order::Lower) {
+                if !matches!(action, MachineAction::Nothing | MachineAction::Lower) {
                     return Err(BlockError::AxisConflict.into());
                 }
-                order = self.flow(flow);
+                action = self.flow(flow);
             }
         }
-        Ok((self, order))
+        Ok((self, action))
     }
 
     /// The program after a jog, whose modes are for itself, and the position to go to.
@@ -355,13 +356,13 @@ impl Program {
         Ok(())
     }
 
-    /// The order for the coordinates of a line. Moves the position to their end.
+    /// The action for the coordinates of a line. Moves the position to their end.
     fn motion(
         &mut self,
         block: &Block,
         context: &Context<'_>,
         rule: PenRule,
-    ) -> Result<Order, CommandError> {
+    ) -> Result<MachineAction, CommandError> {
         let steps = context.settings.page_steps();
         let [from_x, from_y, _] = self.at;
         let [x, y, z] = self.destination(block, context)?;
@@ -373,7 +374,7 @@ impl Program {
             }
             self.at = [x, y, z];
             self.draws = self.begin_move(rule);
-            return Ok(Order::Arc(arc));
+            return Ok(MachineAction::Arc(arc));
         }
         self.check_used_in_motion(block)?;
         if self.inverse_time && self.motion == Motion::Line {
@@ -385,10 +386,10 @@ impl Program {
         self.at = [x, y, z];
         if !block.has_any(b"XY") && block.action != Action::Machine {
             // A move along Z alone only moves the pen.
-            return Ok(Order::Nothing);
+            return Ok(MachineAction::Nothing);
         }
         self.draws = self.begin_move(rule);
-        Ok(Order::Line(steps_at([x, y], steps)))
+        Ok(MachineAction::Line(steps_at([x, y], steps)))
     }
 
     /// Checks that a line that does not move has no words that it does not use.
@@ -409,11 +410,11 @@ impl Program {
         })
     }
 
-    /// The order of M0, M2, M6 or M30.
-    fn flow(&mut self, flow: Flow) -> Order {
+    /// The action of M0, M2, M6 or M30.
+    fn flow(&mut self, flow: Flow) -> MachineAction {
         match flow {
-            Flow::Pause => Order::Pause { for_pen: false },
-            Flow::ChangePen => Order::Pause { for_pen: true },
+            Flow::Pause => MachineAction::Pause { for_pen: false },
+            Flow::ChangePen => MachineAction::Pause { for_pen: true },
             Flow::End => {
                 self.motion = Motion::Line;
                 self.plane = Plane(0);
@@ -421,7 +422,7 @@ impl Program {
                 self.inverse_time = false;
                 self.system = 0;
                 self.coolant = [false; 2];
-                Order::End
+                MachineAction::End
             }
         }
     }

@@ -4,7 +4,7 @@
 use super::process::State;
 use super::record::{BOOT_SCATTERED, BOOT_WITHIN, RECORD_FLASH};
 use super::{EmulatorError, Pico};
-use crate::emulator::{EmulatedBoard as _, PATIENCE};
+use crate::emulator::{EmulatedBoard as _, TIMEOUT};
 use std::io;
 use std::time::Duration;
 
@@ -47,7 +47,7 @@ impl Pico {
         }
         self.send(RECORD_FLASH, 0, 0)?;
         let waits = |state: &mut State| state.operation_count.is_none() && !state.ended;
-        let mut state = self.shared.wait_while(PATIENCE, waits);
+        let mut state = self.shared.wait_while(TIMEOUT, waits);
         if state.operation_count.is_some() {
             return Ok(std::mem::take(&mut state.operations));
         }

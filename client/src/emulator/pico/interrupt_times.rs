@@ -3,7 +3,7 @@
 use super::process::State;
 use super::record::TIME_INTERRUPTS;
 use super::{EmulatorError, Pico};
-use crate::emulator::{EmulatedBoard as _, PATIENCE};
+use crate::emulator::{EmulatedBoard as _, TIMEOUT};
 use std::collections::BTreeMap;
 use std::io;
 use std::time::Duration;
@@ -49,7 +49,7 @@ impl Pico {
         }
         self.send(TIME_INTERRUPTS, 0, 0)?;
         let waits = |state: &mut State| !state.knows_interrupt_times && !state.ended;
-        let mut state = self.shared.wait_while(PATIENCE, waits);
+        let mut state = self.shared.wait_while(TIMEOUT, waits);
         if state.knows_interrupt_times {
             return Ok(std::mem::take(&mut state.interrupt_times));
         }

@@ -4,7 +4,7 @@ use std::time::Duration;
 
 /// The timeouts of a sender.
 #[derive(Debug, Clone, Copy)]
-pub struct Patience {
+pub struct Timeouts {
     /// The longest time without any byte from the plotter while it should answer.
     pub silence: Duration,
     /// The longest time without progress while the plotter still answers status queries.
@@ -20,7 +20,7 @@ pub struct Patience {
     pub hold: Duration,
 }
 
-impl Patience {
+impl Timeouts {
     /// The timeouts for a plotter in this process, by its own clock. It never falls silent, and a
     /// computation takes none of its time.
     pub fn simulated() -> Self {
@@ -30,7 +30,7 @@ impl Patience {
     }
 }
 
-impl Default for Patience {
+impl Default for Timeouts {
     fn default() -> Self {
         Self {
             silence: Duration::from_secs(5),
