@@ -84,6 +84,9 @@ pub struct Numbering {
     /// The number of the first line that was accepted and then refused since the number was last
     /// set, with its error.
     refused: Option<(i32, u16)>,
+    /// Which of the last 32 lines that were accepted were then refused; the lowest bit is that of
+    /// the last line.
+    refusals: u32,
 }
 
 impl Numbering {
@@ -104,10 +107,20 @@ impl Numbering {
     pub fn note(&mut self, label: Label, outcome: Result<(), CommandError>) {
         if let (Named::Line(number), Err(command_error)) = (label.named, outcome)
             && number == self.last
-            && self.refused.is_none()
         {
-            self.refused = Some((number, command_error.number()));
+            self.refusals |= 1;
+            self.refused.get_or_insert((number, command_error.number()));
         }
+    }
+
+    /// Returns what was answered to a line that came before. Of lines that were refused, only the
+    /// first one's error is kept, and stands for that of later ones. Of more than 32 lines behind
+    /// it, it is not known which were refused, so all count as refused.
+    fn answer_again(&self, number: i32) -> Result<(), CommandError> {
+        let Some((first, error)) = self.refused else { return Ok(()) };
+        let later = self.refusals.checked_shr(self.last.abs_diff(number));
+        let is_refused = number > first && later.is_none_or(|bits| bits & 1 != 0);
+        if number == first || is_refused { Err(CommandError::RefusedBefore(error)) } else { Ok(()) }
     }
 
     /// Decides what to do with a line that has a checksum.
@@ -123,7 +136,7 @@ impl Numbering {
             return match number.or(line.number) {
                 Some(number) => {
                     let required = Some(checksum);
-                    *self = Self { last: number, has_begun: true, required, refused: None };
+                    *self = Self { last: number, has_begun: true, required, ..Self::default() };
                     Received::Answer(Ok(()), label(line.number.unwrap_or(number)))
                 }
                 None => match self.refused {
@@ -144,6 +157,7 @@ impl Numbering {
         // Without M110, a sender begins at 1 or at 0.
         if number == self.last + 1 || (number == 0 && !self.has_begun) {
             (self.last, self.has_begun, self.required) = (number, true, Some(checksum));
+            self.refusals <<= 1;
             if matches!(text.trim_ascii(), "M2" | "M30") {
                 self.required = None;
             }
@@ -157,11 +171,7 @@ impl Numbering {
         if number > self.last || !self.has_begun {
             return self.refuse(CommandError::OutOfOrder { expected: self.last + 1 }, by);
         }
-        let again = match self.refused {
-            Some((refused, error)) if refused == number => Err(CommandError::RefusedBefore(error)),
-            _ => Ok(()),
-        };
-        Received::Answer(again, label(number))
+        Received::Answer(self.answer_again(number), label(number))
     }
 
     /// Decides what to do with a line that has no checksum.
@@ -321,7 +331,25 @@ mod tests {
         let again = receive(&mut numbering, &numbered(2, "v 0 1 0"));
         assert_eq!(again.map_err(|(error, _)| error), Err(CommandError::RefusedBefore(number)));
         assert_eq!(receive(&mut numbering, &numbered(1, "v 0 1 0")), Ok(Named::Line(1)));
+        // So is each later one, as long as it is known, and longer.
+        for later in 3..40 {
+            assert_eq!(receive(&mut numbering, &numbered(later, "v")), Ok(Named::Line(later)));
+            if later % 2 == 0 {
+                numbering.note(
+                    Label { named: Named::Line(later), ..label },
+                    Err(CommandError::Unnumbered),
+                );
+            }
+            for before in 1..=later {
+                let is_refused = before % 2 == 0 || before > 2 && later - before >= 32;
+                let again = receive(&mut numbering, &numbered(before, "v"));
+                assert_eq!(again.is_err(), is_refused, "{before} behind {later}");
+            }
+        }
         // A line without a checksum that has a number may be damaged.
+        let mut numbering = Numbering::default();
+        assert_eq!(receive(&mut numbering, &numbered(1, "v 0 1 0")), Ok(Named::Line(1)));
+        assert_eq!(receive(&mut numbering, &numbered(2, "v 0 1 0")), Ok(Named::Line(2)));
         assert_eq!(receive(&mut numbering, "v 1 2 3"), Ok(Named::Nothing));
         let without = receive(&mut numbering, "N3 v 0 1 0");
         assert_eq!(without, Err((CommandError::Unnumbered, Named::Expected(3))));
