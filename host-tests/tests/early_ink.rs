@@ -257,6 +257,41 @@ fn the_pen_travels_to_the_left_end_meanwhile() {
     assert_eq!(drawn(&bench.board.trace().changes()), Run::new());
 }
 
+/// Nothing that a user asks for while the lines are found is lost, nor while the order is computed.
+#[test]
+fn overrides_and_pauses_act_whenever_they_come() {
+    for (first, second) in [(25, 40), (25, 2500)] {
+        let begin = |requests: [(u64, &[u8]); 2]| {
+            let mut bench = loaded(&lattice(), true);
+            bench.board.set_work_ticks(MILLISECOND);
+            let now = bench.board.trace().now();
+            for (milliseconds, bytes) in requests {
+                bench.board.receive_meanwhile(now + milliseconds * MILLISECOND, bytes);
+            }
+            let answer = bench.say("$plot\n");
+            (bench, answer)
+        };
+        let (bench, answer) = begin([(first, b"\x90\x91\x96"), (second, b"\x91\x93")]);
+        assert!(answer.ends_with("ok\n"), "{answer}");
+        let machine = bench.plotter.machine();
+        assert_eq!((machine.percent(), machine.rapid_percent()), (121, 50), "at {second} ms");
+        let (mut bench, _) = begin([(first, b"\x97"), (second, b"\xFB")]);
+        bench.work(4000);
+        assert_eq!(bench.plotter.machine().state(), State::Hold { stopped: true });
+        let strokes = drawn(&bench.board.trace().changes()).len();
+        assert_eq!(bench.plotter.machine().rapid_percent(), 25);
+        assert!(strokes >= 1, "at {second} ms");
+        bench.say("~");
+        bench.finish();
+        assert!(drawn(&bench.board.trace().changes()).len() > 50);
+        // A job that is given up ends them.
+        let (bench, answer) = begin([(first, b"\x91\x96"), (first + 10, b"\x18")]);
+        assert!(answer.contains("error:"), "{answer}");
+        let machine = bench.plotter.machine();
+        assert_eq!((machine.percent(), machine.rapid_percent()), (100, 100));
+    }
+}
+
 /// Draws the job without a cut. Returns its strokes and how many bytes of flash change.
 fn undisturbed(lines: &[String], work_ticks: u64) -> (Run, usize) {
     let flash = CutFlash { budget: usize::MAX / 2, ..empty_flash() };

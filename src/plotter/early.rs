@@ -346,6 +346,7 @@ impl<I: Index> Inner<'_, I> {
         job: Job<I>,
         listener: &mut Listener<'_, B>,
     ) -> Result<Job<I>, CommandError> {
+        self.change_overrides(core::mem::take(&mut listener.overrides));
         self.act(core::mem::take(&mut listener.requests));
         // The pen leaves before the order is begun, which asks for the first time only when it has
         // taken its memory.

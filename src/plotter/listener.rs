@@ -1,6 +1,7 @@
 //! What listens while a job is computed or measured, which takes seconds: the serial line is still
 //! answered, and the work can be cancelled.
 
+use super::overrides::OverrideChange;
 use super::reply::Reply;
 use super::resume::Resumption;
 use super::{Board, Strokes, report};
@@ -50,9 +51,11 @@ pub(super) struct Listener<'b, B: Board> {
     pub(super) inches: bool,
     /// The stage of the computation that status reports tell.
     pub(super) stage: Stage,
-    /// The hold or emergency stop that was requested meanwhile. It is carried out when the
-    /// computation ends.
+    /// The hold, the pause or the emergency stop that was requested meanwhile. It is carried out
+    /// when the computation ends.
     pub(super) requests: RealTime,
+    /// The changes of the overrides that were requested meanwhile.
+    pub(super) overrides: OverrideChange,
     /// Whether the status was reported since this was last set to false.
     #[cfg(feature = "early-ink")]
     pub(super) has_answered: bool,
@@ -68,6 +71,7 @@ impl<'b, B: Board> Listener<'b, B> {
             inches,
             stage: Stage::View,
             requests: RealTime::default(),
+            overrides: OverrideChange::default(),
             #[cfg(feature = "early-ink")]
             has_answered: false,
         }
@@ -81,7 +85,9 @@ impl<B: Board> Cancel for Listener<'_, B> {
         if requests.has(RealTime::RESUME) {
             self.requests = RealTime::default();
         }
-        self.requests = self.requests.and(requests).only(RealTime::HOLD.and(RealTime::EMERGENCY));
+        let stops = RealTime::HOLD.and(RealTime::PAUSE).and(RealTime::EMERGENCY);
+        self.requests = self.requests.and(requests.only(stops));
+        self.overrides.add(requests);
         if requests.has(RealTime::STATUS) {
             #[cfg(feature = "early-ink")]
             {

@@ -20,6 +20,7 @@ mod flash_records;
 mod listener;
 mod memory;
 mod options;
+mod overrides;
 mod plan;
 mod plot;
 mod program;

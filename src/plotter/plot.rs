@@ -93,7 +93,8 @@ impl<I: Index> Inner<'_, I> {
                 })
             }
         };
-        let requests = listener.requests;
+        let Listener { requests, overrides, .. } = listener;
+        self.change_overrides(overrides);
         if requests.has(RealTime::EMERGENCY) {
             self.act(requests);
         }
@@ -120,7 +121,8 @@ impl<I: Index> Inner<'_, I> {
         if self.resumption.stopped(State::Idle).is_none() {
             Self::make_room(&mut listener, 2 * PAGE_BYTES as u32)?;
         }
-        let requests = listener.requests;
+        let Listener { requests, overrides, .. } = listener;
+        self.change_overrides(overrides);
         self.act(requests);
         Ok(())
     }

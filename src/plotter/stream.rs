@@ -4,6 +4,7 @@
 //! become a [`Task`], and are answered only when it is done. It also handles real-time requests and
 //! reports alarms.
 
+use super::overrides::OverrideChange;
 use super::program::{Context, MachineAction, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
@@ -100,28 +101,18 @@ impl<I: Index> Inner<'_, I> {
         if requests.has(RealTime::PAUSE) {
             self.machine.pause_after_stroke();
         }
-        for (byte, percent) in [
-            (RealTime::RAPID_RESET, 100),
-            (RealTime::RAPID_HALF, 50),
-            (RealTime::RAPID_QUARTER, 25),
-        ] {
-            if requests.has(byte) && self.machine.rapid_percent() != percent {
-                self.machine.set_rapid_override(percent);
-                self.report_counts.overrides = 0;
-            }
-        }
-        let percent = i32::from(self.machine.percent());
-        let mut changed = if requests.has(RealTime::FEED_RESET) { 100 } else { percent };
-        for (byte, change) in [
-            (RealTime::FEED_PLUS_10, 10),
-            (RealTime::FEED_MINUS_10, -10),
-            (RealTime::FEED_PLUS_1, 1),
-            (RealTime::FEED_MINUS_1, -1),
-        ] {
-            changed += if requests.has(byte) { change } else { 0 };
-        }
-        if changed != percent {
-            self.machine.set_override(changed.clamp(10, 200) as u8);
+        let mut change = OverrideChange::default();
+        change.add(requests);
+        self.change_overrides(change);
+    }
+
+    /// Changes the overrides of the speeds, and lets the status tell so.
+    pub(super) fn change_overrides(&mut self, change: OverrideChange) {
+        let before = (self.machine.percent(), self.machine.rapid_percent());
+        let (feed, rapid) = (change.feed_after(before.0), change.rapid_after(before.1));
+        if (feed, rapid) != before {
+            self.machine.set_override(feed);
+            self.machine.set_rapid_override(rapid);
             self.report_counts.overrides = 0;
         }
     }
