@@ -14,7 +14,8 @@
 //! rises) gets a greeting, which goes only to it: see [`take_opened`].
 //!
 //! Two of the chip's errata are worked around: see [`connection`] for E5, which takes GPIO 15 for a
-//! millisecond when a host resets the bus, and [`frame`] for E15.
+//! millisecond when a host resets the bus, and [`frame`] for E15. What the crates leave undone at
+//! the buffers of the endpoints is done in [`endpoints`].
 
 mod connection;
 mod endpoints;
