@@ -164,11 +164,11 @@ impl Plot<'_> {
             "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
             streamed.bytes() as f64 / f64::from(points.max(1))
         )]);
-        self.send(sender, &streamed, progress)?;
+        self.send(sender, &streamed, self.args.from, passes, progress)?;
         // Strokes that were left out once are drawn from then on.
         let whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
-        for _ in 1..passes {
-            self.send(sender, &whole, progress)?;
+        for left in (1..passes).rev() {
+            self.send(sender, &whole, 0, left, progress)?;
         }
         Ok(report)
     }
@@ -216,15 +216,18 @@ impl Plot<'_> {
         rest.set_id(stopped.id);
         let Stopped { drawn, all, .. } = stopped;
         self.note(&[format!("{drawn} of {all} strokes are drawn: the rest is sent")]);
-        self.send(sender, &rest, progress)?;
+        self.send(sender, &rest, begin, 1, progress)?;
         Ok(report)
     }
 
-    /// Sends strokes while they are drawn.
+    /// Sends strokes while they are drawn, from this stroke of the drawing, in the first of these
+    /// passes that are left.
     fn send(
         &self,
         sender: &mut Sender<'_>,
         streamed: &StreamedJob,
+        from: u32,
+        passes: u32,
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         let mut followed = StrokeCounter { progress, begun: 0 };
@@ -232,16 +235,12 @@ impl Plot<'_> {
         let begun = followed.begun;
         if sent.is_err() && begun > 0 {
             // The last stroke that was begun may not be whole.
-            let left_out = u64::from(self.args.from) + begun - 1;
-            let text = if self.args.resume {
-                "to go on at the stroke that was begun last, do the same again".to_owned()
-            } else {
-                format!(
-                    "to go on at the stroke that was begun last, add --from {left_out}, or \
-                     --resume if the plotter has flash for how far it comes"
-                )
-            };
-            self.note(&[text]);
+            let left_out = u64::from(from) + begun - 1;
+            let is_repeated = self.args.passes.multipass > 1;
+            self.note(&[match (self.args.resume, is_repeated.then_some(passes)) {
+                (true, _) => GO_ON_AGAIN.to_owned(),
+                (false, passes) => go_on_from(left_out, passes),
+            }]);
         }
         sent
     }
@@ -280,10 +279,29 @@ impl Plot<'_> {
         }
         let left = streamed.targets() - taken.targets;
         self.note(&[format!("the plotter draws this already: the last {left} points are sent")]);
-        let sent = self.send(&mut sender, &streamed, progress);
+        let sent = self.send(&mut sender, &streamed, self.args.from, 1, progress);
         sender.end();
         sent.map(|()| Some(report))
     }
+}
+
+/// What the user is told who goes on with a drawing once more.
+const GO_ON_AGAIN: &str = "to go on at the stroke that was begun last, do the same again";
+
+/// What the user is told who leaves out strokes that are drawn, in the first of these passes that
+/// are left.
+fn go_on_from(left_out: u64, passes: Option<u32>) -> String {
+    let options = match passes {
+        None => {
+            format!(
+                "add --from {left_out}, or --resume if the plotter has flash for how far it comes"
+            )
+        }
+        Some(passes) => {
+            format!("say --from {left_out} --multipass {passes} in place of those options")
+        }
+    };
+    format!("to go on at the stroke that was begun last, {options}")
 }
 
 /// Passes reports of progress on, and notes how many strokes were begun.
@@ -366,4 +384,19 @@ fn draw_by(
         sender.plot(progress)?;
     }
     sender.report()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::go_on_from;
+
+    #[test]
+    fn the_passes_that_are_left_are_named() {
+        assert!(
+            go_on_from(4, None).ends_with(
+                "add --from 4, or --resume if the plotter has flash for how far it comes"
+            )
+        );
+        assert!(go_on_from(4, Some(2)).contains("say --from 4 --multipass 2 in place"));
+    }
 }

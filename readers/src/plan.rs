@@ -174,10 +174,15 @@ impl Plan {
             vertices: HashMap::new(),
             pen: None,
         };
-        for stroke in &self.strokes {
-            lines.draw(stroke);
-        }
-        let notes = super::capacity(lines.vertices.len()).into_iter().collect();
+        let short = self.strokes.iter().filter(|stroke| !lines.draw(stroke)).count();
+        let short = match short {
+            0 => None,
+            1 => Some("1 line is not drawn, because it is too short at this scale".to_owned()),
+            _ => Some(format!(
+                "{short} lines are not drawn, because they are too short at this scale"
+            )),
+        };
+        let notes = short.into_iter().chain(super::capacity(lines.vertices.len())).collect();
         lines.vertices = HashMap::new();
         (lines, notes)
     }
@@ -276,13 +281,15 @@ pub(crate) struct PlanLines {
 }
 
 impl PlanLines {
-    fn draw(&mut self, stroke: &Stroke) {
+    /// Adds the lines of a stroke. Returns `false` if it has no length when it is rounded to
+    /// thousandths of a millimetre.
+    fn draw(&mut self, stroke: &Stroke) -> bool {
         let position = |value: f64| (value * PER_MM).round() as i64;
         let mut positions: Vec<[i64; 2]> =
             stroke.points.iter().map(|point| point.map(position)).collect();
         positions.dedup();
         if positions.len() < 2 {
-            return;
+            return false;
         }
         if self.pen != Some(stroke.pen) {
             self.pen = Some(stroke.pen);
@@ -305,6 +312,7 @@ impl PlanLines {
             last = Some(number);
         }
         self.lines.push((line, stroke.element));
+        true
     }
 
     /// The number of the vertex at this position, which is made if there is none.

@@ -319,6 +319,18 @@ fn arranged(svg: &str, options: &[(&str, &str)]) -> Result<SourceFile, String> {
 }
 
 #[test]
+fn what_becomes_too_short_is_counted() {
+    let svg = in_mm("<path d='M10 10h.01M10 20h.02M10 30h50'/>");
+    let notes =
+        |options: &[(&str, &str)]| arranged(&svg, options).expect("a plan").notes().join("; ");
+    assert_eq!(notes(&[]), "");
+    let told = notes(&[("scale", "0.03")]);
+    assert!(told.contains("1 line is not drawn, because it is too short"), "{told}");
+    let told = notes(&[("scale", "0.02")]);
+    assert!(told.contains("2 lines are not drawn, because they are too short"), "{told}");
+}
+
+#[test]
 fn layers_are_chosen_by_label_number_or_colour() {
     let layer = |label: &str, y: u32| {
         format!("<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9'/></g>")
