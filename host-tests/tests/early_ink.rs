@@ -292,6 +292,23 @@ fn overrides_and_pauses_act_whenever_they_come() {
     }
 }
 
+/// The button is pressed and released before the picture is computed.
+#[test]
+fn the_stop_button_acts_while_a_picture_is_computed() {
+    for early_ink in [true, false] {
+        let mut bench = loaded(&lattice(), early_ink);
+        bench.board.press_stop_during(100..110);
+        let answer = bench.say("$plot\n");
+        assert!(answer.contains("error:"), "{answer}");
+        bench.work(100);
+        assert!(matches!(bench.plotter.machine().state(), State::Alarm(_)));
+        assert_eq!(drawn(&bench.board.trace().changes()), Run::new());
+        // It can be unlocked, and draws then.
+        assert!(bench.say("$X\n").ends_with("ok\n"));
+        assert!(bench.say("$plot\n").ends_with("ok\n"));
+    }
+}
+
 /// Draws the job without a cut. Returns its strokes and how many bytes of flash change.
 fn undisturbed(lines: &[String], work_ticks: u64) -> (Run, usize) {
     let flash = CutFlash { budget: usize::MAX / 2, ..empty_flash() };

@@ -25,6 +25,7 @@ use crate::storage::LogProgress;
 #[cfg(feature = "tiles")]
 use crate::storage::area::{Area, AreaFlash};
 use core::convert::Infallible;
+use core::ops::Range;
 use embedded_hal::digital::{ErrorType, OutputPin};
 use std::boxed::Box;
 use std::cell::{Cell, RefCell};
@@ -308,6 +309,10 @@ pub struct HostBoard<'q> {
     steps: TracedSteps<'q>,
     /// The contacts that are closed.
     contacts: Contacts,
+    /// How many times the contacts were read, and at which of these times the emergency stop was
+    /// pressed besides.
+    contact_reads: u64,
+    stop_reads: Range<u64>,
     /// The state shared with the interrupt code.
     state: &'q PulserState,
     /// The number of ticks that sending a byte takes; 0 if no baud rate is set.
@@ -352,6 +357,8 @@ impl<'q> HostBoard<'q> {
             queue,
             steps,
             contacts: Contacts::default(),
+            contact_reads: 0,
+            stop_reads: 0..0,
             state,
             byte_ticks: 0,
             kept: None,
@@ -444,6 +451,12 @@ impl<'q> HostBoard<'q> {
         self.contacts = contacts;
     }
 
+    /// Presses the emergency stop while the plotter reads the contacts for these times from now on,
+    /// counted from 1.
+    pub fn press_stop_during(&mut self, reads: Range<u64>) {
+        (self.contact_reads, self.stop_reads) = (0, reads);
+    }
+
     /// Which step pins are inverted, as a mask, and whether the enable pin is. The trace shows the
     /// pins as the drivers take them, as if they were not.
     pub fn inverted_pins(&self) -> (u8, bool) {
@@ -510,7 +523,9 @@ impl Board for HostBoard<'_> {
     }
 
     fn contacts(&mut self) -> Contacts {
-        self.contacts
+        self.contact_reads += 1;
+        let stop = self.contacts.stop || self.stop_reads.contains(&self.contact_reads);
+        Contacts { stop, ..self.contacts }
     }
 
     fn step_now(&mut self) {

@@ -188,12 +188,16 @@ impl Machine<'_> {
         Ok(())
     }
 
+    /// Which contacts are closed when they are not pressed: the mask of [`Contacts::pressed`].
+    pub(crate) fn inverted_contacts(&self) -> u8 {
+        self.settings.whole(Setting::InvertContacts) as u8 // at most 7
+    }
+
     /// Reports the present state of the contacts. Call it in every turn of the main loop. A pressed
     /// emergency stop raises an alarm in any state. The limit switches are passed on to
     /// [`Machine::watch`].
     pub fn observe(&mut self, contacts: Contacts) {
-        let inverted = self.settings.whole(Setting::InvertContacts) as u8; // at most 7
-        self.contacts = contacts.pressed(inverted);
+        self.contacts = contacts.pressed(self.inverted_contacts());
         let is_known = matches!(self.activity, Activity::Alarm(Alarm::EmergencyStop));
         if self.contacts.stop && !is_known {
             self.alarm(Alarm::EmergencyStop);

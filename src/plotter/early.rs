@@ -151,6 +151,7 @@ impl<B: Board, I: Index> Cancel for OrderCancel<'_, '_, B, I> {
         report::greet_opened(inner.machine.state(), inner.resumption, *board);
         if requests.has(RealTime::ABORT) {
             inner.machine.abort();
+            inner.act(requests.only(RealTime::EMERGENCY));
             return Err(Aborted);
         }
         inner.act(requests);

@@ -49,6 +49,8 @@ pub(super) struct Listener<'b, B: Board> {
     pub(super) position: [Value; 3],
     /// Whether reports are in inches.
     pub(super) inches: bool,
+    /// Which contacts are closed when they are not pressed.
+    inverted: u8,
     /// The stage of the computation that status reports tell.
     pub(super) stage: Stage,
     /// The hold, the pause or the emergency stop that was requested meanwhile. It is carried out
@@ -64,11 +66,12 @@ pub(super) struct Listener<'b, B: Board> {
 impl<'b, B: Board> Listener<'b, B> {
     /// Begins to listen with the first stage.
     #[inline(always)] // Adds no frame to the stack while the stages run.
-    pub(super) fn new(board: &'b mut B, position: [Value; 3], inches: bool) -> Self {
+    pub(super) fn new(board: &'b mut B, position: [Value; 3], inches: bool, inverted: u8) -> Self {
         Self {
             board,
             position,
             inches,
+            inverted,
             stage: Stage::View,
             requests: RealTime::default(),
             overrides: OverrideChange::default(),
@@ -83,7 +86,7 @@ impl<B: Board> Cancel for Listener<'_, B> {
         report::greet_opened(State::Run, Resumption::default(), self.board);
         let requests = self.board.take_real_time();
         if requests.has(RealTime::RESUME) {
-            self.requests = RealTime::default();
+            self.requests = self.requests.only(RealTime::EMERGENCY);
         }
         let stops = RealTime::HOLD.and(RealTime::PAUSE).and(RealTime::EMERGENCY);
         self.requests = self.requests.and(requests.only(stops));
@@ -103,7 +106,11 @@ impl<B: Board> Cancel for Listener<'_, B> {
             reply.coordinates(self.position, self.inches);
             reply.line(format_args!("|FS:0,0|Stage:{stage}>"));
         }
-        let ends = requests.has(RealTime::ABORT) || requests.has(RealTime::EMERGENCY);
+        // The button stops what is computed, too, also if it is released again before the end.
+        if self.board.contacts().pressed(self.inverted).stop {
+            self.requests = self.requests.and(RealTime::EMERGENCY);
+        }
+        let ends = requests.has(RealTime::ABORT) || self.requests.has(RealTime::EMERGENCY);
         if ends { Err(Aborted) } else { Ok(()) }
     }
 

@@ -57,9 +57,7 @@ impl<I: Index> Inner<'_, I> {
         {
             self.streamed = Default::default();
         }
-        let [x, y] = self.machine.position_mm();
-        let (position, inches) = ([x, y, self.program.z()], self.in_inches());
-        let mut listener = Listener::new(board, position, inches);
+        let mut listener = self.listener(board);
         let begun = match drawing {
             _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
             #[cfg(feature = "tiles")]
@@ -105,26 +103,34 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Waits until the last moves are made, and makes room in the flash for a job that is sent
-    /// while it is drawn. Meanwhile the user is listened to.
+    /// while it is drawn. Meanwhile the user is listened to. Returns what is to be done when the
+    /// job has begun.
     ///
     /// # Errors
     /// [`Aborted`] if the user does not want what comes next.
     #[cfg(all(feature = "stream", feature = "resume"))]
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn wait_until_idle<B: Board>(&mut self, board: &mut B) -> Result<(), Aborted> {
-        let [x, y] = self.machine.position_mm();
-        let (position, inches) = ([x, y, self.program.z()], self.in_inches());
-        let mut listener = Listener::new(board, position, inches);
-        self.settle(&mut listener)?;
+    pub(super) fn wait_until_idle<B: Board>(&mut self, board: &mut B) -> Result<RealTime, Aborted> {
+        let mut listener = self.listener(board);
+        let mut waited = self.settle(&mut listener);
         // The rest of a job that has stopped continues in the log of that job.
         #[cfg(feature = "early-ink")]
-        if self.resumption.stopped(State::Idle).is_none() {
-            Self::make_room(&mut listener, 2 * PAGE_BYTES as u32)?;
+        if waited.is_ok() && self.resumption.stopped(State::Idle).is_none() {
+            waited = Self::make_room(&mut listener, 2 * PAGE_BYTES as u32);
         }
         let Listener { requests, overrides, .. } = listener;
         self.change_overrides(overrides);
-        self.act(requests);
-        Ok(())
+        if waited.is_err() {
+            self.act(requests);
+        }
+        waited.map(|()| requests)
+    }
+
+    /// Begins to listen while a job is computed.
+    fn listener<'b, B: Board>(&self, board: &'b mut B) -> Listener<'b, B> {
+        let [x, y] = self.machine.position_mm();
+        let position = [x, y, self.program.z()];
+        Listener::new(board, position, self.in_inches(), self.machine.inverted_contacts())
     }
 
     /// Waits until the last moves are made: their plan may be complete before, and a sector of

@@ -89,11 +89,12 @@ impl<I: Index> Inner<'_, I> {
         if requests.has(RealTime::EMERGENCY) {
             self.machine.alarm(Alarm::EmergencyStop);
         }
-        if requests.has(RealTime::HOLD) {
-            self.machine.hold();
-        }
+        // Which of them came first is not known; a hold is the safe one, so it comes last.
         if requests.has(RealTime::RESUME) {
             self.machine.resume();
+        }
+        if requests.has(RealTime::HOLD) {
+            self.machine.hold();
         }
         if requests.has(RealTime::CANCEL_JOG) {
             self.machine.cancel_jog();

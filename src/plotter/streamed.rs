@@ -10,7 +10,9 @@ use super::{Board, Cursor, Inner, Job, Strokes};
 use crate::drawing::{LineType, PagePoint};
 use crate::index::Index;
 use crate::machine::{PendingTarget, State, Target};
-use crate::protocol::{CommandError, MOST_TARGETS, StreamHeader, StreamedTarget, StreamedTargets};
+use crate::protocol::{
+    CommandError, MOST_TARGETS, RealTime, StreamHeader, StreamedTarget, StreamedTargets,
+};
 
 /// The number of bits of a coordinate, which is at most [`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT).
 const COORDINATE_BITS: u32 = 21;
@@ -164,15 +166,18 @@ impl<I: Index> Inner<'_, I> {
             return Err(CommandError::OtherSteps);
         }
         #[cfg(feature = "resume")]
-        if self.machine.state() == State::Idle && self.wait_until_idle(board).is_err() {
-            return Err(CommandError::Aborted);
-        }
+        let requests = match self.machine.state() {
+            State::Idle => self.wait_until_idle(board).map_err(|_| CommandError::Aborted)?,
+            _ => RealTime::default(),
+        };
         self.machine.start_streamed(header.size, [header.least, header.greatest])?;
         self.copy_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();
         self.streamed = Streamed { header, taken: 0, released: 0 };
         self.keep_streamed(header.id, board);
+        #[cfg(feature = "resume")]
+        self.act(requests);
         Ok(())
     }
 

@@ -223,6 +223,7 @@ impl<I: Index, B: Board> Cancel for PartCancel<'_, '_, I, B> {
         let requests = board.take_real_time();
         report::greet_opened(inner.machine.state(), inner.resumption, *board);
         if requests.has(RealTime::ABORT) {
+            inner.act(requests.only(RealTime::EMERGENCY));
             *ends = Some(EarlyEnd::ByUser);
             return Err(Aborted);
         }
