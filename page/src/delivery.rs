@@ -12,9 +12,9 @@ use std::rc::Rc;
 /// The most times that one line is sent again.
 const MOST_RESENDS: u32 = 200;
 /// The time in ms after which a line without a reply is asked for.
-const REPLY_PATIENCE: f64 = 300.0;
+const REPLY_TIMEOUT: f64 = 300.0;
 /// The longest time in ms without a line being accepted.
-const LOST_PATIENCE: f64 = 15_000.0;
+const LOST_TIMEOUT: f64 = 15_000.0;
 
 /// What became of a delivery.
 #[derive(Debug)]
@@ -75,10 +75,10 @@ impl Delivery {
         ((self.done - self.base).unsigned_abs() as usize, self.lines.count())
     }
 
-    /// Lets the time pass until `now`, in ms. While the plotter `is_computing` it reads no lines,
-    /// so none is missed. What is to be sent is appended to `out`.
-    pub fn tick(&mut self, now: f64, is_computing: bool, out: &mut Vec<u8>) -> Outcome {
-        if is_computing {
+    /// Lets the time pass until `now`, in ms. While the plotter `reads_no_lines`, because it computes
+    /// or finds its switches, none is missed. What is to be sent is appended to `out`.
+    pub fn tick(&mut self, now: f64, reads_no_lines: bool, out: &mut Vec<u8>) -> Outcome {
+        if reads_no_lines {
             (self.last_event, self.last_progress) = (now, now);
             self.asked_at = self.asked_at.map(|_| now);
         }
@@ -98,10 +98,10 @@ impl Delivery {
             self.sent += 1;
             self.in_queue.push_back((self.sent, cost));
         }
-        if now - self.asked_at.unwrap_or(self.last_event) > REPLY_PATIENCE {
+        if now - self.asked_at.unwrap_or(self.last_event) > REPLY_TIMEOUT {
             self.ask(now, out);
         }
-        if self.resends > MOST_RESENDS || now - self.last_progress > LOST_PATIENCE {
+        if self.resends > MOST_RESENDS || now - self.last_progress > LOST_TIMEOUT {
             return Outcome::Lost(self.line(self.done + 1));
         }
         Outcome::More

@@ -28,7 +28,7 @@ const QUERY_EVERY: f64 = 100.0;
 /// The time in ms after which ctrl-X, or the first line number, is sent again.
 const AGAIN_AFTER: f64 = 1000.0;
 /// The longest time in ms until the plotter counts lines.
-const OPEN_PATIENCE: f64 = 15_000.0;
+const OPEN_TIMEOUT: f64 = 15_000.0;
 /// The most times that the checksums and the report are asked for again.
 const MOST_QUESTIONS: u32 = 10;
 
@@ -64,7 +64,8 @@ pub struct Session {
     strokes: u64,
     /// How often the plotter was asked again for what did not arrive whole.
     questions: u32,
-    is_computing: bool,
+    /// Whether the plotter computes or finds its switches, as its last status says.
+    reads_no_lines: bool,
     /// Equal reports of a machine that waits, one after the other.
     holds: (Option<u8>, String, u32),
     is_given_up: bool,
@@ -102,7 +103,7 @@ impl Session {
             report: None,
             strokes: 0,
             questions: 0,
-            is_computing: false,
+            reads_no_lines: false,
             holds: (None, String::new(), 0),
             is_given_up: false,
             place: Vec::new(),
@@ -264,7 +265,7 @@ impl Session {
         }
         self.repeat();
         if let Some(mut delivery) = self.delivery.take() {
-            let outcome = delivery.tick(now, self.is_computing, &mut self.out);
+            let outcome = delivery.tick(now, self.reads_no_lines, &mut self.out);
             self.delivery = Some(delivery);
             self.settle(outcome);
         }
@@ -311,7 +312,7 @@ impl Session {
             _ => return,
         }
         self.repeated = self.now;
-        if self.now - self.since > OPEN_PATIENCE {
+        if self.now - self.since > OPEN_TIMEOUT {
             self.fail(
                 "What answers is not penup, or the line damages too many bytes. Is it the right \
                  port, and does the plotter run penup at 115200 baud?"
@@ -500,7 +501,7 @@ impl Session {
     }
 
     fn follow(&mut self, status: &Status, raw: &str) {
-        self.is_computing = status.is_computing;
+        self.reads_no_lines = status.is_computing || status.state == "Home";
         let pair = |name: &str| -> Option<(f64, f64)> {
             let (done, all) = field(raw, name)?.split_once('/')?;
             Some((done.parse().ok()?, all.parse().ok()?))

@@ -252,3 +252,17 @@ fn a_test_square_is_a_square_where_the_pen_stands() {
     pipe.session.go_on(false).expect("sent");
     pipe.until("failed");
 }
+
+/// The seek to a switch that is not there takes 25 s at the speed set, and no line is read then.
+#[test]
+fn a_plotter_that_finds_its_switches_is_waited_for() {
+    let mut pipe = Pipe::new(clean);
+    while pipe.until("phase")["name"] != "ready" {}
+    pipe.session.command("$22=1").expect("sent");
+    (0..200).for_each(|_| pipe.step());
+    let began = pipe.now;
+    pipe.session.command("$H").expect("sent");
+    let failed = pipe.until("failed");
+    assert!(pipe.now - began > 20_000.0, "{failed} after {} ms", pipe.now - began);
+    assert!(failed["text"].as_str().is_some_and(|text| text.contains("switch")), "{failed}");
+}

@@ -3,7 +3,7 @@
 use super::open;
 use crate::cli::PortArgs;
 use crate::error::Error;
-use crate::link::{Link as _, SerialLink};
+use crate::link::Link;
 use crate::outcome::Outcome;
 use crate::sender::{Sender, Timeouts};
 use penup_job::protocol::{ABORT, Reply, ReplyReader};
@@ -23,6 +23,8 @@ const PAUSE: Duration = Duration::from_millis(20);
 
 /// After the end of the input, this many pauses in which nothing comes are the end.
 const LAST_SILENCES: u32 = 25;
+/// So many times [`PAUSE`] in a row without a byte, 3 s, until a greeting counts as lost.
+const GREETING_SILENCES: u32 = 150;
 
 /// What the user of a terminal is told first.
 const GREETING: &str = "Type lines for the plotter; ? asks for the status, ! holds, ~ goes on, ^X \
@@ -38,13 +40,14 @@ pub fn console(args: &PortArgs, is_json: bool, interrupt: &AtomicBool) -> Result
     let mut link = open(args)?;
     // A client that broke off may have left the plotter in a conversation with checksums.
     let (_, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
-    if status.is_idle() {
+    let is_reset = status.is_idle();
+    if is_reset {
         link.send(&[ABORT])?;
     }
     if io::stdin().is_terminal() {
         eprintln!("{GREETING}");
     }
-    let refused = talk(&mut link, &typed(), is_json)?;
+    let refused = talk(&mut link, &typed(), is_reset, is_json)?;
     Ok(Outcome { text: String::new(), json: json!({ "refused": refused }), is_answer: false })
 }
 
@@ -74,22 +77,34 @@ fn objects(bytes: &[u8], line: &mut Vec<u8>) -> Vec<u8> {
     objects
 }
 
-/// Returns how many lines were refused.
-fn talk(link: &mut SerialLink, typed: &Receiver<String>, is_json: bool) -> Result<usize, Error> {
+/// Sends what is typed, and prints what the plotter says. With `is_reset` its greeting is still to
+/// come, which answers no line. Returns how many lines were refused.
+fn talk(
+    link: &mut dyn Link,
+    typed: &Receiver<String>,
+    is_reset: bool,
+    is_json: bool,
+) -> Result<usize, Error> {
     let mut reader = ReplyReader::default();
     let mut waiting: VecDeque<String> = VecDeque::new();
     let (mut is_open, mut is_answered, mut refused) = (true, true, 0);
+    let mut awaits_greeting = is_reset;
     let mut buffer = [0; 256];
     let mut line_said = Vec::new();
     let mut silences = 0;
     // A last question, such as that for the status, may still be answered.
-    while is_open || !is_answered || !waiting.is_empty() || silences < LAST_SILENCES {
+    while is_open
+        || !is_answered
+        || awaits_greeting
+        || !waiting.is_empty()
+        || silences < LAST_SILENCES
+    {
         match typed.try_recv() {
             Ok(line) if line.trim() == ABORT_WORD => {
                 link.send(&[ABORT])?;
                 // The plotter forgets what it has not carried out, and answers by its greeting.
                 waiting.clear();
-                is_answered = true;
+                (is_answered, awaits_greeting) = (true, true);
             }
             Ok(line) if !line.is_empty() && line.chars().all(acts_at_once) => {
                 link.send(line.as_bytes())?;
@@ -98,7 +113,12 @@ fn talk(link: &mut SerialLink, typed: &Receiver<String>, is_json: bool) -> Resul
             Err(TryRecvError::Disconnected) => is_open = false,
             Err(TryRecvError::Empty) => {}
         }
-        if is_answered && let Some(line) = waiting.pop_front() {
+        // A greeting that is lost is not waited for any longer.
+        awaits_greeting &= silences < GREETING_SILENCES;
+        if is_answered
+            && !awaits_greeting
+            && let Some(line) = waiting.pop_front()
+        {
             link.send(format!("{line}\n").as_bytes())?;
             is_answered = false;
         }
@@ -117,7 +137,8 @@ fn talk(link: &mut SerialLink, typed: &Receiver<String>, is_json: bool) -> Resul
                     is_answered = true;
                     refused += 1;
                 }
-                Reply::Ok | Reply::Greeting(_) => is_answered = true,
+                Reply::Ok => is_answered = true,
+                Reply::Greeting(_) => (is_answered, awaits_greeting) = (true, false),
                 _ => {}
             }
         }
@@ -127,7 +148,61 @@ fn talk(link: &mut SerialLink, typed: &Receiver<String>, is_json: bool) -> Resul
 
 #[cfg(test)]
 mod tests {
-    use super::objects;
+    use super::{GREETING_SILENCES, LAST_SILENCES, objects, talk};
+    use crate::link::Link;
+    use std::io;
+    use std::sync::mpsc;
+    use std::time::Duration;
+
+    /// A plotter that greets and answers when it was listened to so many times since.
+    struct Slow {
+        greets_in: Option<u32>,
+        answers_in: Option<u32>,
+        lines: usize,
+    }
+
+    /// What a slow plotter takes for a line.
+    const LONG: u32 = 2 * GREETING_SILENCES;
+
+    impl Link for Slow {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.lines += bytes.iter().filter(|byte| **byte == b'\n').count();
+            self.answers_in = Some(LONG);
+            Ok(())
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<usize> {
+            for (left, said) in [
+                (&mut self.greets_in, &b"Grbl 1.1h [penup 0.1.0 '$' for help]\r\n"[..]),
+                (&mut self.answers_in, b"error:9\r\n"),
+            ] {
+                *left = left.and_then(|left| left.checked_sub(1));
+                if *left == Some(0) {
+                    buffer[..said.len()].copy_from_slice(said);
+                    return Ok(said.len());
+                }
+            }
+            Ok(0)
+        }
+
+        fn change_pen(&mut self, _: u8) -> io::Result<bool> {
+            Ok(true)
+        }
+    }
+
+    #[test]
+    fn a_greeting_answers_no_line() {
+        for greets_in in [Some(3), Some(2 * LAST_SILENCES), None] {
+            let mut plotter = Slow { greets_in, answers_in: None, lines: 0 };
+            let (sender, typed) = mpsc::channel();
+            for line in ["$H", "G0 X1"] {
+                sender.send(line.to_owned()).expect("it is read");
+            }
+            drop(sender);
+            let refused = talk(&mut plotter, &typed, true, true).expect("a conversation");
+            assert_eq!((refused, plotter.lines), (2, 2), "{greets_in:?}");
+        }
+    }
 
     #[test]
     fn each_whole_line_is_an_object() {
