@@ -27,7 +27,7 @@ use penup_job::results::{JobReport, JobResult, Lengths, Timings};
 use penup_job::room::Room;
 use penup_job::straight::{TOLERANCE, straightened};
 use penup_job::streamed::{Form, StreamError, StreamedJob};
-use penup_job::strokes::{Stroke, strokes_of};
+use penup_job::strokes::{Stroke, dashes_of, strokes_of};
 use penup_readers::lines::Lines;
 use std::io;
 use std::time::{Duration, Instant};
@@ -261,9 +261,10 @@ impl<I: Index> InMemory<I> {
         let runs = if is_grid(settings) {
             self.board.steps.runs()
         } else {
+            let dot = f64::from(settings.get(Setting::DotLength).to_bits()) / f64::from(1 << 16);
             let steps = self.steps_per_mm();
-            let strokes = self.with_strokes(|strokes| strokes_of(strokes, steps));
-            runs(strokes, 1.0 / steps[0])
+            let lines = self.with_strokes(|strokes| dashes_of(strokes, steps, dot));
+            runs(lines, 1.0 / steps[0])
         };
         Drawn { runs, steps, duration_s }
     }

@@ -1,7 +1,9 @@
 //! The strokes of a job, as a plotter will draw them.
 
 use crate::path::PagePoint;
+use penup::drawing::LineType;
 use penup::machine::{Path, Target};
+use penup::step::Pattern;
 
 /// What the pen draws between lowering and raising.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,4 +32,49 @@ pub fn strokes_of(path: &mut dyn Path, steps: [f64; 2]) -> Vec<Stroke> {
         }
     }
     strokes
+}
+
+/// The units of a length in a millimetre, in which dots and gaps are cut.
+const LENGTH_UNITS: f64 = (1 << 18) as f64;
+
+/// Reads the lines that the pen draws without being lifted: as [`strokes_of`], but each dot and
+/// each dash is a line of its own. Dots are about `dot` mm long.
+pub fn dashes_of(path: &mut dyn Path, steps: [f64; 2], dot: f64) -> Vec<Stroke> {
+    let mut lines: Vec<Stroke> = Vec::new();
+    let mut from = [0.0; 2];
+    while let Some(Target { point, ink }) = path.next_target() {
+        let to = [f64::from(point.x) / steps[0], f64::from(point.y) / steps[1]];
+        let pen = path.pen() + 1;
+        let (x, y) = (to[0] - from[0], to[1] - from[1]);
+        let units = (x.hypot(y) * LENGTH_UNITS).round() as u32;
+        let pattern = match ink {
+            None => {
+                lines.push(Stroke { pen, points: vec![to] });
+                from = to;
+                continue;
+            }
+            Some(LineType::Full) => Pattern::full(units),
+            Some(line_type) => Pattern::of(line_type, units, (dot * LENGTH_UNITS) as u32),
+        };
+        let last = pattern.pieces() - 1;
+        let position = |end: u32| match units {
+            0 => to,
+            _ if end == units => to,
+            _ => [0, 1].map(|axis| from[axis] + [x, y][axis] * f64::from(end) / f64::from(units)),
+        };
+        for piece in (0..=last).filter(|piece| Pattern::inked(*piece)) {
+            let end = position(pattern.end_of(piece));
+            match lines.last_mut() {
+                // The first dash goes on with the line before, if no other pen drew that.
+                Some(line) if piece == 0 && line.pen == pen => line.points.push(end),
+                _ => {
+                    let begin =
+                        piece.checked_sub(1).map_or(from, |gap| position(pattern.end_of(gap)));
+                    lines.push(Stroke { pen, points: vec![begin, end] });
+                }
+            }
+        }
+        from = to;
+    }
+    lines
 }

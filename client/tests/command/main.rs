@@ -603,6 +603,30 @@ fn a_drawing_is_written_for_other_machines() {
     assert_eq!(draws(&looped), 5);
 }
 
+/// Of a machine whose steps are no grid on the page, the lines are computed, and not read from the
+/// pins.
+#[test]
+fn broken_lines_are_broken_on_every_machine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let cube = include_str!("../../../scenes/cube.obj");
+    fs::write(folder.path().join("cube.obj"), cube).expect("written");
+    for line_type in ["dashed", "dotted"] {
+        let lifts = |options: &[&str]| {
+            let all = ["preview", "cube.obj", "--hidden", line_type, "--gcode", "a.gcode"];
+            let (code, _, error) = penup(folder.path(), &[&all, options].concat());
+            assert_eq!(code, Some(0), "{error}");
+            let gcode = fs::read_to_string(folder.path().join("a.gcode")).expect("readable");
+            gcode.matches("M3").count()
+        };
+        let of_grid = lifts(&[]);
+        assert!(of_grid > 40, "{of_grid}");
+        for setting in ["230=1", "101=88"] {
+            let lifts = lifts(&["--set", setting]);
+            assert!(lifts.abs_diff(of_grid) <= 2, "{line_type} {setting}: {lifts}, not {of_grid}");
+        }
+    }
+}
+
 #[test]
 fn the_standard_output_takes_one_file_and_nothing_else() {
     let folder = tempfile::tempdir().expect("a folder");
