@@ -117,7 +117,8 @@ pub struct PauseArgs {
 #[command(after_help = format!(
     "A job that a loss of power or a reset has stopped goes on at the stroke that was being drawn. \
      The machine is homed first, by `penup home`; without limit switches put the pen at the origin \
-     by hand and say so by --at-origin.\n\nKeys: {KEYS}, and Ctrl-C leaves the plotter drawing."
+     by hand and say so by --at-origin.\n\nKeys: {KEYS}. Ctrl-C stops such a job, with the pen up; \
+     do the same again to go on with it."
 ))]
 pub struct ResumeArgs {
     /// The pen has been put at the origin of the page by hand
