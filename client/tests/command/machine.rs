@@ -367,12 +367,17 @@ fn keys_pause_the_drawing_and_move_the_lowered_pen() {
         ("d", "the lowered pen is at height 125 of 127 now"),
         (" ", "Drawing"),
     ] {
+        let mut buffer = [0; 256];
         if key == "d" && answer.starts_with("the pen's") {
-            plotter.wait_for_drawing(&mut client);
+            // The terminal holds 4 KB: who does not read it stops the program.
+            while !plotter.drawing.load(Ordering::Relaxed) {
+                assert_eq!(client.try_wait().expect("a state"), None, "it ended: {said}");
+                let _ = keys.read(&mut buffer);
+                std::thread::sleep(Duration::from_millis(1));
+            }
         }
         let before = said.len();
         keys.write_all(key.as_bytes()).expect("pressed");
-        let mut buffer = [0; 256];
         while !said[before..].contains(answer) {
             assert_eq!(client.try_wait().expect("a state"), None, "{answer}: {said}");
             if let Ok(count) = keys.read(&mut buffer) {
