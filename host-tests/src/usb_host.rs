@@ -69,7 +69,8 @@ impl Transfer {
         self.request[0] & 0x80 != 0
     }
 
-    /// The endpoints, and the sides of them, whose packets begin anew with DATA0 behind the request.
+    /// The endpoints, and the sides of them, whose packets begin anew with DATA0 behind the
+    /// request.
     fn begins_anew(&self) -> Vec<(usize, usize)> {
         let of_port = [(FROM_PORT, IN), (TO_PORT, OUT)];
         match self.request {

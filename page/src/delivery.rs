@@ -75,8 +75,8 @@ impl Delivery {
         ((self.done - self.base).unsigned_abs() as usize, self.lines.count())
     }
 
-    /// Lets the time pass until `now`, in ms. While the plotter `reads_no_lines`, because it computes
-    /// or finds its switches, none is missed. What is to be sent is appended to `out`.
+    /// Lets the time pass until `now`, in ms. While the plotter `reads_no_lines`, because it
+    /// computes or finds its switches, none is missed. What is to be sent is appended to `out`.
     pub fn tick(&mut self, now: f64, reads_no_lines: bool, out: &mut Vec<u8>) -> Outcome {
         if reads_no_lines {
             (self.last_event, self.last_progress) = (now, now);

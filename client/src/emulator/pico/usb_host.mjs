@@ -568,7 +568,8 @@ export class Usb {
       return this.endTransfer(null);
     }
     if (isOut) {
-      const data = transfer.isStatus ? [] : transfer.data.slice(transfer.sent, transfer.sent + PACKET);
+      const { isStatus, sent } = transfer;
+      const data = isStatus ? [] : transfer.data.slice(sent, sent + PACKET);
       this.chip.usbDPRAM.set(data, 0x100);
       this.finish(0, true, (word & ~(AVAILABLE | LENGTH)) | FULL | data.length);
       if (transfer.isStatus) return this.endTransfer(transfer.got);
