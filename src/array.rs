@@ -15,6 +15,21 @@ pub fn reverse<T>(items: &mut [T]) {
     }
 }
 
+/// Moves the first `count` items behind the others. The standard library's `rotate_left` is faster
+/// for large slices, and takes more flash than all that calls it.
+///
+/// ```
+/// let mut items = [1, 2, 3, 4, 5];
+/// penup::array::rotate_left(&mut items, 2);
+/// assert_eq!(items, [3, 4, 5, 1, 2]);
+/// ```
+pub fn rotate_left<T>(items: &mut [T], count: usize) {
+    let (first, others) = items.split_at_mut(count.min(items.len()));
+    reverse(first);
+    reverse(others);
+    reverse(items);
+}
+
 /// Maps arrays of two to four items.
 pub trait MapEach<T, const N: usize> {
     /// Applies `f` to each item, from the first to the last.

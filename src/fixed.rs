@@ -25,9 +25,12 @@ pub struct Decimal {
 impl fmt::Display for Decimal {
     /// Writes the number so that parsing the text gives the same number, for example `5e-4`.
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // The types of numbers that others are formatted in, because a board stores code for each.
+        let sign = if self.mantissa < 0 { "-" } else { "" };
+        write!(formatter, "{sign}{}", self.mantissa.unsigned_abs())?;
         match self.exponent {
-            0 => write!(formatter, "{}", self.mantissa),
-            exponent => write!(formatter, "{}e{exponent}", self.mantissa),
+            0 => Ok(()),
+            exponent => write!(formatter, "e{}", i32::from(exponent)),
         }
     }
 }

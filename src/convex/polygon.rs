@@ -7,7 +7,7 @@
 //! near that part of the solid is behind it, and it detects whether the eye is inside the solid.
 
 use super::exact::{Point, Viewpoint};
-use crate::array::MapEach;
+use crate::array::{MapEach, rotate_left};
 use crate::index::Index;
 
 /// The corners of the polygon in counter-clockwise order, no three of them in line on the page.
@@ -52,7 +52,7 @@ impl<'s, I: Index> Polygon<'s, I> {
     pub(super) fn begin_with(&mut self, corner: I) {
         let corners = &mut self.corners[..self.count];
         if let Some(at) = corners.iter().position(|number| *number == corner) {
-            corners.rotate_left(at);
+            rotate_left(corners, at);
         }
     }
 
@@ -108,7 +108,7 @@ impl<'s, I: Index> Polygon<'s, I> {
         if replaced >= count {
             return Err(Surrounded);
         }
-        corners[..count].rotate_left(start);
+        rotate_left(&mut corners[..count], start);
         // Sides 0 to `replaced` - 1 are replaced by two sides that meet in the new point.
         corners.copy_within(replaced..count, 2);
         corners[1] = number;

@@ -207,7 +207,7 @@ impl<'m> Lookahead<'m> {
     /// Appends a block.
     ///
     /// # Errors Hands the block back if the ring is full.
-    #[inline(always)] // So that the caller makes no whole block either.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // So that the caller makes no whole block either.
     pub(super) fn push(&mut self, block: Block) -> Result<(), Block> {
         if self.is_full() {
             return Err(block);
@@ -250,7 +250,7 @@ impl<'m> Lookahead<'m> {
     /// The limits of a bend apply to whole blocks. So a block is not made longer once it has its
     /// share of 5/4 of that distance, nor while the whole path has that length or less than half of
     /// the memory is in use.
-    #[inline(always)]
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn join(&mut self, line: &Block, limits: &Limits) -> bool {
         let needed = limits.longest_stop.to_bits().saturating_add(surely_known(limits) / 4);
         let enough = needed.saturating_add(needed / 4);

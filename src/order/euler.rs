@@ -128,7 +128,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
     /// least. `None` if everything is drawn.
     pub fn entrance(
         &mut self,
-        far: impl Fn(PagePoint) -> u32,
+        far: &dyn Fn(PagePoint) -> u32,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<I>, OrderError> {
         let mut best = None;
@@ -161,7 +161,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         }
         let at = self.network.position(pen);
         let Some(mut entrances) = self.entrances.take() else {
-            return self.entrance(|position| length(at, position), work_budget);
+            return self.entrance(&|position| length(at, position), work_budget);
         };
         let mut nearest = (u32::MAX, I::NONE);
         let mut looked_at = 1;
@@ -194,7 +194,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         let from_the_left = |position: PagePoint| position.x.wrapping_sub(i32::MIN) as u32;
         let mut entrance = match start {
             Some(start) => Some(start),
-            None => self.entrance(from_the_left, work_budget)?,
+            None => self.entrance(&from_the_left, work_budget)?,
         };
         let mut done = 0;
         while let Some(start) = entrance {

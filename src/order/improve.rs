@@ -218,7 +218,7 @@ impl<I: Index> Best<'_, '_, I> {
                     Some(anchor) => length(self.network.position(anchor), position),
                     None => from_corner(position, corner),
                 };
-                unused.entrance(far, work_budget)?
+                unused.entrance(&far, work_budget)?
             }
             None => start,
         };

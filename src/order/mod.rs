@@ -48,7 +48,7 @@ pub use first::{FirstStrokes, StrokeDurations, choose_first, first_legs, order_r
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
-use crate::array::MapEach;
+use crate::array::{MapEach, rotate_left};
 use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
 use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
@@ -533,7 +533,7 @@ fn turn<I: Index>(network: Network<'_, I>, shape: Shape, route: &mut [Leg<I>]) {
     match shape {
         Shape::ClosedCycle => {
             let first = (0..route.len()).min_by_key(|&index| x_of(&route[index]));
-            route.rotate_left(first.unwrap_or(0));
+            rotate_left(route, first.unwrap_or(0));
         }
         Shape::OpenPath => {
             if let (Some(first), Some(last)) = (route.first(), route.last())

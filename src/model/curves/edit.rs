@@ -1,6 +1,7 @@
 //! Edits of the completed curves of a model.
 
 use super::{CurveList, PEN, header, lengths};
+use crate::array::rotate_left;
 use crate::index::Index;
 use crate::model::ModelError;
 use crate::model::store::Store;
@@ -25,7 +26,8 @@ impl CurveList {
             let before: usize = (0..range.start).filter_map(length).sum();
             let last = length(last).unwrap_or(0);
             let curves = store.curves_mut().get_mut(before..self.completed).unwrap_or(&mut []);
-            curves.rotate_left(curves.len().saturating_sub(last));
+            let before = curves.len().saturating_sub(last);
+            rotate_left(curves, before);
             gone = range.start + 1..range.start + 2;
         }
         let mut number = 0;

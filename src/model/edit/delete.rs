@@ -1,6 +1,7 @@
 //! Deletes vertices, elements and curves, and reverses faces.
 
 use super::ElementKind;
+use crate::array::rotate_left;
 use crate::index::Index;
 use crate::model::pens::{close_gap, open_gap};
 use crate::model::{Corner, Model};
@@ -61,7 +62,8 @@ impl<I: Index> Model<'_, I> {
                 at += length;
             }
             if let Some(between) = corners.get_mut(hole..last.end).filter(|_| last.start > hole) {
-                between.rotate_left(between.len().saturating_sub(last.len()));
+                let before = between.len().saturating_sub(last.len());
+                rotate_left(between, before);
                 self.move_pen(last, hole);
                 self.remove_elements(bars, range.start + 1..range.end + 1);
                 return;

@@ -117,8 +117,7 @@ impl<I: Index> Model<'_, I> {
         range: Range<usize>,
         before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
-        let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
-        let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
+        let coarser = self.coarser_for(map, range.clone())?;
         before(self);
         for position in self.vertices.get_mut(range.clone()).unwrap_or(&mut []) {
             *position = in_unit(map.apply(*position), coarser);
@@ -127,12 +126,12 @@ impl<I: Index> Model<'_, I> {
         Ok(())
     }
 
-    /// Returns by how many bits the unit must become coarser so that these positions fit.
-    pub(super) fn coarser_for(
-        &self,
-        positions: impl Iterator<Item = [i64; 3]>,
-    ) -> Result<u32, ModelError> {
-        let largest = positions.flatten().map(i64::unsigned_abs).max().unwrap_or(0);
+    /// Returns by how many bits the unit must become coarser so that the images of the vertices in
+    /// `range` fit.
+    pub(super) fn coarser_for(&self, map: &Map, range: Range<usize>) -> Result<u32, ModelError> {
+        let positions = self.vertices.get(range).unwrap_or(&[]);
+        let images = positions.iter().flat_map(|position| map.apply(*position));
+        let largest = images.map(i64::unsigned_abs).max().unwrap_or(0);
         (0..=self.fraction_bits)
             .find(|bits| largest >> bits <= POSITION_LIMIT as u64)
             .ok_or(ModelError::CoordinateTooLarge)

@@ -63,8 +63,7 @@ impl<I: Index> Model<'_, I> {
             .map(|curve| curve.length())
             .sum();
         self.store.check_room(of_elements + of_curves)?;
-        let positions = self.vertices.get(range.clone()).unwrap_or(&[]);
-        let coarser = self.coarser_for(positions.iter().map(|position| map.apply(*position)))?;
+        let coarser = self.coarser_for(&map, range.clone())?;
 
         before(self);
         for at in range.clone() {
