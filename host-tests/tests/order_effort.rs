@@ -113,6 +113,15 @@ fn the_longest_second_and_the_slowest_machine_end() {
     }
 }
 
+/// The length that a computer finds with its default effort in mm, and the units of work.
+fn by_a_computer(drawing: &Strokes) -> (f64, u64) {
+    let time_model = TimeModel { units_per_second: TimeModel::COMPUTER, ..TimeModel::default() };
+    let options =
+        Options { effort: Effort::Auto(time_model), lift_cost: 2 * 80 * 256, ..Options::default() };
+    let (_, report, units) = drawing.order(options).expect("an order");
+    (report.pen_up as f64 / 256.0 / 80.0, units)
+}
+
 /// The length that LKH finds for the strokes of a drawing, in mm; `None` if it cannot be installed.
 fn by_lkh(drawing: &Strokes) -> Option<f64> {
     let folder = workspace::root().join("target/elkai");
@@ -144,32 +153,43 @@ fn by_lkh(drawing: &Strokes) -> Option<f64> {
 #[ignore = "installs LKH (elkai) from PyPI and runs for minutes"]
 fn a_computer_comes_near_to_lkh() {
     let text = std::fs::read_to_string(scene_files::scene("text300.obj")).expect("a scene");
-    let drawings = [
-        ("500 hatch lines", Strokes::from(&two_columns()), 0.01),
-        ("300 words", Strokes::from(&Sheet::from_obj(&text)), 0.01),
-        ("1000 random strokes", random(1000, 1), 0.02),
+    let mut drawings = vec![
+        ("500 hatch lines".into(), Strokes::from(&two_columns())),
+        ("300 words".into(), Strokes::from(&Sheet::from_obj(&text))),
     ];
-    for (name, drawing, tolerance) in drawings {
-        let time_model =
-            TimeModel { units_per_second: TimeModel::COMPUTER, ..TimeModel::default() };
-        let options = Options {
-            effort: Effort::Auto(time_model),
-            lift_cost: 2 * 80 * 256,
-            ..Options::default()
-        };
+    let seeds = 1..=BY_LKH.len() as u32;
+    drawings.extend(seeds.map(|seed| (format!("1000 random strokes, {seed}"), random(1000, seed))));
+    for (name, drawing) in drawings {
         let begin = Instant::now();
-        let (_, report, units) = drawing.order(options).expect("an order");
+        let (length, units) = by_a_computer(&drawing);
         let milliseconds = begin.elapsed().as_millis();
-        let length = report.pen_up as f64 / 256.0 / 80.0;
         let Some(best) = by_lkh(&drawing) else {
             println!("skipped: elkai cannot be installed");
             return;
         };
         println!(
-            "{name}: {length:.1} mm, by LKH {best:.1} mm, {:+.1} %, {units} units in \
+            "{name}: {length:.1} mm, by LKH {best:.1} mm, {:+.2} %, {units} units in \
              {milliseconds} ms",
             100.0 * (length / best - 1.0)
         );
+        let tolerance = if name.contains("random") { 0.015 } else { 0.01 };
         assert!(length <= (1.0 + tolerance) * best, "{name}");
     }
+}
+
+/// The lengths that LKH found for 1000 random strokes in mm, by the seed of the drawing, from 1.
+const BY_LKH: [f64; 10] =
+    [4634.4, 4614.1, 4593.0, 4566.5, 4614.7, 4633.6, 4601.1, 4581.8, 4644.5, 4629.6];
+
+#[test]
+fn a_computer_is_within_a_hundredth_of_what_lkh_found() {
+    let mut sums = [0.0; 2];
+    for (seed, best) in (1..).zip(BY_LKH) {
+        let (length, units) = by_a_computer(&random(1000, seed));
+        assert!(length <= 1.015 * best, "seed {seed}: {length:.1} mm, by LKH {best:.1} mm");
+        // More would take longer than a tenth of a second.
+        assert!(units <= 10_000_000, "seed {seed}: {units} units");
+        sums = [sums[0] + length, sums[1] + best];
+    }
+    assert!(sums[0] <= 1.01 * sums[1], "in all {:.1} mm, by LKH {:.1} mm", sums[0], sums[1]);
 }

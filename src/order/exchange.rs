@@ -23,7 +23,7 @@ use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
 /// The greatest number of steps in one exchange, each of which changes two more moves.
-const STEPS: usize = 2;
+const STEPS: usize = 3;
 
 /// One step of an exchange: at which legs the tour is cut after the first cut, and how its parts
 /// are joined anew.
@@ -288,11 +288,12 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     }
 
     /// Returns the stations to which a new move from `station` may lead: [`Index::NONE`] for the
-    /// gap, if `by_gap`, then `station` itself, then its neighbours, and last, if `by_gap`, the
-    /// anchor.
+    /// gap, if `by_gap`, then `station` itself, if several legs begin there, then its neighbours,
+    /// and last, if `by_gap`, the anchor.
     pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
-        let own = [I::NONE, station].into_iter().skip(usize::from(!by_gap));
-        let near = own.chain(self.neighbours.of(station));
+        let gap = by_gap.then_some(I::NONE).into_iter();
+        let own = self.legs_from(station).nth(1).map(|_| station);
+        let near = gap.chain(own).chain(self.neighbours.of(station));
         #[cfg(feature = "early-ink")]
         let near = near.chain(self.network.anchor().filter(|_| by_gap));
         near

@@ -3,19 +3,23 @@
 //! Several first tours are made. Each is shortened until neither an exchange of moves nor a
 //! reversal of strokes helps any more, and the shortest tour is kept. The first tours are: the tour
 //! of the matched moves, part by part; the tour of the same moves after they were changed to join
-//! the parts; and, where each part is one stroke, as in hatching and lettering, the tours that
-//! start at each corner of the page and always take the nearest part next.
+//! the parts; and, where each part is one stroke, as in hatching and lettering, the shortest of the
+//! tours that start at a corner of the page and always take the nearest part next.
 //!
 //! Then lifts are given their cost. Four moves near each other are changed at random (a kick), the
-//! exchanges are tried again around them, and everything is undone unless the result costs no more:
-//! a tour never gets worse. The same budget gives the same tour on every machine. After Martin,
-//! Otto and Felten, "Large-step Markov chains for the traveling salesman problem" (1991).
+//! exchanges are tried again around them, and everything is undone if the result costs too much.
+//! Where the budget is known, a result may at first cost up to a mean move more, and less and less
+//! as the budget is used up (annealing), which finds tours that cannot be reached otherwise. The
+//! same budget gives the same tour on every machine, and it is never worse than the first tours.
+//! After Martin, Otto and Felten, "Large-step Markov chains for the traveling salesman problem"
+//! (1991).
 //!
-//! With [`Effort::Units`] the kicks share a fixed budget, also among the first tours. With
-//! [`Effort::Auto`] the work ends where it no longer pays. What is gained is compared with what was
-//! spent, over the last eighth of a second of counted work ([`TimeModel::units_per_second`]), not
-//! kick by kick: most kicks gain nothing, and hundreds of them are needed to see a rate. A further
-//! first tour is made only if it takes so little work that it may pay, too.
+//! With [`Effort::Units`] the budget is fixed. With [`Effort::Auto`] it is as large as annealing
+//! needs, if that pays. Otherwise no result may cost more, and the work ends where it no longer
+//! pays. What is gained is compared with what was spent, over the last eighth of a second of
+//! counted work ([`TimeModel::units_per_second`]), not kick by kick: most kicks gain nothing, and
+//! hundreds of them are needed to see a rate. A further first tour is made only if it takes so
+//! little work that it may pay, too.
 
 use super::euler::Unused;
 use super::exchange::Exchanges;
@@ -39,8 +43,9 @@ const KICK_REACH: u32 = 6;
 const PATIENCE: u32 = 50;
 /// The directions of the strokes are improved after each this many kicks.
 const KICKS_BETWEEN_TURNS: u32 = 64;
-/// Percentage of a fixed budget that is spent on the first tours, of which the best gets the rest.
-const FIRST_TOURS_PERCENT: u64 = 48;
+/// The part of a fixed budget that may be spent on each of the three first tours. What is left is
+/// spent on the best of them.
+const FIRST_TOUR_SHARE: u64 = 12;
 /// With [`Effort::Auto`], the gain is compared with the work after each such part of a second.
 const WINDOWS_PER_SECOND: u64 = 8;
 /// Where a tour has few moves, the gain is compared with the work as soon as each move had this
@@ -50,9 +55,17 @@ const WINDOW_UNITS_PER_MOVE: u64 = 800;
 /// time in which the pen travels, or of a second. A further one seldom saves more.
 const FIRST_TOUR_PART: u64 = 256;
 
+/// With [`Effort::Auto`], annealing has this many units of work for each move.
+const ANNEALING_UNITS_PER_MOVE: u64 = 7000;
+/// The part of its length by which annealing makes a tour shorter at least, as measured: it pays if
+/// that saves more time than the work takes.
+const ANNEALING_PART: u64 = 32;
+/// The moves that a kick changes while it anneals are at most this many moves apart.
+const ANNEALING_REACH: u32 = 20;
+
 /// The seed of the kicks' random numbers. It must not be 0; on a dozen drawings this one was no
 /// worse than others.
-const SEED: u32 = 23_757;
+const SEED: u32 = 2;
 
 /// A tour to be improved, and the limits for it.
 pub(super) struct Tour<'t, I> {
@@ -96,13 +109,10 @@ pub(super) fn improve<I: Index>(
     }
     let neighbours = Neighbours::new(network, per_station, &mut scratch, work_budget)?;
     let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
-    let (first, last) = match effort {
-        Effort::Auto(time_model) => (Until::Exchanged(time_model), Until::Unpaid(time_model)),
+    let first = match effort {
+        Effort::Auto(time_model) => Until::Exchanged(time_model),
         Effort::Units(units) => {
-            let budget = u64::from(moves) * u64::from(units);
-            let first_tours = if strokes_only { 2 + CORNERS.len() as u64 } else { 2 };
-            let share = budget * FIRST_TOURS_PERCENT / 100 / first_tours;
-            (Until::Spent(share), Until::Spent(budget - first_tours * share))
+            Until::Spent(u64::from(moves) * u64::from(units) / FIRST_TOUR_SHARE)
         }
     };
     let cycle: &mut [Leg<I>] = scratch.take(legs)?;
@@ -115,6 +125,7 @@ pub(super) fn improve<I: Index>(
         cost: u64::MAX,
         route,
         kicks: Kicks { random: SEED },
+        spent: 0,
     };
     best.restore(cycle);
     let mut pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
@@ -129,14 +140,31 @@ pub(super) fn improve<I: Index>(
         for mate in mate.iter_mut().filter(|mate| **mate != I::NONE) {
             *mate = even_part();
         }
-        for corner in CORNERS {
+        let mut shortest = (u64::MAX, None);
+        // With an anchor, they all start there.
+        let starts = if network.anchor().is_some() { 1 } else { CORNERS.len() };
+        for corner in CORNERS.into_iter().take(starts) {
             best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
-            let pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
-            if network.anchor().is_some() || !pays {
-                break;
+            let (route, _) = cycle.split_at(best.route.len());
+            let length = route_moves(network, route, open).sum();
+            if length < shortest.0 {
+                shortest = (length, Some(corner));
             }
         }
+        best.follow(mate, None, shortest.1, cycle, scratch.reborrow(), work_budget)?;
+        best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
     }
+    let annealing = u64::from(moves) * ANNEALING_UNITS_PER_MOVE;
+    let last = match effort {
+        Effort::Auto(time_model) if best.pays(annealing, ANNEALING_PART, time_model, best.cost) => {
+            Until::Annealed(annealing)
+        }
+        Effort::Auto(time_model) => Until::Unpaid(time_model),
+        Effort::Units(units) => {
+            let budget = u64::from(moves) * u64::from(units);
+            Until::Annealed(budget.saturating_sub(best.spent))
+        }
+    };
     // Lifts get their cost only now: with a cost from the start, the exchanges that shorten the
     // moves would be rejected.
     (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
@@ -148,10 +176,13 @@ pub(super) fn improve<I: Index>(
 /// When the work on a tour ends.
 #[derive(Clone, Copy)]
 enum Until {
-    /// When this many units of work are spent.
+    /// When exchanges alone find nothing better any more, but at the latest when this many units of
+    /// work are spent. No kick is made.
     Spent(u64),
     /// When exchanges alone find nothing better any more. No kick is made.
     Exchanged(TimeModel),
+    /// When this many units of work are spent. A kick may make the tour longer, by less and less.
+    Annealed(u64),
     /// When the kicks save less time than they take.
     Unpaid(TimeModel),
 }
@@ -160,7 +191,7 @@ impl Until {
     /// Returns the units of work that may be spent.
     fn budget(self) -> u64 {
         // Work without a limit ends by itself long before this number of units.
-        if let Self::Spent(units) = self { units } else { u64::MAX >> 1 }
+        if let Self::Spent(units) | Self::Annealed(units) = self { units } else { u64::MAX >> 1 }
     }
 }
 
@@ -194,6 +225,8 @@ struct Best<'b, 'a, I> {
     route: &'b mut [Leg<I>],
     /// Gives the random numbers of the kicks. They continue from one first tour to the next.
     kicks: Kicks,
+    /// The units of work that were spent on exchanges before the kicks, for all tours.
+    spent: u64,
 }
 
 impl<I: Index> Best<'_, '_, I> {
@@ -259,18 +292,20 @@ impl<I: Index> Best<'_, '_, I> {
         work_budget.grant(until.budget());
         shorten(&mut tour, choices, work_budget)?;
         let mut pays = true;
-        let mut window = None;
+        let (mut window, mut hottest, mut reach) = (None, 0, KICK_REACH);
+        let spent = until.budget() - work_budget.left();
         match until {
-            Until::Spent(_) => {}
-            Until::Unpaid(time_model) => window = Some(self.window(time_model, tour.cost())),
+            Until::Spent(_) => work_budget.grant(0),
             Until::Exchanged(time_model) => {
-                let spent = until.budget() - work_budget.left();
-                let second = u64::from(time_model.units_per_second).max(1);
-                let parts = spent.saturating_mul(FIRST_TOUR_PART) / second;
-                pays = parts.saturating_mul(self.rate(time_model, tour.cost())) <= tour.cost();
+                pays = self.pays(spent, FIRST_TOUR_PART, time_model, tour.cost());
                 work_budget.grant(0);
             }
+            Until::Annealed(_) => {
+                (hottest, reach) = (self.mean_move(tour.cost()), ANNEALING_REACH);
+            }
+            Until::Unpaid(time_model) => window = Some(self.window(time_model, tour.cost())),
         }
+        self.spent += spent;
         let patience = PATIENCE.saturating_mul(self.moves);
         let kicks = &mut self.kicks;
         let mut in_vain = 0;
@@ -280,7 +315,10 @@ impl<I: Index> Best<'_, '_, I> {
             if in_vain >= patience || work_budget.is_over() {
                 break;
             }
-            let mut gain = kicks.kick(&mut tour, work_budget)?;
+            // Of 256 parts of the budget; the mean length of a move is below 2^31.
+            let parts_left = work_budget.left() / (until.budget() / 256 + 1);
+            let heat = ((hottest * parts_left) >> 8) as u32;
+            let mut gain = kicks.kick(&mut tour, reach, heat, work_budget)?;
             if count % KICKS_BETWEEN_TURNS == 0 {
                 gain += shorten(&mut tour, choices, work_budget)?;
             }
@@ -301,12 +339,25 @@ impl<I: Index> Best<'_, '_, I> {
         Ok(pays)
     }
 
+    /// Whether so many units of work save more time than they take, if they make a tour that costs
+    /// `cost` shorter by one of so many parts.
+    fn pays(&self, units: u64, parts: u64, time_model: TimeModel, cost: u64) -> bool {
+        let second = u64::from(time_model.units_per_second).max(1);
+        let seconds = units.saturating_mul(parts) / second;
+        seconds.saturating_mul(self.rate(time_model, cost)) <= cost
+    }
+
+    /// Returns the mean length of a move in a tour that costs `cost`, in 1/256 steps.
+    fn mean_move(&self, cost: u64) -> u64 {
+        (cost / u64::from(self.moves.max(1))).saturating_sub(self.lift_cost.into())
+    }
+
     /// Returns by how much a saving of one second shortens a tour that costs `cost`, in 1/256
     /// steps. A pen that accelerates all along a move of length `l` takes `2 √(l / a)` for it, of
     /// which the derivative is `1 / √(a l)`; on a long move it is one over the speed.
-    #[inline(never)] // Its two callers share one copy of the code.
+    #[inline(never)] // Its callers share one copy of the code.
     fn rate(&self, time_model: TimeModel, cost: u64) -> u64 {
-        let mean = (cost / u64::from(self.moves.max(1))).saturating_sub(self.lift_cost.into());
+        let mean = self.mean_move(cost);
         // The acceleration is below 2^27 and the length of a move below 2^31.
         let accelerating = 16 * u64::from(root(u64::from(time_model.acceleration) * mean));
         accelerating.min(u64::from(time_model.speed) << 8).max(1)
@@ -400,10 +451,13 @@ struct Kicks {
 
 impl Kicks {
     /// Changes four moves near each other at random (a double bridge), and then exchanges moves
-    /// around them. The result is kept if it costs no more than before. Returns the gain.
+    /// around them. The moves are at most `reach` moves apart. The result is kept if it costs no
+    /// more than before, or by chance if it costs less than `heat` more. Returns the gain.
     fn kick<I: Index>(
         &mut self,
         tour: &mut Exchanges<'_, '_, I>,
+        reach: u32,
+        heat: u32,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<i64, OrderError> {
         tour.cycle.settle();
@@ -411,7 +465,7 @@ impl Kicks {
         let mut at = tour.cycle.leg(begin);
         let mut cuts = [at; 4];
         for cut in &mut cuts {
-            for _ in 0..=self.below(KICK_REACH) {
+            for _ in 0..=self.below(reach) {
                 let Some(leg) = next_move(tour, at, work_budget)? else {
                     return Ok(0);
                 };
@@ -434,10 +488,11 @@ impl Kicks {
         work_budget.work(8 + moved as u32 / 32)?;
         tour.wake(&[a, b.flipped(), c, d.flipped(), e, f.flipped(), g, h.flipped()]);
         let gain = tour.exchange_all(false, work_budget)? - loss;
-        if gain < 0 {
+        if gain < -i64::from(self.below(heat)) {
             tour.cycle.take_back(0);
+            return Ok(0);
         }
-        Ok(gain.max(0))
+        Ok(gain)
     }
 
     /// Returns a random number below `limit` (Marsaglia's xorshift).

@@ -160,10 +160,6 @@ impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
     ) -> Result<Outcome, OrderError> {
         work_budget.work(1)?;
         let tour = self.tour;
-        let hand = tour.left(hand, second.far, third);
-        if hand == 0 {
-            return Ok(Outcome::TooFar);
-        }
         for leg in tour.legs_from(third) {
             let before = self.before(leg);
             // Only some positions of the third cut keep the tour in one piece, and it must differ
@@ -175,6 +171,11 @@ impl<'e, 's, 'a, I: Index> StepSearch<'e, 's, 'a, I> {
                 || before.legs_between == second.legs_between
             {
                 continue;
+            }
+            // Most candidates are refused by their position, for which no distance is needed.
+            let hand = tour.left(hand, second.far, third);
+            if hand == 0 {
+                return Ok(Outcome::TooFar);
             }
             work_budget.work(2)?;
             let cut = self.cut(leg, before);
