@@ -50,8 +50,8 @@ pub mod fuzz_targets;
 pub mod gear_train;
 pub mod spiral;
 pub mod step_edges;
-pub mod usb_bus;
-#[path = "../../src/boards/pico/usb/endpoints.rs"]
-pub mod usb_endpoints;
+pub mod usb_controller;
+#[path = "../../src/boards/pico/usb/driver/mod.rs"]
+pub mod usb_driver;
 pub mod usb_host;
 pub mod usb_port;

@@ -4,18 +4,19 @@
 //! It acts as USB 2.0 wants, or breaks transfers off, or sends what no host sends; then it checks
 //! only what the device still owes it. Three things are left out:
 //!
-//! - `rp2040-hal` takes back the answer to a broken-off request when it sees the next SETUP packet.
-//!   A host that asks before gets the old answer, and may lose the data that it sends. Nothing is
+//! - The driver takes back the answer to a broken-off request when it sees the next SETUP packet. A
+//!   host that asks before gets the old answer, and may lose the data that it sends. Nothing is
 //!   promised of such a transfer.
 //! - A host that breaks off a request behind which packets begin anew with DATA0 does not know
 //!   whether it was carried out. Behind each such request one packet may be lost each way, but no
 //!   more, and none is repeated.
-//! - `rp2040-hal` keeps a SETUP packet that it has not seen when the host resets the bus. So that
-//!   request is still carried out behind the reset, and may configure the device or open the port.
+//! - The driver keeps a SETUP packet that it has not seen when the host resets the bus, if the
+//!   device had no address, because that packet may have come behind the reset. So that request is
+//!   still carried out, and may configure the device or open the port.
 
-use crate::usb_bus::{Answer, Handshake};
-use crate::usb_endpoints::Buffers;
-use crate::usb_port::{MANUFACTURER, PACKET, PRODUCT, Port, VENDOR_AND_PRODUCT};
+use crate::usb_controller::{Answer, Handshake};
+use crate::usb_driver::PACKET;
+use crate::usb_port::{MANUFACTURER, PRODUCT, Port, VENDOR_AND_PRODUCT};
 
 /// The number of endpoints in each direction.
 const ENDPOINTS: usize = 16;
@@ -160,12 +161,12 @@ impl<'p> Host<'p> {
     /// nothing else.
     pub fn reset(&mut self) {
         self.is_suspended = false;
-        let had_setup = self.port.bus().has_setup();
+        let keeps_setup = self.port.bus().has_setup() && self.port.bus().address() == 0;
         self.port.bus().reset_bus();
         self.transfer = Transfer::NONE;
         self.settle();
         let is_anew = !self.port.is_up() && !self.port.is_open();
-        assert!(is_anew || had_setup, "a reset has left the port open");
+        assert!(is_anew || keeps_setup, "a reset has left the port open");
         let lost = self.accepted.len() - self.arrived();
         assert!(lost <= PACKET, "{lost} bytes were lost by a reset");
         self.accepted = self.port.waiting();

@@ -1,13 +1,13 @@
 //! The Pico's serial port by USB, as its firmware uses the crates `usb-device` and `usbd-serial`,
-//! on a bus made of plain memory.
+//! on a controller made of plain memory.
 //!
 //! [`Port::serve`] does what the function of that name in `src/boards/pico/usb.rs` does, with the
-//! very code that the firmware has for the buffers of the endpoints (`usb_endpoints`). What is
-//! left out belongs to the chip or to the protocol: the errata E5 and E15, the main loop's queues
-//! and messages, and real-time bytes.
+//! very driver that the firmware has ([`usb_driver`](crate::usb_driver)). What is left out belongs
+//! to the chip or to the protocol: the errata E5 and E15, the main loop's queues and messages, and
+//! real-time bytes.
 
-use crate::usb_bus::Bus;
-use crate::usb_endpoints::{self, DataToggles};
+use crate::usb_controller::UsbController;
+use crate::usb_driver::{Buffers, Bus, DataToggles, PACKET};
 use std::collections::VecDeque;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{
@@ -21,8 +21,6 @@ pub const VENDOR_AND_PRODUCT: [u16; 2] = [0x1209, 0x0001];
 pub const MANUFACTURER: &str = "penup";
 /// The product's name.
 pub const PRODUCT: &str = "penup pen plotter";
-/// The greatest size of a packet, in bytes.
-pub const PACKET: usize = 64;
 /// The size of a sent packet, so that no empty one is needed behind it.
 const SENT_PACKET: usize = PACKET - 1;
 /// The greatest number of bytes that wait to be sent.
@@ -32,9 +30,10 @@ const MOST_WAITING: usize = 512;
 
 /// The device and its serial port.
 pub struct Port<'b> {
-    device: UsbDevice<'b, Bus>,
-    class: CdcAcmClass<'b, Bus>,
-    toggles: DataToggles<Bus>,
+    device: UsbDevice<'b, Bus<UsbController>>,
+    class: CdcAcmClass<'b, Bus<UsbController>>,
+    toggles: DataToggles<UsbController>,
+    buffers: Buffers<UsbController>,
     is_up: bool,
     is_open: bool,
     /// Received bytes for which the line's queue has had no room yet.
@@ -52,7 +51,7 @@ pub struct Port<'b> {
 
 impl<'b> Port<'b> {
     /// Connects the device to the host, with this serial number.
-    pub fn new(bus: &'b UsbBusAllocator<Bus>, number: &'b str) -> Self {
+    pub fn new(bus: &'b UsbBusAllocator<Bus<UsbController>>, number: &'b str) -> Self {
         let class = CdcAcmClass::new(bus, PACKET as u16);
         let strings = StringDescriptors::default()
             .manufacturer(MANUFACTURER)
@@ -65,12 +64,13 @@ impl<'b> Port<'b> {
             .and_then(|builder| builder.max_packet_size_0(64))
             .expect("the strings fit")
             .build();
-        let buffers = device.bus().clone();
-        let endpoints = [class.write_ep().address(), class.read_ep().address()];
+        device.bus().connect();
+        let buffers = Buffers(device.bus().controller().clone());
         Self {
             device,
             class,
-            toggles: DataToggles::new(buffers, endpoints),
+            toggles: DataToggles(buffers.clone()),
+            buffers,
             is_up: false,
             is_open: false,
             waiting: VecDeque::new(),
@@ -82,9 +82,9 @@ impl<'b> Port<'b> {
         }
     }
 
-    /// The bus, at whose other end is the host.
-    pub fn bus(&self) -> &Bus {
-        self.device.bus()
+    /// The controller, at whose other end is the host.
+    pub fn bus(&self) -> &UsbController {
+        &self.buffers.0
     }
 
     /// Whether the host has configured the device.
@@ -115,9 +115,10 @@ impl<'b> Port<'b> {
 
     /// Does all the work of the port.
     pub fn serve(&mut self) {
-        let unread = usb_endpoints::unread(self.bus());
+        let unread = self.buffers.unread();
+        self.device.bus().look();
         self.device.poll(&mut [&mut self.toggles, &mut self.class]);
-        usb_endpoints::refuse(self.bus(), unread);
+        self.buffers.refuse(unread);
         self.follow_state();
         self.follow_port();
         self.receive();
@@ -143,7 +144,7 @@ impl<'b> Port<'b> {
         self.is_open = is_open;
         if !is_open {
             self.forget_sent();
-            if usb_endpoints::take_back(self.bus(), self.class.write_ep().address()) {
+            if self.buffers.take_back() {
                 self.sent.pop();
             }
         }
@@ -162,7 +163,7 @@ impl<'b> Port<'b> {
                 self.received.extend(self.waiting.drain(..));
             }
             if MOST_WAITING - self.waiting.len() < PACKET + 2 {
-                return usb_endpoints::leave(self.bus(), self.class.read_ep().address());
+                return self.buffers.leave();
             }
             let mut packet = [0; PACKET];
             let Ok(count) = self.class.read_packet(&mut packet) else { return };

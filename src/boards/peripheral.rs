@@ -15,6 +15,12 @@ impl Offset {
         Self(bytes)
     }
 
+    /// The word of this number, counted from the first one. A peripheral has 1024 of them.
+    #[cfg_attr(not(feature = "pico"), expect(dead_code, reason = "the memory of one chip"))]
+    pub const fn of_word(number: usize) -> Self {
+        Self(number % 1024 * 4)
+    }
+
     /// The data register of a port for these of its eight pins: reading gives the levels of these
     /// pins, and writing changes no other ones. Bits 2 to 9 of its address are the pins.
     #[cfg_attr(not(feature = "lm3s6965"), expect(dead_code, reason = "the ports of one chip"))]

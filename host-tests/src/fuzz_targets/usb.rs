@@ -1,8 +1,9 @@
 //! Packets of a USB host, in any order.
 
-use crate::usb_bus::Bus;
+use crate::usb_controller::UsbController;
+use crate::usb_driver::{Bus, PACKET};
 use crate::usb_host::{FROM_PORT, Host};
-use crate::usb_port::{PACKET, Port};
+use crate::usb_port::Port;
 use usb_device::bus::UsbBusAllocator;
 
 /// Requests that real hosts make, and some that they might make.
@@ -53,7 +54,7 @@ const REQUESTS: [[u8; 8]; 16] = [
 pub fn fuzz(input: &[u8]) {
     let Some((first, rest)) = input.split_first() else { return };
     let number: String = (0..first % 64).map(|digit| char::from(b'0' + digit % 10)).collect();
-    let bus = UsbBusAllocator::new(Bus::default());
+    let bus = UsbBusAllocator::new(Bus::new(UsbController::default()));
     let mut host = Host::new(Port::new(&bus, &number));
     let mut rest = rest.iter().copied();
     while let Some(action) = rest.next() {

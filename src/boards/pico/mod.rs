@@ -109,7 +109,9 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
         &mut chip.RESETS,
         &mut watchdog,
     );
-    let Ok(clocks) = clocks else { fault::stop("the clocks do not start") };
+    if clocks.is_err() {
+        fault::stop("the clocks do not start");
+    }
     registers::restart(registers::reset::TIMER);
     let sio = Sio::new(chip.SIO);
     // It takes the pins out of reset.
@@ -120,10 +122,9 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let mut flash = flash::Flash::new();
     let lines = ports::set_up();
     let uart = serial::set_up(&mut core.NVIC);
-    let controller = (chip.USBCTRL_REGS, chip.USBCTRL_DPRAM);
     static NUMBER: StaticCell<heapless::String<16>> = StaticCell::new();
     let number = once(NUMBER.try_init(flash.number()));
-    let usb = usb::set_up(&mut core.NVIC, controller, clocks.usb_clock, &mut chip.RESETS, number);
+    let usb = usb::set_up(&mut core.NVIC, number);
     let ports = Ports::new(lines, uart, usb);
     pins::hand_over();
     serial::open();

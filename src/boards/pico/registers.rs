@@ -133,12 +133,11 @@ pub const PIO0: Registers<pac::pio0::RegisterBlock> = unsafe { Registers::at(pac
 /// The core's own registers: the masks of the interrupts, and the address of the vector table. Used
 /// by `critical`.
 pub const PPB: Guarded<pac::ppb::RegisterBlock> = Guarded(unsafe { Registers::at(pac::PPB::PTR) });
-/// The USB controller. Used by `usb` in addition to its driver.
+/// The USB controller. Used by `usb`.
 pub const USB: Registers<pac::usbctrl_regs::RegisterBlock> =
     unsafe { Registers::at(pac::USBCTRL_REGS::PTR) };
-/// The USB controller's memory. Used by `usb`, where its driver has no function.
-pub const USB_MEMORY: Registers<pac::usbctrl_dpram::RegisterBlock> =
-    unsafe { Registers::at(pac::USBCTRL_DPRAM::PTR) };
+/// The USB controller's memory, of 1024 words, which Rust has for nothing else. Used by `usb`.
+pub const USB_MEMORY: Peripheral = unsafe { Peripheral::at(0x5010_0000) };
 /// The serial line to the flash chip. Used by `flash`, while nothing else reads the flash.
 pub const SSI: Guarded<pac::xip_ssi::RegisterBlock> =
     Guarded(unsafe { Registers::at(pac::XIP_SSI::PTR) });
@@ -159,6 +158,8 @@ pub mod reset {
     pub const TIMER: u32 = 1 << 21;
     /// The bit of the first UART.
     pub const UART0: u32 = 1 << 22;
+    /// The bit of the USB controller.
+    pub const USBCTRL: u32 = 1 << 24;
 }
 
 /// Resets the peripherals of `bits`, so that their registers have their initial values, and waits

@@ -13,12 +13,13 @@
 //! rest of a line that it has not ended, but nobody is told. A program that opens the port (DTR
 //! rises) gets a greeting, which goes only to it: see [`take_opened`].
 //!
-//! Two of the chip's errata are worked around: see [`connection`] for E5, which takes GPIO 15 for a
-//! millisecond when a host resets the bus, and [`frame`] for E15. What the crates leave undone at
-//! the buffers of the endpoints is done in [`endpoints`].
+//! The controller is driven by [`driver`]. Two of the chip's errata are worked around: see
+//! [`connection`] for E5, which takes GPIO 15 for a millisecond when a host resets the bus, and
+//! [`frame`] for E15. E2 does not matter, because no endpoint is aborted, nor do E3 and E4, which
+//! are those of a host.
 
 mod connection;
-mod endpoints;
+mod driver;
 mod frame;
 
 use core::sync::atomic::{AtomicBool, Ordering};
@@ -27,9 +28,7 @@ use cortex_m::peripheral::NVIC;
 use heapless::{Deque, Vec};
 use penup::byte_queue::{ByteQueue, Consumer, Producer};
 use penup::protocol::{DAMAGED, RealTime};
-use rp2040_hal::clocks::UsbClock;
-use rp2040_hal::pac::{Interrupt, RESETS, USBCTRL_DPRAM, USBCTRL_REGS, interrupt};
-use rp2040_hal::usb::UsbBus;
+use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
 use usb_device::bus::UsbBusAllocator;
 use usb_device::device::{
@@ -38,20 +37,19 @@ use usb_device::device::{
 use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 use self::connection::Connection;
-use self::endpoints::{Buffers, DataToggles};
+use self::driver::{Buffers, Bus, Controller, DataToggles, PACKET, Register};
 use self::frame::Frame;
 pub use self::frame::forget as forget_frame;
 use super::ports::{self, Port, ReceiveSide};
-use super::registers::{Get, Put, USB, USB_MEMORY};
+use super::registers::{self, Get, Put, USB, USB_MEMORY};
 use super::{clock, critical, divider};
 use crate::boards::fault::once;
 use crate::boards::handler::Owned;
+use crate::boards::peripheral::Offset;
 
 /// The USB number for tests and for projects without a number of their own:
 /// <https://pid.codes/1209/0001>.
 const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
-/// The greatest size of a packet, in bytes.
-const PACKET: usize = 64;
 /// The size of a sent packet. After a full packet, an empty one would be needed for the host to see
 /// the end.
 const SENT_PACKET: usize = PACKET - 1;
@@ -73,16 +71,10 @@ const TOUCH_RATE: u32 = 1200;
 /// The bit of the controller's interrupts for a reset of the bus.
 const BUS_RESET: u32 = 1 << 12;
 
-/// Cycles of the core after which a packet of 64 bytes that has already begun is over: 60
-/// microseconds.
-const PACKET_CYCLES: u32 = 7500;
-/// In the controller's status, the bit for a request of the host's that was not read.
-const SETUP_RECEIVED: u32 = 1 << 17;
-/// Both directions of endpoint 0, in the register that arms its stalls.
-const BOTH_DIRECTIONS: u32 = 0b11;
-
-/// The USB bus of the driver, which its other parts borrow.
-static BUS: StaticCell<UsbBusAllocator<UsbBus>> = StaticCell::new();
+/// The buffers of the controller, which the driver has too.
+const BUFFERS: Buffers<Chip> = Buffers(Chip);
+/// The driver of the controller, which `usb-device` borrows.
+static BUS: StaticCell<UsbBusAllocator<Bus<Chip>>> = StaticCell::new();
 /// The queue of bytes to send.
 static QUEUE: StaticCell<ByteQueue<SENT_SLOTS>> = StaticCell::new();
 /// The device, which belongs to the USB handler.
@@ -103,12 +95,12 @@ static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
 /// The USB device: the serial line and what it needs of the chip.
 struct Device {
-    /// The USB device of the driver.
-    device: UsbDevice<'static, UsbBus>,
-    /// The serial port of the driver.
-    class: CdcAcmClass<'static, UsbBus>,
-    /// Begins packets anew with DATA0 where the driver does not.
-    toggles: DataToggles<Controller>,
+    /// The USB device of `usb-device`.
+    device: UsbDevice<'static, Bus<Chip>>,
+    /// The serial port of `usbd-serial`.
+    class: CdcAcmClass<'static, Bus<Chip>>,
+    /// Begins packets anew with DATA0 where `usb-device` does not.
+    toggles: DataToggles<Chip>,
     /// Whether the host has configured the device, so that bytes can be exchanged.
     is_up: bool,
     /// Whether a program has the port open, according to DTR.
@@ -142,41 +134,30 @@ pub struct Sender {
     is_cut: bool,
 }
 
-/// Connects the device to the host, with this serial number. `ports` must be set up, and the pins
-/// must be out of reset.
+/// Connects the device to the host, with this serial number. `ports` must be set up, the clock of
+/// the controller must run at 48 MHz, and the pins must be out of reset.
 ///
 /// # Panics
 /// Never: the strings fit.
-pub fn set_up(
-    nvic: &mut NVIC,
-    controller: (USBCTRL_REGS, USBCTRL_DPRAM),
-    clock: UsbClock,
-    resets: &mut RESETS,
-    number: &'static str,
-) -> Sender {
-    const POWERED: bool = true; // USB powers the Pico; the pin that would show it is in use.
-    let bus = once(BUS.try_init(UsbBusAllocator::new(UsbBus::new(
-        controller.0,
-        controller.1,
-        clock,
-        POWERED,
-        resets,
-    ))));
+pub fn set_up(nvic: &mut NVIC, number: &'static str) -> Sender {
+    registers::restart(registers::reset::USBCTRL);
+    let bus = once(BUS.try_init(UsbBusAllocator::new(Bus::new(Chip))));
     let bus: &UsbBusAllocator<_> = bus;
     let class = CdcAcmClass::new(bus, PACKET as u16);
-    let endpoints = [class.write_ep().address(), class.read_ep().address()];
     let strings = StringDescriptors::default()
         .manufacturer("penup")
         .product("penup pen plotter")
         .serial_number(number);
     let builder = UsbDeviceBuilder::new(bus, VENDOR_AND_PRODUCT).device_class(USB_CLASS_CDC);
     let builder = builder.strings(&[strings]).and_then(|builder| builder.max_packet_size_0(64));
+    let device = builder.map(UsbDeviceBuilder::build);
     let (sent, to_send) = once(QUEUE.try_init(ByteQueue::new())).split();
-    if let Ok(builder) = builder {
+    if let Ok(device) = device {
+        device.bus().connect();
         let device = Device {
-            device: builder.build(),
+            device,
             class,
-            toggles: DataToggles::new(Controller, endpoints),
+            toggles: DataToggles(BUFFERS),
             is_up: false,
             is_open: false,
             connection: Connection::new(),
@@ -288,13 +269,9 @@ fn serve() {
     if let (Some(device), Some(receive_side)) = unsafe { (DEVICE.get(), ports::receive_side()) } {
         device.frame.follow();
         // This must be read before polling, which clears it.
-        let took = endpoints::is_finished(&Controller, device.class.write_ep().address());
+        let took = BUFFERS.is_taken();
         if device.connection.is_ready() {
-            // The driver sees only interrupts that are not masked.
-            device.await_bus(false);
-            let unread = endpoints::unread(&Controller);
-            device.device.poll(&mut [&mut device.toggles, &mut device.class]);
-            endpoints::refuse(&Controller, unread);
+            device.poll();
         }
         device.await_bus(USB.intr().get() & BUS_RESET != 0);
         device.follow_state();
@@ -309,6 +286,19 @@ fn serve() {
 }
 
 impl Device {
+    /// Lets `usb-device` see what has happened on the bus.
+    fn poll(&mut self) {
+        let unread = BUFFERS.unread();
+        self.device.bus().look();
+        // The driver never reports that the bus is suspended. Where the compiler sees that here, it
+        // leaves out a panic of `usb-device`.
+        if self.device.state() == UsbDeviceState::Suspend {
+            return;
+        }
+        self.device.poll(&mut [&mut self.toggles, &mut self.class]);
+        BUFFERS.refuse(unread);
+    }
+
     /// Masks or unmasks the interrupt of a bus reset. While the host resets the bus, for some 10 to
     /// 50 ms or for as long as the host has no power, the interrupt would come again at once. So it
     /// is masked, and the main loop checks instead.
@@ -348,7 +338,7 @@ impl Device {
         }
         HOST_IS_GONE.store(true, Ordering::Relaxed);
         self.forget_sent();
-        endpoints::take_back(&Controller, self.class.write_ep().address());
+        BUFFERS.take_back();
         if self.is_in_line {
             // The unfinished line is refused, and the next one is a separate line. There is room,
             // because packets are read only while there are two slots more than they need.
@@ -401,7 +391,7 @@ impl Device {
                 self.waiting.pop_front();
             }
             if self.waiting.capacity() - self.waiting.len() < PACKET + 2 {
-                return endpoints::leave(&Controller, self.class.read_ep().address());
+                return BUFFERS.leave();
             }
             let mut packet = [0; PACKET];
             let Ok(count) = self.class.read_packet(&mut packet) else { return };
@@ -447,40 +437,51 @@ impl Device {
     }
 }
 
-/// The registers of the controller's buffers.
-struct Controller;
+/// The controller of the chip.
+#[derive(Clone, Copy)]
+struct Chip;
 
-impl Buffers for Controller {
-    fn finished(&self) -> u32 {
-        USB.buff_status().get()
+impl Controller for Chip {
+    fn get(&self, register: Register) -> u32 {
+        match register {
+            Register::AddrEndp => USB.addr_endp().get(),
+            Register::MainCtrl => USB.main_ctrl().get(),
+            Register::SieCtrl => USB.sie_ctrl().get(),
+            Register::SieStatus => USB.sie_status().get(),
+            Register::BuffStatus => USB.buff_status().get(),
+            Register::EpStallArm => USB.ep_stall_arm().get(),
+            Register::UsbMuxing => USB.usb_muxing().get(),
+            Register::UsbPwr => USB.usb_pwr().get(),
+            Register::Intr => USB.intr().get(),
+            Register::Inte => USB.inte().get(),
+        }
     }
 
-    fn clear_finished(&self, bits: u32) {
-        USB.buff_status().put(bits); // Written ones clear.
+    fn put(&self, register: Register, bits: u32) {
+        match register {
+            Register::AddrEndp => USB.addr_endp().put(bits),
+            Register::MainCtrl => USB.main_ctrl().put(bits),
+            Register::SieCtrl => USB.sie_ctrl().put(bits),
+            Register::SieStatus => USB.sie_status().put(bits),
+            Register::BuffStatus => USB.buff_status().put(bits),
+            Register::EpStallArm => USB.ep_stall_arm().put(bits),
+            Register::UsbMuxing => USB.usb_muxing().put(bits),
+            Register::UsbPwr => USB.usb_pwr().put(bits),
+            Register::Intr => {} // It can only be read.
+            Register::Inte => USB.inte().put(bits),
+        }
     }
 
-    fn control(&self, buffer: usize) -> u32 {
-        USB_MEMORY.ep_buffer_control(buffer).get()
+    fn word(&self, index: usize) -> u32 {
+        USB_MEMORY.read(Offset::of_word(index))
     }
 
-    fn put_control(&self, buffer: usize, word: u32) {
-        USB_MEMORY.ep_buffer_control(buffer).put(word);
+    fn put_word(&self, index: usize, word: u32) {
+        USB_MEMORY.write(Offset::of_word(index), word);
     }
 
-    fn setup(&self) -> [u32; 2] {
-        [USB_MEMORY.setup_packet_low().get(), USB_MEMORY.setup_packet_high().get()]
-    }
-
-    fn has_setup(&self) -> bool {
-        USB.sie_status().get() & SETUP_RECEIVED != 0
-    }
-
-    fn arm_stall(&self) {
-        USB.ep_stall_arm().set(BOTH_DIRECTIONS);
-    }
-
-    fn wait_for_packet(&self) {
-        cortex_m::asm::delay(PACKET_CYCLES);
+    fn delay(&self, cycles: u32) {
+        cortex_m::asm::delay(cycles);
     }
 }
 

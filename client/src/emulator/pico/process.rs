@@ -13,8 +13,6 @@ use crate::emulator::EmulatorError;
 use crate::emulator::PinChange;
 use crate::emulator::running::{Shared, quitting_with_parent};
 use crate::table::{BoardRow, Pins};
-use base64::Engine as _;
-use base64::prelude::BASE64_STANDARD;
 use object::{Object, ObjectSymbol};
 use std::collections::VecDeque;
 use std::fs;
@@ -25,6 +23,18 @@ use std::sync::mpsc;
 use std::time::Duration;
 
 pub(super) const PROGRAM: &str = "node";
+/// Puts together what comes in several arguments, because a single one may have at most 128 KiB:
+/// the script, and the names and texts of its modules. Each import by name becomes one by a `data:`
+/// URL (RFC 2397), and so does the script.
+const LOADER: &str = "
+    const url = (text) =>
+        'data:text/javascript;base64,' + Buffer.from(text).toString('base64');
+    let [script, ...modules] = process.argv.slice(1, -4);
+    for (; modules.length; modules.splice(0, 2)) {
+        script = script.replace(modules[0], url(modules[1]));
+    }
+    await import(url(script));
+";
 const SCRIPT: &str = include_str!("../pico.mjs");
 /// The modules that the script imports: the name in the import, and the text.
 const MODULES: &[(&str, &str)] = &[
@@ -112,16 +122,6 @@ pub(super) fn function(
     Ok(symbol.address() & !1)
 }
 
-/// Embeds the modules in the script: each import by name becomes one by a `data:` URL (RFC 2397).
-fn script() -> String {
-    let mut script = SCRIPT.to_owned();
-    for (name, text) in MODULES {
-        let address = format!("data:text/javascript;base64,{}", BASE64_STANDARD.encode(text));
-        script = script.replace(name, &address);
-    }
-    script
-}
-
 /// Checks that rp2040js is installed in the version that this program needs.
 pub(super) fn check_version(root: &Path) -> Result<(), EmulatorError> {
     const PROGRAM: &str = "rp2040js";
@@ -144,7 +144,8 @@ pub(super) fn check_version(root: &Path) -> Result<(), EmulatorError> {
 /// Creates the command line of the emulator.
 pub(super) fn command(image: &Path, log_address: u64) -> Command {
     let mut command = quitting_with_parent(PROGRAM);
-    command.args(["--input-type=module", "--eval", &script(), "--"]);
+    command.args(["--input-type=module", "--eval", LOADER, "--", SCRIPT]);
+    command.args(MODULES.iter().flat_map(|(name, text)| [name, text]));
     command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
     command.arg(board());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());

@@ -6,7 +6,8 @@
 // errata: E5 (without 800 us of idle bus after a reset the device does not connect; GPIO 15 can
 // stand in for it), with other devices' packets on a busy bus, and E15 (an IN buffer that becomes
 // available late in a frame may be asked for so late that the hub cuts its acknowledgement off; the
-// controller then hangs until it is reset). Here every such buffer hangs it.
+// controller then hangs until it is reset). Here every such buffer hangs it. So does a program that
+// does what the controller may not bear, as it runs on another clock: see `misuse`.
 //
 // It is longer than 500 lines, because the controller and the host share the state of each
 // transaction.
@@ -35,8 +36,14 @@ const BUFFER_DONE = 1 << 4;
 const FRAME_BEGAN = 1 << 17;
 const CONTROLLER_ON = 1;
 const PULLED_UP = 1 << 16;
+/** Each buffer of endpoint 0 that is done is reported. */
+const REPORTS_0 = 1 << 29;
 const TO_PHY = 1;
 const TO_PAD = 1 << 2;
+/** The program says when the pull-up is on. */
+const SOFT_CONNECT = 1 << 3;
+/** The bus has power, whatever a pin says. */
+const POWERED = 3 << 2;
 /** The bit that overrides it is the next. */
 const DIRECT_PULL_UP = 1 << 1;
 const J = 1 << 2;
@@ -47,6 +54,11 @@ const STALL = 1 << 11;
 const IS_DATA_1 = 1 << 13;
 const FULL = 1 << 15;
 const LENGTH = 0x3ff;
+/** Bits of an endpoint's control word: it is on, reports each buffer, and is of the type bulk. */
+const ENDPOINT_ON = 1 << 31;
+const REPORTS = 1 << 29;
+const TYPE = 3 << 26;
+const BULK = 2 << 26;
 const CONTROLS = 0x80;
 const CONTROLS_END = 0x100;
 const PACKET = 64;
@@ -55,6 +67,9 @@ const PACKET = 64;
 const CRITICAL_FROM = 800 * MICROSECOND;
 const CRITICAL_TO = 998 * MICROSECOND;
 const IDLE_TO_CONNECT = 800 * MICROSECOND;
+/** The other bits of a control word must be there for so long before AVAILABLE (data sheet,
+ * 4.1.2.5.1; the Pico SDK waits as long). */
+const SETTLING = 12 * CYCLE;
 
 const HOST = {
   PLUGS_IN: 1, STOPS: 2, TAKES: 3, SUSPENDS: 4, RESUMES: 5, UNPLUGS: 6, PLUGS_INTO_BUSY: 7,
@@ -94,6 +109,9 @@ export class Usb {
     this.generation = (this.generation ?? 0) + 1;
     chip.usbCtrl = this;
     chip.peripherals[0x50110] = this;
+    // Memory holds anything when the power comes.
+    const random = numbers(0x50100);
+    chip.usbDPRAM.forEach((_, at, memory) => (memory[at] = 256 * random.next().value));
     this.resetController();
     const resets = chip.peripherals[0x4000c];
     const write = resets.writeUint32.bind(resets);
@@ -107,6 +125,7 @@ export class Usb {
     Object.assign(this, {
       address: 0, main: 0, sie: 0, status: 0, buffers: 0, stallArm: 0, muxing: 0, power: 0,
       direct: 0, override: 0, isStepDue: false, available: 0,
+      controls: new Uint32Array(32), settledAt: new Float64Array(32),
       enabled: 0, forced: 0, frame: 0, frameBegan: false, isHung: false, raised: false,
     });
     this.isFramed = false;
@@ -132,6 +151,12 @@ export class Usb {
     const { chip } = this;
     const alarm = chip.clock.createAlarm(() => chip === this.chip && work());
     alarm.schedule(Math.ceil(nanos / CYCLE) * CYCLE);
+  }
+
+  /** The program has done what the chip may not bear. */
+  misuse(what) {
+    console.error(`the USB controller may not bear this: ${what}`);
+    this.isHung = true;
   }
 
   // --- The registers ---
@@ -206,9 +231,13 @@ export class Usb {
         if (isNew && this.isPlugged) this.after(MILLISECOND, () => this.enumerate());
         break;
       }
-      // Written ones clear.
-      case REGISTER.STATUS: this.status &= ~value; break;
-      case REGISTER.BUFFERS: this.buffers &= ~value; break;
+      // Written ones clear, and nothing is said about the aliases.
+      case REGISTER.STATUS:
+      case REGISTER.BUFFERS:
+        if (type !== 0) this.misuse('an alias of a register that written ones clear');
+        if (offset === REGISTER.STATUS) this.status &= ~value;
+        else this.buffers &= ~value;
+        break;
       case REGISTER.STALL_ARM: this.stallArm = apply(this.stallArm); break;
       case REGISTER.MUXING:
         this.muxing = apply(this.muxing);
@@ -239,24 +268,62 @@ export class Usb {
     return this.chip.usbDPRAMView.getUint32(this.control(endpoint, isOut), true);
   }
 
+  endpointWord(endpoint, isOut) {
+    return this.chip.usbDPRAMView.getUint32(8 * endpoint + (isOut ? 4 : 0), true);
+  }
+
+  /** Whether an endpoint of the port answers. */
+  isOn(endpoint, isOut) {
+    const word = this.endpointWord(endpoint, isOut);
+    return (word & ENDPOINT_ON) !== 0 && (word & TYPE) === BULK;
+  }
+
   place(endpoint, isOut) {
-    if (endpoint === 0) return 0x100;
-    return this.chip.usbDPRAMView.getUint32(8 * endpoint + (isOut ? 4 : 0), true) & 0xffc0;
+    return endpoint === 0 ? 0x100 : this.endpointWord(endpoint, isOut) & 0xffc0;
   }
 
   finish(endpoint, isOut, word) {
     this.chip.usbDPRAMView.setUint32(this.control(endpoint, isOut), word, true);
-    const bit = 1 << (2 * endpoint + (isOut ? 1 : 0));
-    this.available &= ~bit;
-    this.buffers |= bit;
+    const index = 2 * endpoint + (isOut ? 1 : 0);
+    this.controls[index] = word;
+    this.available &= ~(1 << index);
+    const reports = endpoint ? this.endpointWord(endpoint, isOut) & REPORTS : this.sie & REPORTS_0;
+    if (reports) this.buffers |= 1 << index;
     this.interrupt();
+  }
+
+  /** The program may not write to a buffer that the controller has. */
+  checkPacket(offset) {
+    for (let index = 0; index < 32; index++) {
+      if (!(this.available & (1 << index))) continue;
+      const from = this.place(index >> 1, (index & 1) !== 0);
+      const length = this.controls[index] & LENGTH;
+      if (offset >= from && offset < from + length) this.misuse(`a write to buffer ${index}`);
+    }
+  }
+
+  /** A buffer becomes available some time after the other bits of its control word, and while it
+   * is, only the data toggle and the stall may change. */
+  checkControl(index, before, value) {
+    const changed = value ^ before;
+    if (!(value & AVAILABLE)) {
+      if (changed) this.settledAt[index] = this.now();
+    } else if (before & AVAILABLE) {
+      if (changed & ~(STALL | IS_DATA_1)) this.misuse(`a change of buffer ${index}`);
+    } else if (changed !== AVAILABLE || this.now() - this.settledAt[index] < SETTLING) {
+      this.misuse(`buffer ${index} becomes available too early`);
+    }
   }
 
   /** The chip has written a word of the controller's memory. */
   DPRAMUpdated(offset, value) {
+    if (offset >= CONTROLS_END) this.checkPacket(offset);
     if (offset < CONTROLS || offset >= CONTROLS_END) return;
     const [endpoint, isOut] = [(offset - CONTROLS) >> 3, (offset & 4) !== 0];
-    const bit = 1 << ((offset - CONTROLS) >> 2);
+    const index = (offset - CONTROLS) >> 2;
+    this.checkControl(index, this.controls[index], value);
+    this.controls[index] = value;
+    const bit = 1 << index;
     const wasAvailable = (this.available & bit) !== 0;
     this.available = value & AVAILABLE ? this.available | bit : this.available & ~bit;
     if (endpoint === 0) this.goOnWithTransfer();
@@ -275,7 +342,10 @@ export class Usb {
   /** Whether the device answers at all. */
   answers() {
     const isConnected = (this.status & STATUS.CONNECTED) !== 0;
-    return isConnected && this.isPlugged && !this.isHung && !this.isBusReset;
+    const has = (register, bits) => (register & bits) === bits;
+    const isOn = has(this.main, CONTROLLER_ON) && has(this.sie, PULLED_UP);
+    const isWired = has(this.muxing, TO_PHY | SOFT_CONNECT) && has(this.power, POWERED);
+    return isConnected && isOn && isWired && this.isPlugged && !this.isHung && !this.isBusReset;
   }
 
   /** The host asks for the next packet of the device's, if it wants one. */
@@ -292,7 +362,7 @@ export class Usb {
       this.isTaking = false;
       const word = this.word(endpoint, false);
       if (!this.answers() || !this.isFramed || !this.isOpen || !this.takes) return;
-      if (!(word & AVAILABLE)) return;
+      if (!(word & AVAILABLE) || !(word & FULL) || !this.isOn(endpoint, false)) return;
       const from = this.place(endpoint, false);
       const data = this.chip.usbDPRAM.slice(from, from + (word & LENGTH));
       if (((word & IS_DATA_1) !== 0) === this.inToggle) {
@@ -313,6 +383,7 @@ export class Usb {
       this.isOffering = false;
       const word = this.word(endpoint, true);
       if (!this.answers() || !this.isFramed || !(word & AVAILABLE)) return;
+      if (!this.isOn(endpoint, true)) return;
       const data = Uint8Array.from(this.bytes.splice(0, Math.min(word & LENGTH, PACKET)));
       if (((word & IS_DATA_1) !== 0) !== this.outToggle) {
         console.error('the device takes a packet for one that it has already');
@@ -570,6 +641,7 @@ export class Usb {
     if (isOut) {
       const { isStatus, sent } = transfer;
       const data = isStatus ? [] : transfer.data.slice(sent, sent + PACKET);
+      if (data.length > (word & LENGTH)) return this.misuse('no room for data of a request');
       this.chip.usbDPRAM.set(data, 0x100);
       this.finish(0, true, (word & ~(AVAILABLE | LENGTH)) | FULL | data.length);
       if (transfer.isStatus) return this.endTransfer(transfer.got);
@@ -577,6 +649,7 @@ export class Usb {
       transfer.sent += data.length;
       transfer.isStatus = transfer.sent >= transfer.length;
     } else {
+      if (!(word & FULL)) return;
       const length = word & LENGTH;
       transfer.got.push(...this.chip.usbDPRAM.slice(0x100, 0x100 + length));
       this.finish(0, false, word & ~(AVAILABLE | FULL));
