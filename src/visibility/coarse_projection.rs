@@ -10,8 +10,8 @@ use super::yield_counter::YieldCounter;
 use super::{Unrounded, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::{
-    Axis, COORDINATE_LIMIT, EdgeParameter, Projection, Vertex, page_offset, page_side, plane_side,
-    plane_side_margin,
+    Axis, COORDINATE_LIMIT, EdgeParameter, Projection, Vertex, page_offset, page_side,
+    page_side_of, plane_side, plane_side_margin,
 };
 use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
@@ -94,6 +94,21 @@ impl CoarseLine {
         let side = self.along_x * to_y - self.along_y * to_x;
         let error_bound = self.error_bound + to_x.abs() + to_y.abs();
         i32::from(side >= error_bound) - i32::from(side <= -error_bound)
+    }
+}
+
+impl CoarseLine {
+    /// Whether the line may have a point in the rectangle with these corners.
+    pub fn may_cross(&self, low: CoarsePoint, high: CoarsePoint) -> bool {
+        // The corners that lie the farthest to the left of the line, and to the right.
+        let (mut left, mut right) = (low, high);
+        if self.along_x > 0 {
+            (left.y, right.y) = (high.y, low.y);
+        }
+        if self.along_y < 0 {
+            (left.x, right.x) = (high.x, low.x);
+        }
+        self.side(left) >= 0 && self.side(right) <= 0
     }
 }
 
@@ -250,6 +265,15 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     }
 }
 
+/// A point of the page that is no vertex.
+#[derive(Debug, Clone, Copy)]
+pub struct PagePoint {
+    /// The homogeneous coordinates (x, y, w): the point lies at (x/w, y/w).
+    exact: [i64; 3],
+    /// The position on the coarse grid.
+    position: CoarsePoint,
+}
+
 /// One of the two ends of an edge that is tested against faces.
 #[derive(Debug, Clone, Copy)]
 pub struct End<I> {
@@ -336,6 +360,31 @@ impl<'a> CoarseProjection<'a> {
     #[inline]
     pub fn side<I: Index>(&self, a: I, b: I, c: I) -> i32 {
         self.line(a, b).side(self.end(c))
+    }
+
+    /// Returns the middle of a rectangle of the coarse grid.
+    pub fn middle(&self, low: CoarsePoint, high: CoarsePoint) -> PagePoint {
+        let Mapping { low: origin, shift, .. } = self.mapping;
+        // Twice the coordinates in units of 2^-20, so that the middle is a whole number.
+        let twice = |low: u16, high: u16, origin: i64, shift: u32| {
+            2 * origin + ((i64::from(low) + i64::from(high)) << shift)
+        };
+        let x = twice(low.x, high.x, origin.0, shift.0);
+        let y = twice(low.y, high.y, origin.1, shift.1);
+        let between = |low: u16, high: u16| low + (high - low) / 2;
+        PagePoint {
+            exact: [x, y, 2 << 20],
+            position: CoarsePoint { x: between(low.x, high.x), y: between(low.y, high.y) },
+        }
+    }
+
+    /// Returns on which side of the line from vertex a to vertex b a point of the page lies: 1 left,
+    /// -1 right, 0 on the line.
+    pub fn side_of_point<I: Index>(&self, a: I, b: I, point: &PagePoint) -> i32 {
+        match coarse_side(self.position(a), self.position(b), point.position) {
+            0 => page_side_of(self.projection, self.vertex(a), self.vertex(b), point.exact),
+            side => side,
+        }
     }
 
     /// Returns the exact [`page_side`] of an end, for the line through two vertices.

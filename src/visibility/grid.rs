@@ -88,6 +88,10 @@ pub struct Grid<'a, I> {
 pub struct CellView<'g, I> {
     /// The rank of the face that covers the whole cell, if that face is nearer than the whole edge.
     pub cover: Option<I>,
+    /// Whether that face or the sheet in the cell is nearer than the whole edge.
+    pub hides: bool,
+    /// Whether the edge, if it is a side of a face, is part of the sheet in the cell.
+    pub shows: bool,
     /// The ranks of the faces on the cell, nearest first.
     pub faces: &'g [I],
 }
@@ -96,25 +100,46 @@ pub struct CellView<'g, I> {
 /// the lists longer.
 const CELLS_FOR_EACH_FACE: usize = 2;
 
+/// How many faces there are for each wanted cell if sheets are looked for. It takes some time to
+/// look for one, which larger cells save; smaller ones leave fewer edges to be tested.
+const FACES_FOR_EACH_SHEET: usize = 2;
+
+/// From this number of faces on, sheets are looked for. In a scene of fewer faces, most cells have
+/// an outline in them and therefore no sheet.
+const MANY_FACES: usize = 4096;
+
 impl<'a, I: Index> Grid<'a, I> {
+    /// Whether there may be scenes in which sheets are looked for. A board that draws a model in
+    /// parts looks for them, because such models have many small faces. To other boards, whose
+    /// scenes are small, they are no gain.
+    const MAY_HAVE_SHEETS: bool = I::BITS > 16 || cfg!(feature = "tiles");
+
     /// Returns the bytes that the coarsest grid, a single cell, needs.
     pub const fn least_bytes(faces: usize) -> usize {
         Scratch::bytes_for::<Cell<I>>(1) + Scratch::bytes_for::<I>(faces)
     }
 
-    /// Sorts the faces into the finest grid that fits into `scratch` and is still useful.
+    /// Sorts the faces into the finest grid that fits into `scratch` and is still useful. The scene
+    /// may be part of one with many more faces (`is_part`).
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
     #[inline(never)] // Inlined in its only caller, the code would be larger.
     pub fn new(
         around: &SceneIndex<'_, I>,
+        is_part: bool,
         mut scratch: Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let SceneIndex { coarse_projection, outlines, faces, .. } = around;
         let outlines = *outlines;
-        let wanted_cells = (faces.len() * CELLS_FOR_EACH_FACE).min(I::NONE.get());
+        let with_sheets = Self::MAY_HAVE_SHEETS && (is_part || faces.len() >= MANY_FACES);
+        let wanted_cells = if with_sheets {
+            faces.len() / FACES_FOR_EACH_SHEET
+        } else {
+            faces.len() * CELLS_FOR_EACH_FACE
+        };
+        let wanted_cells = wanted_cells.min(I::NONE.get());
         let mut shape = Shape::finest(coarse_projection);
         while shape.cells() > 1 {
             let fits = |entries: usize| {
@@ -134,16 +159,50 @@ impl<'a, I: Index> Grid<'a, I> {
         let entry_count = raster.count(coarse_projection, outlines, faces, yield_counter)?;
         let entries: &mut [I] = scratch.take(entry_count)?;
         raster.fill(coarse_projection, outlines, faces, entries, yield_counter)?;
-        Ok(Self { shape, columns: shape.columns(), cells: raster.cells(), entries })
+        let mut grid = Self { shape, columns: shape.columns(), cells: raster.cells(), entries };
+        if with_sheets {
+            grid.find_sheets(around, yield_counter)?;
+        }
+        Ok(grid)
+    }
+
+    /// Returns the number of cells that a sheet covers.
+    #[cfg(test)]
+    pub fn sheets(&self) -> usize {
+        self.cells.iter().filter(|cell| cell.cover() == I::NONE).count()
+    }
+
+    /// Finds the cells that a sheet of faces covers where no single face does.
+    fn find_sheets(
+        &mut self,
+        around: &SceneIndex<'_, I>,
+        yield_counter: &mut YieldCounter<'_>,
+    ) -> Result<(), VisibilityError> {
+        for cell in 0..self.cells.len() {
+            if self.cells[cell].cover_depth() != NO_COVER {
+                continue;
+            }
+            let area = self.shape.area(cell % self.columns, cell / self.columns);
+            let ranks = self.view(cell, 0, 0).faces;
+            if let Some(far) = around.sheet(&area, ranks) {
+                self.cells[cell].cover_with(I::NONE, coarse_depth(far + 1));
+            }
+            yield_counter.spend(500)?;
+        }
+        Ok(())
     }
 
     /// Returns the faces that an edge meets in a cell if no point of the edge is nearer than the
     /// coarse depth `near`.
-    fn view(&self, cell: usize, near: u16) -> CellView<'_, I> {
+    fn view(&self, cell: usize, near: u16, far: u16) -> CellView<'_, I> {
         let begin = cell.checked_sub(1).map_or(I::ZERO, |before| self.cells[before].end());
         let cell = self.cells[cell];
+        let hides = cell.cover_depth() < near;
+        let is_sheet = cell.cover() == I::NONE;
         CellView {
-            cover: (cell.cover_depth() < near).then_some(cell.cover()),
+            cover: (hides && !is_sheet).then_some(cell.cover()),
+            hides,
+            shows: is_sheet && far < cell.cover_depth(),
             faces: &self.entries[begin.get()..cell.end().get()],
         }
     }
@@ -153,7 +212,7 @@ impl<'a, I: Index> Grid<'a, I> {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
             for column in column0..=column1 {
-                visit(self.view(row * self.columns + column, 0).faces);
+                visit(self.view(row * self.columns + column, 0, 0).faces);
             }
         }
     }
@@ -165,7 +224,7 @@ impl<'a, I: Index> Grid<'a, I> {
         &self,
         p: CoarsePoint,
         q: CoarsePoint,
-        near: u16,
+        [near, far]: [u16; 2],
         margin: i32,
     ) -> EdgeCells<'_, I> {
         // The rounded ends of a seam may lie beyond the last cell.
@@ -174,7 +233,7 @@ impl<'a, I: Index> Grid<'a, I> {
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
         let slope = if dy > 0 { (dx << 16) / dy } else { 0 };
-        EdgeCells { grid: self, near, margin, low, high, slope }
+        EdgeCells { grid: self, near, far, margin, low, high, slope }
     }
 }
 
@@ -185,6 +244,8 @@ pub struct EdgeCells<'g, I> {
     grid: &'g Grid<'g, I>,
     /// The coarse depth of the nearest point of the edge.
     near: u16,
+    /// The depth of its farther end, on the scale of [`coarse_depth`].
+    far: u16,
     /// How far beside the edge cells are visited, too, in units of the coarse grid.
     margin: i32,
     /// The lower end of the edge, which is not above `high`.
@@ -221,7 +282,7 @@ impl<'g, I: Index> EdgeCells<'g, I> {
             }
             let first = row as usize * self.grid.columns;
             for column in (from >> shift_x)..=(to >> shift_x) {
-                if !visit(self.grid.view(first + column as usize, self.near)) {
+                if !visit(self.grid.view(first + column as usize, self.near, self.far)) {
                     return false;
                 }
             }

@@ -23,6 +23,8 @@
 //! * Cut concave faces into triangles (`triangles`).
 //! * Place the vertices on a coarse grid of the page (`coarse_projection`).
 //! * Sort the faces by depth (`faces`) and into the cells of the page (`grid`, `raster`).
+//! * Of a fine mesh, find the cells that one sheet of faces covers (`sheet`), where it is known at
+//!   once which edges are visible.
 //! * Follow each edge through the cells (`search`) and mark on its `profile` which part each face
 //!   hides (`edge_query`), each face once (`face_set`).
 //! * If the options ask for it, find the lines where faces pass through each other (`seams`) and
@@ -65,6 +67,7 @@ mod raster;
 mod seams;
 mod scene_index;
 mod search;
+mod sheet;
 #[cfg(feature = "threads")]
 pub mod threads;
 mod edge_query;
@@ -264,7 +267,11 @@ fn find_some<I: Index>(
     let around = &index(scene, options, &mut scratch, yield_counter)?;
     let faces = around.faces.len();
     let marks = Marks::new(faces, StretchFinder::<I>::least_bytes(faces), &mut scratch)?;
-    let grid = &Grid::new(around, scratch, yield_counter)?;
+    #[cfg(feature = "tiles")]
+    let is_part = owner.is_some();
+    #[cfg(not(feature = "tiles"))]
+    let is_part = false;
+    let grid = &Grid::new(around, is_part, scratch, yield_counter)?;
     #[cfg(feature = "tiles")]
     let owner: Owner<'_, I> = match owner {
         Some(owner) => Some(&mut *owner), // It lives no longer than the scene.

@@ -7,6 +7,7 @@ use super::coarse_projection::{
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::grid::{Cell, coarse_depth};
+use super::sheet::CellArea;
 use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
 use crate::index::Index;
@@ -56,6 +57,15 @@ impl Shape {
     /// Returns the number of cells on the whole page.
     pub fn cells(&self) -> usize {
         self.columns() * self.rows()
+    }
+
+    /// Returns the area of the cell in a column and a row.
+    pub fn area(&self, column: usize, row: usize) -> CellArea {
+        let corner = |column: usize, row: usize| CoarsePoint {
+            x: (column << self.shift_x) as u16,
+            y: (row << self.shift_y) as u16,
+        };
+        CellArea { low: corner(column, row), high: corner(column + 1, row + 1) }
     }
 
     /// Returns the first and the last column and the first and the last row that a face touches.

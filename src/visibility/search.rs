@@ -339,18 +339,22 @@ impl<'s, I: Index> StretchFinder<'s, I> {
     ) -> Result<(), Aborted> {
         let Self { around, grid, marks: Marks { seen, profile, .. }, options, .. } = self;
         let faces_by_rank = &around.faces;
-        let near = coarse_depth(edge_query.near);
+        let depths = [edge_query.near, edge_query.far].map_each(coarse_depth);
         let margin = if options.merged_blocks { around.coarse_projection.error_bound() } else { 0 };
         let cells_along =
-            grid.cells_along(edge_query.p.position, edge_query.q.position, near, margin);
-        let (mut any_covered, mut all_covered) = (false, true);
+            grid.cells_along(edge_query.p.position, edge_query.q.position, depths, margin);
+        let (mut any_covered, mut is_hidden, mut is_shown) = (false, true, true);
         cells_along.visit(&mut |cell| {
             any_covered |= cell.cover.is_some();
-            all_covered &= cell.cover.is_some();
+            is_hidden &= cell.hides;
+            is_shown &= cell.shows;
             true
         });
-        if all_covered {
+        if is_hidden {
             profile.mark(EdgeInterval::WHOLE, mark::HIDDEN);
+            return yield_counter.spend(1000);
+        }
+        if is_shown && edge_query.seam.is_none() && !options.merged_blocks {
             return yield_counter.spend(1000);
         }
         seen.clear();

@@ -73,7 +73,7 @@ pub fn find_stretches_in_parts<I: Index>(
     let mut scratch = scratch;
     let yield_counter = &mut YieldCounter::new(cancel);
     let around = &index(scene, options, &mut scratch, yield_counter)?;
-    let grid = &Grid::new(around, scratch, yield_counter)?;
+    let grid = &Grid::new(around, false, scratch, yield_counter)?;
     let stop = &AtomicBool::new(false);
     rayon::in_place_scope_fifo(|scope| {
         let (sender, receiver) = mpsc::channel();

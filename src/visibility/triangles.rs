@@ -57,14 +57,11 @@ struct EarNeeds {
 impl EarNeeds {
     /// Counts the faces of a scene that no fan covers.
     fn of<I: Index>(outlines: Outlines<'_, I>, vertices: &[Vertex]) -> Self {
-        outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears).fold(
-            Self::default(),
-            |needs, (_, corners)| Self {
-                faces: needs.faces + 1,
-                ears: needs.ears + corners.len() - 2,
-                most_corners: needs.most_corners.max(corners.len()),
-            },
-        )
+        concave(outlines, vertices).fold(Self::default(), |needs, (_, corners)| Self {
+            faces: needs.faces + 1,
+            ears: needs.ears + corners.len() - 2,
+            most_corners: needs.most_corners.max(corners.len()),
+        })
     }
 }
 
@@ -96,9 +93,7 @@ impl<'a, I: Index> Ears<'a, I> {
         let mut meantime = scratch.reborrow();
         let remaining: &mut [I] = meantime.take(needs.most_corners)?;
         let mut used = 0;
-        let concave =
-            outlines.elements().filter(|(_, corners)| cut_of(corners, vertices) == Cut::Ears);
-        for (entry, (first, corners)) in entries.iter_mut().zip(concave) {
+        for (entry, (first, corners)) in entries.iter_mut().zip(concave(outlines, vertices)) {
             *entry = Entry([first, used].map_each(I::new));
             for (slot, corner) in remaining.iter_mut().zip(corners) {
                 *slot = corner.vertex();
@@ -198,10 +193,23 @@ pub fn cut_of<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> Cut {
     let Some(plane) = Plane::of(&mut corners.iter().map(at)) else {
         return Cut::None;
     };
+    if corners.len() == 3 {
+        return Cut::Fan;
+    }
     let is_fan = corners[1..]
         .windows(2)
         .all(|side| plane.turn(at(&corners[0]), at(&side[0]), at(&side[1])) >= 0);
     if is_fan { Cut::Fan } else { Cut::Ears }
+}
+
+/// Returns the faces that no fan covers, each with the number of its first corner.
+fn concave<'a, I: Index>(
+    outlines: Outlines<'a, I>,
+    vertices: &[Vertex],
+) -> impl Iterator<Item = (usize, &'a [Corner<I>])> {
+    outlines
+        .elements()
+        .filter(|(_, corners)| corners.len() > 3 && cut_of(corners, vertices) == Cut::Ears)
 }
 
 /// Cuts one ear after the other off a polygon and returns the number of triangles.

@@ -1,0 +1,309 @@
+//! Finds out in which cells of the page the nearest faces form one sheet: together they cover the
+//! cell once and leave no gap.
+//!
+//! Such a cell answers most questions at once. An edge that lies behind the sheet is hidden there,
+//! and an edge that lies in it is visible there, because no other face of the sheet covers the page
+//! beside it. On a closed mesh that is finer than the cells, only cells with an outline in them are
+//! left, which are few.
+//!
+//! The nearest faces are those that begin before the farthest of them ends. Each is taken in the
+//! sense in which it runs anticlockwise on the page. If every side that may touch the cell belongs
+//! to two of them, in opposite directions, then no boundary of these faces enters the cell, so every
+//! point of it is covered by the same number of faces (a chain without boundary). That number is
+//! counted at the middle of the cell.
+
+use super::coarse_projection::{CoarseLine, CoarsePoint, PagePoint};
+use super::edges::sides;
+use super::faces::Face;
+use super::scene_index::SceneIndex;
+use crate::array::MapEach;
+use crate::geometry::COORDINATE_LIMIT;
+use crate::index::Index;
+
+/// The most sides that may be waiting for their second face. A cell that needs more is taken to
+/// have no sheet.
+const MOST_OPEN_SIDES: usize = 32;
+
+/// The part of the page whose coarse points lie between two corners, the upper right corner not
+/// included.
+#[derive(Debug, Clone, Copy)]
+pub struct CellArea {
+    /// The lower left corner.
+    pub low: CoarsePoint,
+    /// The upper right corner, just outside.
+    pub high: CoarsePoint,
+}
+
+impl CellArea {
+    /// Whether the segment between two vertices at these coarse points may have a point in the cell
+    /// or just beside it.
+    fn may_touch(&self, a: CoarsePoint, b: CoarsePoint) -> bool {
+        let (low, high) = (a.low(b), a.high(b));
+        let is_beside = high.x < self.low.x
+            || high.y < self.low.y
+            || low.x >= self.high.x
+            || low.y >= self.high.y;
+        !is_beside && CoarseLine::new(a, b).may_cross(self.low, self.high)
+    }
+}
+
+/// The two ends of a side, in the direction in which its face runs anticlockwise on the page.
+type Directed<I> = [I; 2];
+
+/// The sides that were met once so far.
+struct OpenSides<I> {
+    sides: [Directed<I>; MOST_OPEN_SIDES],
+    count: usize,
+}
+
+impl<I: Index> OpenSides<I> {
+    /// Removes the side that runs in the opposite direction, or adds this one. Returns `None` if
+    /// there is no room for it.
+    fn meet(&mut self, [from, to]: Directed<I>) -> Option<()> {
+        let open = self.sides.get_mut(..self.count)?;
+        if let Some(found) = open.iter().position(|side| *side == [to, from]) {
+            self.count -= 1;
+            open.swap(found, self.count);
+        } else {
+            *self.sides.get_mut(self.count)? = [from, to];
+            self.count += 1;
+        }
+        Some(())
+    }
+}
+
+impl<I: Index> SceneIndex<'_, I> {
+    /// Returns the greatest depth of the sheet that the nearest of the faces with these ranks form
+    /// in a cell; `None` if they form none, or if that is not certain. The ranks ascend, and all
+    /// faces on the cell are among them.
+    pub fn sheet(&self, cell: &CellArea, ranks: &[I]) -> Option<i32> {
+        let mut open = OpenSides { sides: [[I::ZERO; 2]; MOST_OPEN_SIDES], count: 0 };
+        let mut far = -COORDINATE_LIMIT;
+        let mut count = 0;
+        for rank in ranks.iter().map(|rank| rank.get()) {
+            if count > 0 && self.faces.begins_behind(rank, far) {
+                break;
+            }
+            count += 1;
+            let face = self.faces.get(rank);
+            let is_turned = self.facing(face)? < 0;
+            for (_, a, b) in sides(self.outlines.element(face.first)) {
+                far = far.max(self.coarse_projection.vertex(a).z);
+                let [at_a, at_b] = [a, b].map_each(|end| self.coarse_projection.position(end));
+                if cell.may_touch(at_a, at_b) {
+                    open.meet(if is_turned { [b, a] } else { [a, b] })?;
+                }
+            }
+        }
+        if open.count > 0 {
+            return None;
+        }
+        let middle = self.coarse_projection.middle(cell.low, cell.high);
+        let mut layers = 0;
+        for rank in ranks.iter().take(count) {
+            for triangle in self.triangles(self.faces.get(rank.get())) {
+                layers += u32::from(self.covers(triangle, &middle)?);
+            }
+        }
+        (layers == 1).then_some(far)
+    }
+
+    /// Returns the sense in which all triangles of a face turn on the page: 1 anticlockwise, -1
+    /// clockwise. `None` if they do not turn in one sense, or if the face is no fan of triangles.
+    fn facing(&self, face: Face) -> Option<i32> {
+        let corners = self.outlines.element(face.first);
+        let (first, others) = corners.split_first().filter(|_| face.is_fan)?;
+        let mut turns = others.windows(2).map(|pair| match pair {
+            [b, c] => self.coarse_projection.side(first.vertex(), b.vertex(), c.vertex()),
+            _ => 0,
+        });
+        let facing = turns.next().filter(|&facing| facing != 0)?;
+        turns.all(|turn| turn == facing).then_some(facing)
+    }
+
+    /// Whether a triangle contains a point of the page. `None` if the point lies on its outline.
+    fn covers(&self, [a, b, c]: [I; 3], point: &PagePoint) -> Option<bool> {
+        let side = |from, to| self.coarse_projection.side_of_point(from, to, point);
+        let (first, second) = (side(a, b), side(b, c));
+        if first * second < 0 {
+            return Some(false);
+        }
+        let third = side(c, a);
+        if first * third < 0 || second * third < 0 {
+            return Some(false);
+        }
+        (first * second * third != 0).then_some(true)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::geometry::{Projection, Vertex};
+    use crate::model::{Corner, Elements};
+    use crate::stage::{NeverCancel, Scratch, SinkFull};
+    use crate::visibility::grid::Grid;
+    use crate::visibility::search::{Marks, StretchFinder};
+    use crate::visibility::{
+        Crease, Options, Scene, Stretch, StretchSink, Unrounded, YieldCounter, index,
+    };
+    use std::vec::Vec;
+
+    /// The cells around a ball, and those from pole to pole.
+    const AROUND: u32 = 20;
+    const ALONG: u32 = 9;
+
+    struct Random(u32);
+
+    impl Random {
+        /// Returns a number from 0 to 1.
+        fn part(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            f64::from(self.0 >> 8) / f64::from(1 << 24)
+        }
+
+        fn is_one_of(&mut self, many: u32) -> bool {
+            self.part() * f64::from(many) < 1.0
+        }
+    }
+
+    /// A scene of bumpy balls, seen from a generic direction. Some are so bumpy that they have
+    /// folds, some have holes, faces that are there twice or turned over, and bars.
+    struct Balls {
+        vertices: Vec<Vertex>,
+        elements: Vec<Vec<u32>>,
+    }
+
+    impl Balls {
+        fn new(seed: u32) -> Self {
+            let mut random = Random(seed.wrapping_mul(0x9E37_79B9));
+            let mut scene = Self { vertices: Vec::new(), elements: Vec::new() };
+            let bumps = if seed % 4 == 0 { 0.0 } else { 0.3 * random.part() };
+            let is_damaged = seed % 3 == 0;
+            let (turn, tilt) = (6.0 * random.part(), 0.2 + random.part());
+            for _ in 0..1 + seed % 3 {
+                let middle = [(); 3].map(|()| 90_000.0 * (random.part() - 0.5));
+                let radius = 40_000.0 + 80_000.0 * random.part();
+                scene.add_ball(middle, radius, bumps, [turn, tilt], &mut random, is_damaged);
+            }
+            scene
+        }
+
+        fn add_ball(
+            &mut self,
+            middle: [f64; 3],
+            radius: f64,
+            bumps: f64,
+            [turn, tilt]: [f64; 2],
+            random: &mut Random,
+            is_damaged: bool,
+        ) {
+            let first = self.vertices.len() as u32;
+            for row in 0..=ALONG {
+                for column in 0..AROUND {
+                    let across = f64::from(row) / f64::from(ALONG) * 3.0 + 0.07;
+                    let around = f64::from(column) / f64::from(AROUND) * core::f64::consts::TAU;
+                    let r = radius * (1.0 + bumps * (random.part() - 0.5));
+                    let (x, y, z) = (
+                        r * across.sin() * around.cos(),
+                        r * across.sin() * around.sin(),
+                        r * across.cos(),
+                    );
+                    let (x, y) = (x * turn.cos() - y * turn.sin(), x * turn.sin() + y * turn.cos());
+                    let (y, z) = (y * tilt.cos() - z * tilt.sin(), y * tilt.sin() + z * tilt.cos());
+                    let [mx, my, mz] = middle;
+                    let (x, y, z) = ((x + mx) as i32, (y + my) as i32, (z + mz) as i32);
+                    self.vertices.push(Vertex::new(x, y, 300_000 + z));
+                }
+            }
+            for row in 0..ALONG {
+                for column in 0..AROUND {
+                    let at = |row: u32, column: u32| first + row * AROUND + column % AROUND;
+                    let [a, b] = [at(row, column), at(row, column + 1)];
+                    let [d, c] = [at(row + 1, column), at(row + 1, column + 1)];
+                    let faces = if column % 3 == 0 {
+                        std::vec![std::vec![a, b, c, d]]
+                    } else {
+                        std::vec![std::vec![a, b, c], std::vec![a, c, d]]
+                    };
+                    for mut face in faces {
+                        if is_damaged && random.is_one_of(12) {
+                            face.reverse();
+                        }
+                        if is_damaged && random.is_one_of(25) {
+                            self.elements.push(std::vec![a, c]);
+                        }
+                        if is_damaged && random.is_one_of(40) {
+                            self.elements.push(face.clone());
+                        }
+                        if !(is_damaged && random.is_one_of(20)) {
+                            self.elements.push(face);
+                        }
+                    }
+                }
+            }
+        }
+
+        fn corners(&self) -> Vec<Corner<u32>> {
+            let corners = self.elements.iter().flat_map(|element| {
+                let (is_bar, last) = (element.len() == 2, element.len() - 1);
+                element.iter().enumerate().map(move |(n, &to)| Corner::new(to, is_bar, n == last))
+            });
+            corners.collect()
+        }
+    }
+
+    struct Stretches(Vec<Stretch<u32>>);
+
+    impl StretchSink<u32> for Stretches {
+        fn stretch(&mut self, stretch: Stretch<u32>) -> Result<(), SinkFull> {
+            self.0.push(stretch);
+            Ok(())
+        }
+    }
+
+    /// Returns the stretches of a scene, and in how many cells a sheet was found. Sheets are looked
+    /// for only in a part of a scene.
+    fn find(scene: &Scene<'_, u32>, options: Options, is_part: bool) -> (Vec<Stretch<u32>>, usize) {
+        let mut words = std::vec![0u64; 1 << 14];
+        let mut scratch = Scratch::new(&mut words);
+        let mut never_cancel = NeverCancel;
+        let yield_counter = &mut YieldCounter::new(&mut never_cancel);
+        let around = &index(scene, options, &mut scratch, yield_counter).expect("an index");
+        let faces = around.faces.len();
+        let marks = Marks::new(faces, 1 << 14, &mut scratch).expect("marks");
+        let grid = &Grid::new(around, is_part, scratch, yield_counter).expect("a grid");
+        let mut search = StretchFinder::new(around, grid, marks, options, Default::default());
+        let mut found = Stretches(Vec::new());
+        let corners = around.outlines.corners.len();
+        search.follow_edges(0..corners, yield_counter, &mut found).expect("edges");
+        search.follow_seams(0..faces, yield_counter, &mut found).expect("seams");
+        (found.0, grid.sheets())
+    }
+
+    #[test]
+    fn sheets_change_no_stretch() {
+        let mut sheets = 0;
+        for seed in 0..if cfg!(miri) { 1 } else { 240 } {
+            let balls = Balls::new(seed);
+            let corners = balls.corners();
+            let scene = Scene {
+                vertices: &balls.vertices,
+                elements: Elements::new(&corners),
+                projection: [Projection::Perspective, Projection::Parallel][seed as usize / 2 % 2],
+                unrounded: Unrounded::UNKNOWN,
+            };
+            let options = Options {
+                with_hidden: seed % 2 == 0,
+                with_seams: true,
+                merged_blocks: seed % 5 == 1,
+                crease: (seed % 7 == 2).then(|| Crease { cosine: 31_000, depth_stretch: (1, 1) }),
+            };
+            let (expected, none) = find(&scene, options, false);
+            let (found, some) = find(&scene, options, true);
+            assert_eq!(none, 0, "a whole scene of few faces");
+            assert!(found == expected, "{seed}: {} and {}", found.len(), expected.len());
+            sheets += some;
+        }
+        assert!(sheets > 2000, "{sheets}");
+    }
+}
