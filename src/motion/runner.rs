@@ -678,6 +678,11 @@ impl<'m> Runner<'m> {
         self.ink_bound = length.map_or(u64::MAX, |length| self.run.drawn.saturating_add(length));
     }
 
+    /// Whether the runner is to stop before the next travel.
+    pub fn pauses(&self) -> bool {
+        self.stopping_after_stroke || self.run.drawn >= self.ink_bound
+    }
+
     /// Continues where [`Runner::stop`] or [`Runner::stop_after_stroke`] stopped.
     pub fn resume(&mut self) {
         self.stopping = false;
@@ -872,8 +877,7 @@ impl<'m> Runner<'m> {
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         let stroke_ends =
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
-        let pauses = self.stopping_after_stroke || self.run.drawn >= self.ink_bound;
-        let stops = self.stopping || (pauses && stroke_ends);
+        let stops = self.stopping || (stroke_ends && self.pauses());
         if stops && self.plan.is_none() && self.plan_end == PathSpeed::REST {
             return self.come_to_rest(Progress::Stopped, queue);
         }

@@ -734,6 +734,7 @@ impl<I: Index> Inner<'_, I> {
             }
             Command::Sleep => {
                 self.machine.sleep()?;
+                self.resumption.lose_position();
                 Reply(board).line(format_args!("[MSG:Sleeping]"));
             }
             Command::Jog(line) => self.jog(line)?,
