@@ -3,9 +3,9 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
-use penup::boards::host::Change;
-use penup::machine::{Alarm, Contacts, State};
-use penup::plotter::Board as _;
+use penup::boards::host::{Change, LAYOUT};
+use penup::machine::{Alarm, Contacts, Setting, State};
+use penup::plotter::{Board as _, FlashRecords, Record};
 use penup_host_tests::cut_jobs::{Powered, empty_flash, switch_on};
 use penup_host_tests::whole_jobs::Bench;
 
@@ -277,4 +277,61 @@ fn a_stop_in_sleep_forgets_what_sleep_forgets() {
         };
         assert_eq!(changes(b"\xFD"), changes(b""), "{settings}");
     }
+}
+
+#[test]
+fn a_pen_that_is_raised_by_the_greater_height_is_raised_whatever_happens() {
+    let mut bench = Bench::small();
+    bench.say("$211=0\n$210=127\n");
+    // The pen is still where it was: the first move raises it before it steps.
+    bench.say("G0 X2\n");
+    bench.finish();
+    let changes = bench.board.trace().changes();
+    let first = |is: fn(&Change) -> bool| changes.iter().position(|stamped| is(&stamped.change));
+    let raised = first(|change| *change == Change::Pen(127)).expect("it is raised");
+    let stepped = first(|change| *change == Change::StepX(true)).expect("it moves");
+    assert!(raised < stepped && changes[raised].time + 3_700_000 < changes[stepped].time);
+    bench.say("M3\nG1 X90\n");
+    bench.work(600);
+    bench.board.receive(b"\xFD");
+    bench.work(20);
+    assert_eq!(heights(&bench), [127, 0, 127]);
+    bench.say("$X\nG1 X50\n");
+    bench.work(600);
+    bench.board.set_contacts(Contacts { stop: true, ..Contacts::default() });
+    bench.work(20);
+    assert_eq!(heights(&bench), [127, 0, 127, 0, 127]);
+    // A motor has its stop above.
+    bench.board.set_contacts(Contacts::default());
+    let refused = bench.say("$X\n$209=1\n");
+    assert!(refused.contains("set $210 below $211") && refused.ends_with("error:151\n"));
+    assert!(bench.say("$210=0\n$209=1\n").ends_with("ok\nok\n"));
+    assert!(bench.say("$210=1\n").ends_with("error:151\n"));
+}
+
+#[test]
+fn a_kept_setting_that_is_refused_is_told_and_the_others_stay() {
+    // As another version of the firmware may have kept them: -1 m of ink before a pause.
+    let kept = [(130, 300), (215, -1), (100, 100), (999, 1)].map(|(number, value): (u16, i32)| {
+        let [a, b] = number.to_le_bytes();
+        let [c, d, e, f] = (value << 16).to_le_bytes();
+        [a, b, c, d, e, f]
+    });
+    let mut records = FlashRecords::new(empty_flash(), LAYOUT);
+    records.save(Record::Settings, &[kept.as_flattened()]).expect("it fits");
+    let told = "[MSG:the kept $215=-1 is refused, so 0 holds: set it before you draw]\n";
+    let (flash, _) = switch_on(records.flash, |plotter| {
+        assert!(plotter.heard().ends_with(told));
+        let settings = plotter.plotter.machine().settings();
+        assert_eq!(
+            [settings.get(Setting::TravelX), settings.get(Setting::StepsPerMmX)],
+            [300, 100]
+        );
+        assert_eq!(settings.get(Setting::InkBeforePause), 0);
+    });
+    let (flash, _) = switch_on(flash, |plotter| {
+        assert!(plotter.heard().ends_with(told), "at each start");
+        assert_eq!(plotter.say("$215=0"), "ok\n");
+    });
+    switch_on(flash, |plotter| assert!(!plotter.heard().contains("$215")));
 }

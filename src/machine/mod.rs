@@ -475,12 +475,14 @@ impl<'m> Machine<'m> {
             && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
     }
 
-    /// Passes the pulse width, the pin inversion and the rule for braking to the step interrupt.
+    /// Passes the pulse width, the pin inversion, the height of the raised pen and the rule for
+    /// braking to the step interrupt.
     /// Call it only while nothing moves.
     fn configure_pulser(&mut self) {
         self.pins.configure(
             self.settings.microseconds_as_ticks(Setting::StepPulse),
             self.settings.whole(Setting::InvertDirections) as u8, // at most 7
+            Tool::positions(&self.settings).up_height,
         );
         let (rule, _) = self.settings.brake(self.pins.queue());
         self.runner.set_brake(rule);

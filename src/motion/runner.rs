@@ -247,6 +247,10 @@ impl<'m> Runner<'m> {
         if pen.lift != self.pen.lift {
             self.forget_lift();
         }
+        if pen.up_height != self.pen.up_height {
+            // The pen is raised to the new height before anything else moves.
+            self.pen_is_down = None;
+        }
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.lookahead.pass_limits_on(limits.jerk.is_none());

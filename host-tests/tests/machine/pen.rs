@@ -53,7 +53,6 @@ fn after_a_restart_a_motor_raises_the_pen_and_then_has_no_current() {
 = drivers on
 = the pen's motor up 451 steps
 = the pen's motor down 62 steps
-= the pen at height 20
 = up 60 steps to 50,60
 = Idle at 50,60
 ";
