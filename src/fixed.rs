@@ -123,9 +123,9 @@ impl Decimal {
         if self.mantissa == 0 {
             return Ok(0);
         }
-        let magnitude = u128::from(self.mantissa.unsigned_abs()); // below 2^60
+        let magnitude = i128::from(self.mantissa.abs()); // below 2^60
         let shifted = if fraction_bits <= 60 {
-            magnitude << fraction_bits
+            shift_left(magnitude, fraction_bits) as u128
         } else {
             return Err(OutOfRange);
         };
@@ -305,6 +305,18 @@ pub fn product(a: i64, b: i64) -> i128 {
     i128::from(a) * i128::from(b)
 }
 
+/// Returns value × 2^`bits`. The code of a 128-bit shift is long, so it is stored once.
+#[inline(never)]
+pub fn shift_left(value: i128, bits: u32) -> i128 {
+    value << bits
+}
+
+/// Returns value / 2^`bits`, rounded towards minus infinity. See [`shift_left`].
+#[inline(never)]
+pub fn shift_right(value: i128, bits: u32) -> i128 {
+    value >> bits
+}
+
 /// Halves a number, rounding towards zero.
 pub fn half(value: i128) -> i128 {
     (value - (value >> 127)) >> 1
@@ -478,9 +490,9 @@ impl fmt::Display for BinaryFraction {
         let scale = units_in_one(decimals);
         let bits = self.fraction_bits.min(60);
         let magnitude = self.units.unsigned_abs();
-        let below_one = u128::from(magnitude & ((1 << bits) - 1)) * u128::from(scale); // below 2^90
-        let half = if bits == 0 { 0 } else { 1 << (bits - 1) };
-        let fraction = ((below_one + half) >> bits) as u64; // at most `scale`
+        let below_one = product((magnitude & ((1 << bits) - 1)) as i64, scale as i64); // below 2^90
+        let half: u64 = if bits == 0 { 0 } else { 1 << (bits - 1) };
+        let fraction = shift_right(below_one + i128::from(half), bits) as u64; // at most `scale`
         let carries = fraction >= scale;
         let whole = (magnitude >> bits) + u64::from(carries);
         let fraction = if carries { 0 } else { fraction };

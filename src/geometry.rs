@@ -10,6 +10,7 @@
 //! bound.
 
 use crate::array::MapEach;
+use crate::fixed::product;
 use bytemuck::{Pod, Zeroable};
 use core::cmp::Ordering;
 
@@ -277,7 +278,7 @@ pub struct Precision {
 
 /// The least width of a triangle, in multiples of the precision, at which its rounded corners still
 /// determine its plane. The plane of a narrower triangle is taken to be exact.
-const WIDTHS: u128 = 64;
+const WIDTHS: i64 = 64;
 
 /// Whether four points of the model may lie in one plane, if each coordinate may be off by what
 /// `precision` says. The first three points are the triangle that defines the plane. Coordinates
@@ -299,25 +300,28 @@ const WIDTHS: u128 = 64;
 /// ```
 #[inline(never)] // Its 128-bit arithmetic is long.
 pub fn are_coplanar(points: [[i32; 3]; 4], precision: Precision) -> bool {
-    let [a, points @ ..] = points;
-    let [u, v, w] = points.map(|to| difference(to, a));
-    let (uv, vw, wu) = (cross(u, v), cross(v, w), cross(w, u));
-    let height: i128 = (0..3).map(|n| uv[n] * i128::from(w[n])).sum();
+    let [a, b, c, d] = points;
+    let (u, v, w) = (difference(b, a), difference(c, a), difference(d, a));
+    let (third, fourth) = (difference(c, b), difference(d, b));
+    let uv = cross(u, v);
+    let height = dot(uv, w);
     if height == 0 || precision.written == 0 {
         return height == 0;
     }
-    let side = largest(u).max(largest(v)).max(largest([0, 1, 2].map_each(|n| v[n] - u[n])));
-    let area = uv.iter().map(|part| part.unsigned_abs()).max().unwrap_or(0);
-    let is_wide = |off: u32| area >= WIDTHS * u128::from(off) * u128::from(side);
-    let off = [precision.written, precision.unit].into_iter().find(|off| is_wide(*off));
-    let off = u128::from(off.unwrap_or(0));
-    let size = |parts: [i128; 3]| parts.iter().map(|part| part.unsigned_abs()).sum::<u128>();
-    // The derivatives together are below 2^69, the lengths below 2^33.
-    let derivatives =
-        size(uv) + size(vw) + size(wu) + size([0, 1, 2].map_each(|n| uv[n] + vw[n] + wu[n]));
-    let lengths = size([u, v, w].map_each(|to| i128::from(largest(to))));
-    // The three terms are at most 2^30 × 2^69, 2^60 × 2^38 and 2^96.
-    height.unsigned_abs() <= off * derivatives + 24 * off * off * lengths + 48 * off * off * off
+    let side = largest(u).max(largest(v)).max(largest(third));
+    let area = i128::from(largest(uv));
+    let is_wide = |off: &u32| area >= product(WIDTHS * i64::from(*off), side);
+    let off = [precision.written, precision.unit].into_iter().find(is_wide);
+    let off = i64::from(off.unwrap_or(0));
+    // The derivatives together are below 2^66, the lengths below 2^33.
+    let derivatives: i128 = [uv, cross(v, w), cross(w, u), cross(third, fourth)]
+        .iter()
+        .flatten()
+        .map(|part| i128::from(part.abs()))
+        .sum();
+    let lengths = largest(u) + largest(v) + largest(w);
+    // The second term is below 2^35 × 2^33, and the product below 2^30 × 2^70.
+    height.abs() <= i128::from(off) * (derivatives + product(24 * off, lengths + 2 * off))
 }
 
 /// Whether three points of the model may lie on one line, if each coordinate may be off by what
@@ -335,30 +339,35 @@ pub fn are_in_line(points: [[i32; 3]; 3], precision: Precision) -> bool {
     let [a, b, c] = points;
     let (u, v) = (difference(b, a), difference(c, a));
     let turn = cross(u, v);
-    let is_long = |off: &u32| u128::from(largest(u)) >= WIDTHS * u128::from(*off);
+    let is_long = |off: &u32| largest(u) >= WIDTHS * i64::from(*off);
     let off = [precision.written, precision.unit].into_iter().find(is_long);
-    let off = i128::from(off.unwrap_or(0));
+    let off = i64::from(off.unwrap_or(0));
     // Each minor has four factors, each of which contains two errors.
-    let most = 4 * i128::from(largest(u)) + 4 * i128::from(largest(v)) + 8 * off;
-    turn.iter().all(|part| part.abs() <= off * most)
+    let most = 4 * largest(u) + 4 * largest(v) + 8 * off;
+    i128::from(largest(turn)) <= product(off, most)
 }
 
-/// Returns the vector from a to `to`; each component is within ±2^31.
-fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
-    [0, 1, 2].map(|n| i64::from(to[n]) - i64::from(a[n]))
+/// Returns the vector from a to `to`, for coordinates within ±2^30. Each component is within ±2^31.
+pub(crate) fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
+    [0, 1, 2].map_each(|n| i64::from(to[n]) - i64::from(a[n]))
 }
 
-/// Returns the cross product of two vectors.
-fn cross(u: [i64; 3], v: [i64; 3]) -> [i128; 3] {
-    let minor = |m: usize, n: usize| {
-        i128::from(u[m]) * i128::from(v[n]) - i128::from(u[n]) * i128::from(v[m])
-    };
+/// Returns the cross product of two [`difference`]s from one point. A component is twice the area
+/// of a triangle in a square of side 2^31, so it is within ±2^62.
+#[inline(never)] // Its 64-bit arithmetic is long.
+pub(crate) fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
+    let minor = |m: usize, n: usize| u[m] * v[n] - u[n] * v[m];
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
-/// Returns the largest absolute value of the components.
-fn largest(parts: [i64; 3]) -> u64 {
-    parts.iter().fold(0, |most, part| most.max(part.unsigned_abs()))
+/// Returns the scalar product of two vectors, whose components must be within ±2^62.
+pub(crate) fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
+    (0..3).map(|n| product(a[n], b[n])).sum()
+}
+
+/// Returns the largest absolute value of the components, which must be within ±2^62.
+fn largest(parts: [i64; 3]) -> i64 {
+    parts.iter().fold(0, |most, part| most.max(part.abs()))
 }
 
 /// Returns the determinant of the matrix with the rows a, b and c.

@@ -4,7 +4,7 @@
 
 use penup::board_table::PICO;
 use penup_client::emulator::{
-    EmulatedBoard as _, Machine, MachineEventKind, Pico, PinChange, image_path,
+    EmulatedBoard as _, Machine, MachineEventKind, Pico, Pin, PinChange, image_path,
 };
 use penup_host_tests::cut_jobs::{assert_one_drawing, strokes_of};
 use penup_host_tests::emulated_jobs::{Line, bench_like};
@@ -118,5 +118,50 @@ fn a_panic_raises_the_pen_is_reported_at_both_ports_and_the_job_goes_on() -> Tes
     runs.push(strokes_of(line.emulator.pin_changes()?));
     assert!(assert_one_drawing(&whole, &runs) <= 2);
     assert_eq!(ask(&mut line, "$resume")?, "error:163");
+    Ok(())
+}
+
+/// A servo that is mounted the other way round has its pen raised at height 127. After the first
+/// raise it is lowered by nothing but the order to draw.
+#[test]
+fn a_servo_mounted_the_other_way_round_is_raised_by_faults_and_starts() -> TestResult {
+    let image = image_path("pico");
+    let checks = failed_checks(&std::fs::read(&image)?)?;
+    let check = checks.first().ok_or("no check")?;
+    let mut line = Line::to(Box::new(Pico::start(&image)?))?;
+    for text in ["$210=127", "$211=0", "$212=30", "$213=30", "G0 X1"] {
+        assert_eq!(ask(&mut line, text)?, "ok", "{text}");
+    }
+    let mut is_raised = false;
+    let mut follow = |line: &mut Line<Pico>| -> TestResult<bool> {
+        for change in line.emulator.pin_changes()? {
+            if change.pin == Pin::Pen {
+                is_raised = change.high;
+            }
+        }
+        Ok(is_raised)
+    };
+    while !line.status()?.starts_with("<Idle") {}
+    assert!(follow(&mut line)?, "the first move raises it");
+    for text in ["M3", "G1 X60 F600"] {
+        assert_eq!(ask(&mut line, text)?, "ok", "{text}");
+    }
+    while follow(&mut line)? {
+        line.status()?;
+    }
+    line.emulator.jump_to(check.address, false)?;
+    line.hear_greeting()?;
+    while !line.hear()?.starts_with("ALARM:101") {}
+    for _ in 0..10 {
+        line.status()?;
+    }
+    assert!(follow(&mut line)?, "the fault has raised it");
+    while !line.unlock()? {}
+    line.emulator.cut_power()?;
+    line.hear_greeting()?;
+    for _ in 0..10 {
+        line.status()?;
+    }
+    assert!(follow(&mut line)?, "it is raised as soon as the settings are read");
     Ok(())
 }

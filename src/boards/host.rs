@@ -235,15 +235,17 @@ impl TracedSteps<'_> {
         &self.trace
     }
 
-    /// Makes the next event due now.
+    /// Makes the next event due now, if there is one, or if the pins were halted.
     pub fn step_now(&mut self) {
-        self.due = Some(self.trace.now());
+        if self.pulser.begin() {
+            self.due = Some(self.trace.now());
+        }
     }
 
     /// Advances the time to `end`, in ticks from the start. Everything that is due before it
     /// happens.
     pub fn pass_until(&mut self, end: u64) {
-        if self.due.is_none() && self.trace.now() < end && self.pulser.begin() {
+        if self.due.is_none() && self.trace.now() < end {
             self.step_now();
         }
         loop {

@@ -8,21 +8,10 @@
 
 use super::Eye;
 use crate::array::MapEach;
-use crate::fixed::product;
+use crate::geometry::{cross, difference, dot};
 
 /// A position in model coordinates, each within ±2^30.
 pub(super) type Point = [i32; 3];
-
-/// Returns the vector from b to a.
-fn difference(a: Point, b: Point) -> [i64; 3] {
-    [0, 1, 2].map_each(|axis| i64::from(a[axis]) - i64::from(b[axis]))
-}
-
-/// Returns the scalar product of two vectors. The module documentation says why it does not
-/// overflow.
-fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
-    (0..3).map(|axis| product(a[axis], b[axis])).sum()
-}
 
 /// The plane of three points. Its normal points to the side from which they turn counter-clockwise,
 /// the upper side.
@@ -38,16 +27,7 @@ pub(super) struct Plane {
 impl Plane {
     /// Returns the plane through three points.
     pub(super) fn through(a: Point, b: Point, c: Point) -> Self {
-        let u = difference(b, a);
-        let v = difference(c, a);
-        Self {
-            origin: a,
-            normal: [
-                u[1] * v[2] - u[2] * v[1],
-                u[2] * v[0] - u[0] * v[2],
-                u[0] * v[1] - u[1] * v[0],
-            ],
-        }
+        Self { origin: a, normal: cross(difference(b, a), difference(c, a)) }
     }
 
     /// Whether the three points lie on one line, so that they define no plane.

@@ -2,6 +2,8 @@
 
 use super::SolidError;
 use super::exact::Point;
+use crate::array::MapEach;
+use crate::fixed::{divide, product};
 
 /// The eye, in units of the positions of the model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,29 +32,25 @@ impl Eye {
     pub(super) fn drawn_in(self, centre: Point, extent: u32, tolerance: u32) -> Self {
         // With a tolerance of more than 1/1024 of the solid the eye would come too near to see it
         // from the same side.
-        let step = 4 * i128::from(tolerance.min(extent >> 10));
+        let step = 4 * i64::from(tolerance.min(extent >> 10));
         if step == 0 {
             return self;
         }
-        let square = i128::from(extent) * i128::from(extent); // below 2^62
-        let centre = centre.map(i64::from);
-        let (ray, divisor) = match self {
+        let square = i64::from(extent) * i64::from(extent); // at most 2^62
+        let centre = centre.map_each(i64::from);
+        let (ray, nearest) = match self {
             Self::At(position) => {
-                let ray = [0, 1, 2].map(|axis| position[axis] - centre[axis]);
-                (ray, square + step * greatest(ray))
+                ([0, 1, 2].map_each(|axis| position[axis] - centre[axis]), square)
             }
-            Self::Towards(direction) => (direction, step * greatest(direction)),
+            Self::Towards(direction) => (direction, 0),
         };
+        let greatest = ray.iter().map(|part| part.abs()).max().unwrap_or(0);
+        let divisor = (i128::from(nearest) + product(step, greatest)).unsigned_abs();
         // The ray is below 2^62, and the part of it that remains is below 2^61 in either case.
-        Self::At(
-            [0, 1, 2].map(|axis| centre[axis] + (i128::from(ray[axis]) * square / divisor) as i64),
-        )
+        let shortened =
+            |part: i64| part.signum() * divide(product(part.abs(), square) as u128, divisor) as i64;
+        Self::At([0, 1, 2].map_each(|axis| centre[axis] + shortened(ray[axis])))
     }
-}
-
-/// Returns the greatest absolute value of the components.
-fn greatest(ray: [i64; 3]) -> i128 {
-    ray.iter().map(|part| i128::from(part.unsigned_abs())).max().unwrap_or(0)
 }
 
 #[cfg(test)]

@@ -46,12 +46,12 @@ pub type StepsPerMillimetre = [Millimetres; 2];
 
 impl Page {
     /// Returns the size of the page without its margins and its foot, in units of 2^-16 mm.
-    pub(super) fn free(&self) -> Result<[u64; 2], PageError> {
+    pub(super) fn free(&self) -> Result<[i64; 2], PageError> {
         let margin = i64::from(self.margin.to_bits());
         let free = [(self.width, 0), (self.height, 1)]
             .map(|(side, axis)| i64::from(side.to_bits()) - margin - self.first(axis));
         match free {
-            [width, height] if width > 0 && height > 0 => Ok([width as u64, height as u64]),
+            [width, height] if width > 0 && height > 0 => Ok(free),
             _ => Err(PageError::NoRoom),
         }
     }

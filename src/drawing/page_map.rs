@@ -3,7 +3,8 @@
 use super::page::{foot_steps, side_steps};
 use super::window::Window;
 use super::{PAGE_LIMIT, Page, PageError, PagePoint, StepsPerMillimetre};
-use crate::fixed::{divide, divide_rounding, half, product};
+use crate::array::MapEach;
+use crate::fixed::{divide, divide_rounding, half, product, shift_left, shift_right};
 use crate::geometry::{Projection, Vertex};
 use crate::model::Position;
 use crate::visibility::EdgeParameter;
@@ -49,6 +50,11 @@ impl Bounds {
                 Self { low: point, high: point }
             })
             .reduce(Self::union)
+    }
+
+    /// Returns the width and the height.
+    fn size(&self) -> [i64; 2] {
+        [0, 1].map_each(|axis: usize| self.high[axis] - self.low[axis])
     }
 
     /// Returns the smallest box that contains both boxes.
@@ -142,47 +148,45 @@ impl PageMap {
     ) -> Result<Self, PageError> {
         let free = page.free()?;
         page.check_steps(steps)?;
-        let size = [0, 1].map(|axis: usize| (bounds.high[axis] - bounds.low[axis]).unsigned_abs());
+        let size = bounds.size();
         // The tighter axis decides the scale, in millimetres for each unit of the image: free /
         // size.
         let (length, extent) = match size {
             [0, 0] => (1, 1),
             [width, 0] => (free[0], width),
             [0, height] => (free[1], height),
-            [width, height] => {
-                let by_width = u128::from(free[0]) * u128::from(height);
-                let by_height = u128::from(free[1]) * u128::from(width);
-                if by_width <= by_height { (free[0], width) } else { (free[1], height) }
+            [width, height] if product(free[0], height) <= product(free[1], width) => {
+                (free[0], width)
             }
+            [_, height] => (free[1], height),
         };
-        let numerator =
-            [0, 1].map(|axis: usize| u128::from(length) * steps[axis].to_bits() as u128);
-        let denominator = u128::from(extent);
+        // Lengths on the page are below 2^31, as are the steps.
+        let numerator = steps.map_each(|steps| length * i64::from(steps.to_bits()));
         // a = numerator / extent 2^-32 2^unit_bits 2^k, with k as great as SCALE_BITS allow.
         let largest = numerator[0].max(numerator[1]).max(1);
-        let bits = |value: u128| (128 - value.leading_zeros()) as i32;
-        let shift = SCALE_BITS as i32 + bits(denominator) - bits(largest);
+        let bits = |value: i64| (64 - value.leading_zeros()) as i32;
+        let shift = SCALE_BITS as i32 + bits(extent) - bits(largest);
         let k = (shift + 32 - unit_bits as i32).clamp(0, FINEST as i32);
         let shift = k - 32 + unit_bits as i32;
-        let (up, down) = (shift.max(0), (-shift).max(0));
-        let a = numerator.map(|numerator| {
-            // The quotient is below 2^42 by the choice of k.
-            divide(numerator << up, denominator << down) as i64
-        });
-        let b = [0, 1].map(|axis: usize| {
+        let k = k as u32;
+        let (up, down) = (shift.max(0) as u32, (-shift).max(0) as u32);
+        let divisor = shift_left(extent.into(), down) as u128;
+        // The quotient is below 2^42 by the choice of k.
+        let a =
+            numerator.map_each(|part| divide(shift_left(part.into(), up) as u128, divisor) as i64);
+        let b = [0, 1].map_each(|axis: usize| {
             // The drawing and the foot below it are centred together.
-            let side =
-                i128::from(side_steps(page, steps, axis) + foot_steps(page, steps, axis)) << k;
-            let middle = i128::from(bounds.low[axis]) + i128::from(bounds.high[axis]);
-            half(side) - ((i128::from(a[axis]) * middle) >> (unit_bits + 1))
+            let side = side_steps(page, steps, axis) + foot_steps(page, steps, axis);
+            let middle = bounds.low[axis] + bounds.high[axis];
+            half(shift_left(side.into(), k)) - shift_right(product(a[axis], middle), unit_bits + 1)
         });
-        Ok(Self { a, b, k: k as u32, window: None })
+        Ok(Self { a, b, k, window: None })
     }
 
     /// Makes the map take coordinates that are greater by a factor of 2^`bits`.
     fn coarsen(&mut self, bits: u32) {
         // (a p 2^-bits + b) / 2^k = (a p + b 2^bits) / 2^(k + bits)
-        self.b = self.b.map(|b| b << bits);
+        self.b = self.b.map_each(|b| shift_left(b, bits));
         self.k += bits;
     }
 
@@ -201,39 +205,39 @@ impl PageMap {
     ) -> Result<Self, PageError> {
         let free = page.free()?;
         page.check_steps(steps)?;
-        let to_page = |value: i64| (i128::from(value) << 16) >> fraction_bits;
-        let size = [0, 1].map(|axis: usize| to_page(bounds.high[axis] - bounds.low[axis]));
-        if size[0] > i128::from(free[0]) || size[1] > i128::from(free[1]) {
+        // Positions of a plan have 32 bits.
+        let to_page = |value: i64| (value << 16) >> fraction_bits;
+        let size = bounds.size().map_each(to_page);
+        if size[0] > free[0] || size[1] > free[1] {
             // Converts a size in units of 2^-16 mm to 0.1 mm, rounded.
-            let tenths = |size: i128| u32::try_from((10 * size as i64 + (1 << 15)) >> 16);
-            let [width, height] = size.map(|size| tenths(size).unwrap_or(u32::MAX));
+            let tenths = |size: i64| u32::try_from((10 * size + (1 << 15)) >> 16);
+            let [width, height] = size.map_each(|size| tenths(size).unwrap_or(u32::MAX));
             return Err(PageError::DoesNotFit { width, height, foot: page.foot });
         }
-        let moved = [0, 1].map(|axis: usize| {
+        let a = steps.map_each(|steps| i64::from(steps.to_bits()));
+        let b = [0, 1].map_each(|axis: usize| {
             let (low, high) = (to_page(bounds.low[axis]), to_page(bounds.high[axis]));
-            let first = i128::from(page.first(axis));
-            let last = first + i128::from(free[axis]);
-            if low < first { first - low } else { (last - high).min(0) }
+            let first = page.first(axis);
+            let last = first + free[axis];
+            let moved = if low < first { first - low } else { (last - high).min(0) };
+            shift_left(product(moved, a[axis]), fraction_bits) >> 16
         });
-        let bits = steps.map(|steps| i64::from(steps.to_bits()));
-        Ok(Self {
-            a: bits,
-            b: [0, 1]
-                .map(|axis: usize| (moved[axis] * i128::from(bits[axis])) << fraction_bits >> 16),
-            k: 16 + fraction_bits,
-            window: None,
-        })
+        Ok(Self { a, b, k: 16 + fraction_bits, window: None })
+    }
+
+    /// Returns a coordinate of the image point that c/w is along `axis`, in 2^-`k` steps, times w.
+    /// |c| and w must be below 2^52, so that it is below 2^42 2^52 + 2^(44 + 21) 2^52 < 2^118.
+    #[inline(never)] // Its 128-bit arithmetic is long.
+    fn times_w(&self, axis: usize, c: i64, w: i64) -> i128 {
+        product(self.a[axis], c) + self.b[axis] * i128::from(w)
     }
 
     /// Returns the image point (x/w, y/w) in steps. |x| and |y| must be below 2^52, and 0 < w <
     /// 2^52.
     pub fn point(&self, x: i64, y: i64, w: i64) -> PagePoint {
-        let [x, y] = [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
-            // The sum is below 2^42 2^52 + 2^(44 + 21) 2^52, so it fits 127 bits.
-            let steps = divide_rounding(
-                product(self.a[axis], c) + self.b[axis] * i128::from(w),
-                i128::from(w) << self.k,
-            );
+        let divisor = shift_left(w.into(), self.k);
+        let [x, y] = [(0, x), (1, y)].map_each(|(axis, c)| {
+            let steps = divide_rounding(self.times_w(axis, c, w), divisor);
             steps.clamp(-i128::from(PAGE_LIMIT), i128::from(PAGE_LIMIT)) as i32
         });
         PagePoint { x, y }
@@ -263,16 +267,14 @@ impl PageMap {
     /// Returns the image point (x/w, y/w) in 1/256 steps, for [`crate::curve::Spline::chords`]. As
     /// [`PageMap::point`], but not limited to the page.
     pub fn fine(&self, x: i64, y: i64, w: i64) -> crate::curve::Fine {
-        [(x, 0), (y, 1)].map(|(c, axis): (i64, usize)| {
-            // The sum is below 2^118, see `point`, so the shift does not overflow.
-            let sum = product(self.a[axis], c) + self.b[axis] * i128::from(w);
-            let fine = if w & (w - 1) == 0 {
-                // The case of a parallel view: a shift is many times faster than a
-                // division.
-                let shift = w.trailing_zeros() + self.k;
-                ((sum << 9 >> shift) + 1) >> 1
-            } else {
-                divide_rounding(sum << 8, i128::from(w) << self.k)
+        let divisor = shift_left(w.into(), self.k);
+        // The case of a parallel view: a shift is many times faster than a division.
+        let power = (w & (w - 1) == 0).then(|| w.trailing_zeros() + self.k);
+        [(0, x), (1, y)].map_each(|(axis, c)| {
+            let scaled = self.times_w(axis, c, w) << 8; // below 2^126
+            let fine = match power {
+                Some(power) => (shift_right(scaled << 1, power) + 1) >> 1,
+                None => divide_rounding(scaled, divisor),
             };
             const LIMIT: i128 = 1 << 40;
             fine.clamp(-LIMIT, LIMIT) as i64

@@ -205,8 +205,7 @@ fn points_of_a_plane_stay_in_it_within_their_errors() {
         let height = |points: [[i32; 3]; 4]| {
             let [a, points @ ..] = points;
             let [u, v, w] = points.map(|to| difference(to, a));
-            let uv = cross(u, v);
-            (0..3).map(|n| uv[n] * i128::from(w[n])).sum::<i128>()
+            dot(cross(u, v), w)
         };
         for sign in [1, -1] {
             let mut moved = exact;
@@ -220,12 +219,35 @@ fn points_of_a_plane_stay_in_it_within_their_errors() {
             }
             let [u, v] = [1, 2].map(|to| difference(moved[to], moved[0]));
             let side = largest(u).max(largest(v)).max(largest([0, 1, 2].map(|n| v[n] - u[n])));
-            let area = cross(u, v).iter().map(|part| part.unsigned_abs()).max().unwrap_or(0);
-            if area >= WIDTHS * off.unsigned_abs() as u128 * side as u128 {
+            if largest(cross(u, v)) >= WIDTHS * i64::from(off) * side {
                 assert!(are_coplanar(moved, precision), "{exact:?} {moved:?}");
                 tried += 1;
             }
         }
     }
     assert!(tried > 1000, "{tried}");
+}
+
+#[test]
+fn the_corners_of_the_largest_cube_overflow_nothing() {
+    let corner = |number: usize| {
+        [0, 1, 2].map(|axis: usize| if number >> axis & 1 == 0 { -(1 << 30) } else { 1 << 30 })
+    };
+    let roughest = Precision { written: 1 << 30, unit: 1 << 30 };
+    for number in 0..8 * 8 * 8 * 8 {
+        let points = [0, 3, 6, 9].map(|shift: usize| corner(number >> shift & 7));
+        let [a, b, c, d] = points;
+        let [u, v, w] = [b, c, d].map(|to| [0, 1, 2].map(|n| i128::from(to[n]) - i128::from(a[n])));
+        let minor = |m: usize, n: usize| u[m] * v[n] - u[n] * v[m];
+        let normal = [minor(1, 2), minor(2, 0), minor(0, 1)];
+        let height: i128 = (0..3).map(|n| normal[n] * w[n]).sum();
+        assert_eq!(are_coplanar(points, Precision::default()), height == 0, "{points:?}");
+        // The cube is narrower than 64 times this precision, which then counts as exact.
+        assert_eq!(are_coplanar(points, roughest), height == 0, "{points:?}");
+        let in_line = normal == [0; 3];
+        assert_eq!(are_in_line([a, b, c], Precision::default()), in_line, "{points:?}");
+        // An error of one unit lets no corner of the cube come into a plane of others.
+        let precise = Precision { written: 1, unit: 1 };
+        assert_eq!(are_coplanar(points, precise), height == 0, "{points:?}");
+    }
 }

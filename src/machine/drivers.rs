@@ -24,10 +24,10 @@ impl Machine<'_> {
             return self.alarm(Alarm::Queue);
         }
         self.released_at = self.runner.ticks();
-        // The motors have no current, as during sleep.
-        self.forget_backlash();
         if self.settings.is_on(Setting::Tool) {
-            self.runner.forget_lift();
+            self.forget_what_needs_current();
+        } else {
+            self.forget_backlash();
         }
     }
 }

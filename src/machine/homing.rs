@@ -110,14 +110,16 @@ pub(super) struct Homing {
     pub(super) pressed_at: Option<PagePoint>,
     /// Whether the move of this phase has been planned to its end.
     pub(super) is_stopped: bool,
+    /// Whether the position was unknown when homing began.
+    pub(super) was_lost: bool,
 }
 
 impl Homing {
     /// Returns the first phase of homing an axis, which depends on whether its switch is `pressed`
     /// already.
-    pub(super) const fn begin(axis: Axis, pressed: bool) -> Self {
+    pub(super) const fn begin(axis: Axis, pressed: bool, was_lost: bool) -> Self {
         let phase = if pressed { Phase::Leave } else { Phase::Seek };
-        Self { axis, phase, pressed_at: None, is_stopped: false }
+        Self { axis, phase, pressed_at: None, is_stopped: false, was_lost }
     }
 
     /// Whether the axis moves slowly in this phase.
@@ -162,12 +164,12 @@ impl Homing {
             Phase::PullOff => {
                 return match self.axis {
                     _ if pressed => Err(SwitchFault),
-                    Axis::X => Ok(Some(Self::begin(Axis::Y, switches.y))),
+                    Axis::X => Ok(Some(Self::begin(Axis::Y, switches.y, self.was_lost))),
                     Axis::Y => Ok(None),
                 };
             }
         };
-        Ok(Some(Self { axis: self.axis, phase, pressed_at: None, is_stopped: false }))
+        Ok(Some(Self { phase, pressed_at: None, is_stopped: false, ..self }))
     }
 }
 
@@ -179,12 +181,16 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
     pub fn home(&mut self, switches: Switches) -> Result<(), MachineError> {
-        let is_allowed = matches!(self.activity, Activity::Idle | Activity::Alarm(Alarm::NotHomed));
-        if !is_allowed || !self.is_stopped() {
-            return Err(self.refusal());
-        }
+        let was_lost = match self.activity {
+            Activity::Idle if self.is_stopped() => false,
+            Activity::Alarm(alarm @ Alarm::NotHomed) => {
+                self.release_pins(alarm)?;
+                true
+            }
+            _ => return Err(self.refusal()),
+        };
         self.forget_backlash();
-        self.begin_phase(Homing::begin(Axis::X, switches.x));
+        self.begin_phase(Homing::begin(Axis::X, switches.x, was_lost));
         Ok(())
     }
 

@@ -162,7 +162,10 @@ impl Machine<'_> {
         #[cfg(feature = "resume")]
         self.begin_points(0);
         self.progress = Progress::begin(size, self.runner.run());
-        self.reset_ink_budget();
+        // Moves that are sent one by one may stop and go on, so their ink is counted on.
+        if !matches!(source, Source::Stream) {
+            self.reset_ink_budget();
+        }
         self.steady = Steady::default();
         self.activity = Activity::Run(source);
     }
@@ -263,9 +266,11 @@ impl Machine<'_> {
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn after_stop(&mut self, progress: RunnerProgress) {
         match self.activity {
+            // Where moves are sent one by one, a stroke may be over because the next move is late.
             Activity::Run(source) | Activity::Hold { source, .. }
                 if progress == RunnerProgress::Stopped
-                    || matches!(source, Source::PenChange { .. }) =>
+                    || matches!(source, Source::PenChange { .. })
+                    || (matches!(source, Source::Stream) && self.runner.pauses()) =>
             {
                 if let Activity::Run(_) = self.activity {
                     self.reset_ink_budget();
@@ -293,13 +298,18 @@ impl Machine<'_> {
     fn pause_at_switch(&mut self, queue: &mut dyn EventQueue) {
         let ticks = self.settings.milliseconds_as_ticks(Setting::HomingDebounce);
         let is_homing = matches!(self.activity, Activity::Home(Homing { is_stopped: true, .. }));
-        if is_homing && ticks > 0 && self.runner.dwell(ticks, queue).is_err() {
+        if !is_homing || ticks == 0 {
+            return;
+        }
+        // An event lasts 0.67 s at most, and the setting allows a second.
+        let half = ticks.div_ceil(2);
+        if self.runner.dwell(half, queue).is_err() || self.runner.dwell(half, queue).is_err() {
             self.alarm(Alarm::Queue);
         }
     }
 
     /// Restarts the count of the ink after which the machine pauses ([`Setting::InkBeforePause`]).
-    pub(super) fn reset_ink_budget(&mut self) {
+    pub fn reset_ink_budget(&mut self) {
         let metres = u64::from(self.settings.get(Setting::InkBeforePause).to_bits().unsigned_abs());
         // Converts units of 2^-16 m to units of 2^-18 mm.
         self.runner.stop_after_ink((metres > 0).then_some(metres * 4000));

@@ -54,6 +54,7 @@ pub use stroke_points::StrokePoints;
 pub use tool::{Pen, Solenoid, servo};
 
 use backlash::Backlash;
+use homing::Homing;
 use progress::Progress;
 use segmenter::Segmenter;
 use state::{Activity, Source};
@@ -164,6 +165,7 @@ impl<'m> Machine<'m> {
             released_at: 0,
         };
         machine.configure_pulser();
+        machine.reset_ink_budget();
         machine.set_position(PagePoint::default());
         machine
     }
@@ -220,7 +222,11 @@ impl<'m> Machine<'m> {
         if spreads_backlash {
             self.set_motors(self.motors_now(), page);
         }
-        self.settings = settings;
+        let ink_before =
+            core::mem::replace(&mut self.settings, settings).get(Setting::InkBeforePause);
+        if settings.get(Setting::InkBeforePause) != ink_before {
+            self.reset_ink_budget();
+        }
         self.resize_backlash(backlash);
         if self.settings.kinematics() != before {
             // The pen stays where it is, but the motors' coordinates for that position change.
@@ -355,8 +361,12 @@ impl<'m> Machine<'m> {
     }
 
     /// Slows down, raises the pen and cancels the job. The position stays known. This also ends a
-    /// feed hold, a jog and homing.
+    /// feed hold, a jog and homing. Homing that began in [`Alarm::NotHomed`] stops at once and ends
+    /// in that alarm again, because the position is still unknown.
     pub fn abort(&mut self) {
+        if let Activity::Home(Homing { was_lost: true, .. }) = self.activity {
+            return self.alarm(Alarm::NotHomed);
+        }
         if matches!(
             self.activity,
             Activity::Run(_) | Activity::Hold { .. } | Activity::Jog | Activity::Home(_)
@@ -373,6 +383,9 @@ impl<'m> Machine<'m> {
     /// pins stopped.
     pub fn alarm(&mut self, alarm: Alarm) {
         self.pins.halt();
+        if let Activity::Sleep { .. } = self.activity {
+            self.forget_what_needs_current();
+        }
         self.end_log();
         self.end_homing();
         self.segmenter = None;
@@ -409,23 +422,38 @@ impl<'m> Machine<'m> {
     /// a motor still raises the pen, and while the emergency stop is pressed.
     pub fn unlock(&mut self) -> Result<(), MachineError> {
         match self.activity {
-            // The motors had no current, so the backlash and the height of the pen are unknown.
-            Activity::Sleep { .. } => {
-                self.forget_backlash();
-                self.runner.forget_lift();
-            }
-            Activity::Alarm(alarm)
-                if self.is_stopped()
-                    && !self.contacts.stop
-                    && !self.runner.is_pen_held(alarm == Alarm::Restarted) =>
-            {
-                self.set_motors(self.motors_now(), self.position());
-                self.pins.release();
+            Activity::Sleep { .. } => self.forget_what_needs_current(),
+            Activity::Alarm(alarm) => {
+                self.release_pins(alarm)?;
+                if alarm == Alarm::Restarted {
+                    self.forget_what_needs_current();
+                }
             }
             _ => return Err(self.refusal()),
         }
         self.activity = Activity::Idle;
         Ok(())
+    }
+
+    /// Lets the pins move again after an alarm, from where they are.
+    ///
+    /// # Errors
+    /// See [`Machine::unlock`].
+    fn release_pins(&mut self, alarm: Alarm) -> Result<(), MachineError> {
+        let is_held = self.runner.is_pen_held(alarm == Alarm::Restarted);
+        if !self.is_stopped() || self.contacts.stop || is_held {
+            return Err(self.refusal());
+        }
+        self.set_motors(self.motors_now(), self.position());
+        self.pins.release();
+        Ok(())
+    }
+
+    /// Forgets on which side of its backlash each motor is, and the height of a pen that a motor
+    /// lifts: the motors have had no current, so they may have been turned.
+    fn forget_what_needs_current(&mut self) {
+        self.forget_backlash();
+        self.runner.forget_lift();
     }
 
     /// Declares that the pen has been put at the page's origin by hand.
@@ -447,12 +475,14 @@ impl<'m> Machine<'m> {
             && (self.pins.is_halted() || self.pins.ticks() == self.runner.ticks())
     }
 
-    /// Passes the pulse width, the pin inversion and the rule for braking to the step interrupt.
+    /// Passes the pulse width, the pin inversion, the height of the raised pen and the rule for
+    /// braking to the step interrupt.
     /// Call it only while nothing moves.
     fn configure_pulser(&mut self) {
         self.pins.configure(
             self.settings.microseconds_as_ticks(Setting::StepPulse),
             self.settings.whole(Setting::InvertDirections) as u8, // at most 7
+            Tool::positions(&self.settings).up_height,
         );
         let (rule, _) = self.settings.brake(self.pins.queue());
         self.runner.set_brake(rule);

@@ -40,6 +40,7 @@ impl Machine<'_> {
     ///
     /// # Errors
     /// See [`PushError`]. On an error nothing is appended.
+    #[inline(never)] // The Pico places it beside what the main loop does for each chord.
     pub(super) fn push(
         &mut self,
         target: Target,

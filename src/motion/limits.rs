@@ -52,6 +52,9 @@ pub enum LimitsError {
     Anchors,
     /// Pulses of 1 ms or longer.
     Pulse,
+    /// The raised pen is to be lower than the lowered one, but a stepper motor lifts it, which
+    /// looks for its stop upward.
+    PenUpsideDown,
     /// The pen is to move while the machine does, but a stepper motor lifts it, which moves only at
     /// rest.
     #[cfg(feature = "pen-overlap")]

@@ -247,6 +247,10 @@ impl<'m> Runner<'m> {
         if pen.lift != self.pen.lift {
             self.forget_lift();
         }
+        if pen.up_height != self.pen.up_height {
+            // The pen is raised to the new height before anything else moves.
+            self.pen_is_down = None;
+        }
         self.pen = pen;
         self.emitter.set_limits(&limits);
         self.lookahead.pass_limits_on(limits.jerk.is_none());
@@ -678,6 +682,11 @@ impl<'m> Runner<'m> {
         self.ink_bound = length.map_or(u64::MAX, |length| self.run.drawn.saturating_add(length));
     }
 
+    /// Whether the runner is to stop before the next travel.
+    pub fn pauses(&self) -> bool {
+        self.stopping_after_stroke || self.run.drawn >= self.ink_bound
+    }
+
     /// Continues where [`Runner::stop`] or [`Runner::stop_after_stroke`] stopped.
     pub fn resume(&mut self) {
         self.stopping = false;
@@ -872,8 +881,7 @@ impl<'m> Runner<'m> {
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         let stroke_ends =
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
-        let pauses = self.stopping_after_stroke || self.run.drawn >= self.ink_bound;
-        let stops = self.stopping || (pauses && stroke_ends);
+        let stops = self.stopping || (stroke_ends && self.pauses());
         if stops && self.plan.is_none() && self.plan_end == PathSpeed::REST {
             return self.come_to_rest(Progress::Stopped, queue);
         }

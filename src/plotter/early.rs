@@ -148,7 +148,8 @@ impl<B: Board, I: Index> Cancel for OrderCancel<'_, '_, B, I> {
     fn check(&mut self) -> Result<(), Aborted> {
         let Self { inner, board, begun, status_due } = self;
         let requests = board.take_real_time();
-        report::greet_opened(inner.machine.state(), inner.resumption, *board);
+        let settings = Some(inner.machine.settings());
+        report::greet_opened(inner.machine.state(), inner.resumption, settings, *board);
         if requests.has(RealTime::ABORT) {
             inner.machine.abort();
             inner.act(requests.only(RealTime::EMERGENCY));

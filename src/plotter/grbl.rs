@@ -256,19 +256,16 @@ impl<I: Index> Inner<'_, I> {
         let _ = self.program.end(self.machine.settings());
     }
 
-    /// Sets the origin of a coordinate system, which is kept once the machine is at rest, if
-    /// `waits`.
-    pub(super) fn set_system(&mut self, index: usize, origin: MachinePosition, waits: bool) {
+    /// Sets the origin of a coordinate system, which is kept once the machine is at rest.
+    pub(super) fn set_system(&mut self, index: usize, origin: MachinePosition) {
         if let Some(system) = self.parameters.systems.get_mut(index) {
             *system = origin;
         }
         self.report_counts.origin = 0;
-        if waits {
-            self.task = Some(Task::Keep { settings: false });
-        }
+        self.task = Some(Task::Keep { settings: false });
     }
 
-    /// Sets the position of G28 or G30, which is kept once the machine is at rest, if `waits`.
+    /// Sets the position of G28 or G30, which is kept once the machine is at rest.
     ///
     /// # Errors
     /// [`CommandError::Setting`] for a position of G28 that the settings do not hold.
@@ -276,16 +273,13 @@ impl<I: Index> Inner<'_, I> {
         &mut self,
         kept: StoredPosition,
         position: MachinePosition,
-        waits: bool,
     ) -> Result<(), CommandError> {
         let [x, y, _] = position;
         match kept {
             StoredPosition::Park => self.machine.set_park([x, y])?,
             StoredPosition::Second => self.parameters.second = position,
         }
-        if waits {
-            self.task = Some(Task::Keep { settings: kept == StoredPosition::Park });
-        }
+        self.task = Some(Task::Keep { settings: kept == StoredPosition::Park });
         Ok(())
     }
 

@@ -83,7 +83,7 @@ impl<'b, B: Board> Listener<'b, B> {
 
 impl<B: Board> Cancel for Listener<'_, B> {
     fn check(&mut self) -> Result<(), Aborted> {
-        report::greet_opened(State::Run, Resumption::default(), self.board);
+        report::greet_opened(State::Run, Resumption::default(), None, self.board);
         let requests = self.board.take_real_time();
         if requests.has(RealTime::RESUME) {
             self.requests = self.requests.only(RealTime::EMERGENCY);

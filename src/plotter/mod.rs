@@ -296,6 +296,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         #[cfg(feature = "resume")]
         self.inner.report_held(None, board);
         self.inner.resumption.report(State::Idle, board);
+        records::report_refused(self.inner.machine.settings(), board);
         #[cfg(feature = "tiles")]
         self.inner.find_stored(board);
         self.inner.run_startup_lines(board);
@@ -515,7 +516,8 @@ impl<'m, I: Index> Plotter<'m, I> {
     /// Carries out the real-time `requests`, and everything else that does not come by a line.
     fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
         let state = self.inner.machine.state();
-        report::greet_opened(state, self.inner.resumption, board);
+        let settings = Some(self.inner.machine.settings());
+        report::greet_opened(state, self.inner.resumption, settings, board);
         if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
             board.show_drive();
         }
@@ -734,6 +736,7 @@ impl<I: Index> Inner<'_, I> {
             }
             Command::Sleep => {
                 self.machine.sleep()?;
+                self.resumption.lose_position();
                 Reply(board).line(format_args!("[MSG:Sleeping]"));
             }
             Command::Jog(line) => self.jog(line)?,

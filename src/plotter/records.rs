@@ -5,10 +5,11 @@ use super::job::FIGURES;
 #[cfg(feature = "early-ink")]
 use super::job::{UNORDERED_WORDS, Unordered};
 use super::program::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
-use super::{Board, Job, NotStored, Record, Stored};
+use super::{Board, Job, NotStored, Record, Reply, Stored};
 use crate::array::MapEach;
+use crate::fixed::Length;
 use crate::index::Index;
-use crate::machine::{SETTINGS, Settings, Value};
+use crate::machine::{SETTINGS, Setting, Settings, Value};
 use crate::protocol::CommandError;
 #[cfg(feature = "early-ink")]
 use crate::storage::PAGE_BYTES;
@@ -16,10 +17,12 @@ use crate::storage::PAGE_BYTES;
 /// Size of a kept setting: two bytes for its number, four for its value.
 const SETTING_BYTES: usize = 6;
 
-/// The settings kept by the board; those that are not kept have their default values.
-#[inline(never)] // Inlined, its frame would take stack while a job is computed.
-pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
-    let mut values = heapless::Vec::<(u16, Value), { SETTINGS.len() }>::new();
+/// The values of settings that the board has kept, with their numbers.
+type KeptValues = heapless::Vec<(u16, Value), { SETTINGS.len() }>;
+
+/// Reads the values of settings that the board has kept.
+fn kept_values<B: Board>(board: &mut B) -> KeptValues {
+    let mut values = KeptValues::new();
     board.load(Record::Settings, &mut |record| {
         let mut bytes = [0; SETTING_BYTES];
         // A record with more entries than there are settings was written by another version. Its
@@ -30,7 +33,30 @@ pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
             let _ = values.push((u16::from_le_bytes([a, b]), value));
         }
     });
-    Settings::restored(values.iter().copied())
+    values
+}
+
+/// The settings kept by the board; those that are not kept, or that are refused, have their default
+/// values.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+pub(super) fn load_settings<B: Board>(board: &mut B) -> Settings {
+    Settings::restored(kept_values(board).iter().copied())
+}
+
+/// Says which of the values that the board has kept are not in force, because this firmware
+/// refuses them.
+#[inline(never)] // Inlined, its frame would take stack while a job is computed.
+pub(super) fn report_refused<B: Board>(settings: &Settings, board: &mut B) {
+    for (number, value) in kept_values(board) {
+        let Some(setting) = Setting::numbered(number) else { continue };
+        if settings.get(setting) != value {
+            let [kept, value] = [value, settings.get(setting)].map(Length);
+            Reply(board).line(format_args!(
+                "[MSG:the kept ${number}={kept} is refused, so {value} holds: set it before you \
+                 draw]"
+            ));
+        }
+    }
 }
 
 /// Keeps the settings in the board's flash.

@@ -3,10 +3,10 @@
 use super::grbl::{rate, whole};
 use super::reply::Reply;
 use super::resume::Resumption;
-use super::{Board, Inner, Job};
+use super::{Board, Inner, Job, records};
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
-use crate::machine::{Alarm, Setting, State, Value};
+use crate::machine::{Alarm, Setting, Settings, State, Value};
 use crate::order;
 use crate::protocol::AlarmEntry;
 
@@ -31,9 +31,15 @@ pub(super) fn greet<B: Board>(board: &mut B) {
 }
 
 /// If a program has opened a port, writes the greeting to that port alone, with the current alarm,
-/// which the other ports have already heard of, and the job that has stopped.
+/// which the other ports have already heard of, the job that has stopped, and the kept settings
+/// that are not in force, if the settings are given.
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-pub(super) fn greet_opened<B: Board>(state: State, resumption: Resumption, board: &mut B) {
+pub(super) fn greet_opened<B: Board>(
+    state: State,
+    resumption: Resumption,
+    settings: Option<&Settings>,
+    board: &mut B,
+) {
     if !board.take_opened() {
         return;
     }
@@ -46,6 +52,9 @@ pub(super) fn greet_opened<B: Board>(state: State, resumption: Resumption, board
         Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
     }
     resumption.report(state, board);
+    if let Some(settings) = settings {
+        records::report_refused(settings, board);
+    }
     board.reply_only_to_opened(false);
 }
 

@@ -102,6 +102,12 @@ impl<I: Index> Inner<'_, I> {
         if requests.has(RealTime::PAUSE) {
             self.machine.pause_after_stroke();
         }
+        // Between two lines of a program, and in a dwell, the machine is idle and can hold at once.
+        // In other states this is refused.
+        if (requests.has(RealTime::HOLD) || requests.has(RealTime::PAUSE)) && self.program.is_open()
+        {
+            let _ = self.machine.pause();
+        }
         let mut change = OverrideChange::default();
         change.add(requests);
         self.change_overrides(change);
@@ -184,6 +190,7 @@ impl<I: Index> Inner<'_, I> {
     fn advance<B: Board>(&mut self, board: &mut B) -> Result<Progress, MachineError> {
         let machine = &mut self.machine;
         let is_stopped = machine.state() == State::Idle && machine.is_stopped();
+        let may_keep = is_stopped || machine.state() == State::Check;
         match &mut self.task {
             Some(Task::Arc(from, arc)) if machine.has_room() => {
                 // The chord iterator is made anew for each chord. Keeping it, with the points that
@@ -207,6 +214,7 @@ impl<I: Index> Inner<'_, I> {
             Some(Task::Pause { for_pen }) if is_stopped => {
                 let text = if *for_pen { "put in the next pen, then" } else { "to go on," };
                 machine.pause()?;
+                machine.reset_ink_budget();
                 Reply(board).line(format_args!("[MSG:{text} send ~]"));
                 Ok(Progress::Done(Ok(())))
             }
@@ -214,12 +222,13 @@ impl<I: Index> Inner<'_, I> {
                 machine.draw_to(Target { point: *point, ink: None }, None)?;
                 Ok(Progress::Done(Ok(())))
             }
-            Some(Task::Keep { settings }) if is_stopped => {
+            Some(Task::Keep { settings }) if may_keep => {
                 let settings = *settings;
                 Ok(Progress::Done(self.keep(settings, board)))
             }
             Some(Task::Home) if is_stopped => {
                 self.resumption.find_position();
+                self.run_startup_lines(board);
                 Ok(Progress::Done(Ok(())))
             }
             Some(Task::Dwell(_)) if is_stopped => Ok(Progress::Done(Ok(()))),
@@ -284,7 +293,8 @@ impl<I: Index> Inner<'_, I> {
     pub(super) fn context(&self) -> Context<'_> {
         let settings = self.machine.settings();
         let park = [settings.get(Setting::ParkX), settings.get(Setting::ParkY)];
-        Context { settings, parameters: &self.parameters, park }
+        let is_idle = self.machine.state() == State::Idle;
+        Context { settings, parameters: &self.parameters, park, is_idle }
     }
 
     /// Carries out a line of G-code, or begins a task for it.
@@ -317,7 +327,7 @@ impl<I: Index> Inner<'_, I> {
             self.program.at(&self.machine, checking).after(line, &self.context())?;
         let is_end = matches!(action, MachineAction::End);
         let machine = &mut self.machine;
-        let waits = !checking && !matches!(machine.state(), State::Abort);
+        let waits = !checking;
         match action {
             MachineAction::Nothing | MachineAction::End => {}
             MachineAction::Line(point) => machine.draw_to(program.target(point), program.feed())?,
@@ -343,10 +353,8 @@ impl<I: Index> Inner<'_, I> {
             }
             MachineAction::Pause { for_pen } if waits => self.task = Some(Task::Pause { for_pen }),
             MachineAction::Dwell(_) | MachineAction::Pause { .. } => {}
-            MachineAction::SetSystem(index, origin) => self.set_system(index, origin, waits),
-            MachineAction::StorePosition(kept, position) => {
-                self.keep_position(kept, position, waits)?
-            }
+            MachineAction::SetSystem(index, origin) => self.set_system(index, origin),
+            MachineAction::StorePosition(kept, position) => self.keep_position(kept, position)?,
             MachineAction::Position => self.report_position(board),
         }
         self.note_shift(&program);
@@ -379,7 +387,10 @@ impl<I: Index> Inner<'_, I> {
         if self.waits_for_targets() {
             return true;
         }
-        self.task.is_some() || (self.machine.is_streaming() && !self.machine.has_room())
+        // After ctrl-X and after a jog that was cancelled, lines wait until the machine stands.
+        self.task.is_some()
+            || self.machine.state() == State::Abort
+            || (self.machine.is_streaming() && !self.machine.has_room())
     }
 }
 

@@ -2,9 +2,9 @@
 //! a given angle.
 
 use super::triangles::areas;
-use crate::fixed::product;
-use crate::geometry::{Projection, Vertex};
-use core::cmp::Ordering;
+use crate::array::MapEach;
+use crate::fixed::{product, shift_right};
+use crate::geometry::{Projection, Vertex, dot};
 
 /// The sharpness that an edge between two faces must have to be drawn.
 ///
@@ -32,6 +32,7 @@ impl Crease {
     /// one from its back when it sees the other from its front. `are_one_plane` tells whether the
     /// faces lie in one plane in the model. If they do and one face continues the other across the
     /// edge, the edge is not drawn, however much rounding has bent them.
+    #[inline(never)] // Its 128-bit arithmetic is long.
     pub fn draws(
         &self,
         projection: Projection,
@@ -43,20 +44,14 @@ impl Crease {
         let [one, other] = faces.map(areas);
         let other = if turned { other.map(|area| -area) } else { other };
         let facing = |normal: [i64; 3]| match projection {
-            Projection::Perspective => [end.x, end.y, end.z]
-                .into_iter()
-                .zip(normal)
-                .map(|(at, part)| product(i64::from(at), part))
-                .sum::<i128>()
-                .signum(),
-            Projection::Parallel => i128::from(normal[2].signum()),
+            Projection::Perspective => {
+                dot([end.x, end.y, end.z].map_each(i64::from), normal).signum() as i64
+            }
+            Projection::Parallel => normal[2].signum(),
         };
         let is_drawn = facing(one) * facing(other) <= 0
             || self.is_sharp(self.unstretched(one), self.unstretched(other));
-        let is_folded = || {
-            let products = one.into_iter().zip(other).map(|(a, b)| i128::from(a) * i128::from(b));
-            products.sum::<i128>() <= 0
-        };
+        let is_folded = || dot(one, other) <= 0;
         is_drawn && (is_folded() || !are_one_plane())
     }
 
@@ -64,24 +59,22 @@ impl Crease {
     /// is stretched. Only its direction is kept; its components are below 2^20.
     fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
         let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
-        let exact = [0, 1, 2].map(|n| product(normal[n], i64::from(by[n])));
-        let largest = exact.iter().map(|part| part.unsigned_abs()).max();
-        let bits = 128 - largest.unwrap_or(0).leading_zeros();
-        exact.map(|part| (part >> bits.saturating_sub(20)) as i64)
+        let exact = [0, 1, 2].map_each(|n| product(normal[n], i64::from(by[n])));
+        // It has as many bits as the largest part.
+        let all = exact.iter().fold(0, |all, part| all | part.unsigned_abs());
+        let excess = (128 - all.leading_zeros()).saturating_sub(20);
+        exact.map_each(|part| shift_right(part, excess) as i64)
     }
 
     /// Whether the angle between two normals with components below 2^20 exceeds the limit.
     fn is_sharp(&self, one: [i64; 3], other: [i64; 3]) -> bool {
-        let dot = |a: [i64; 3], b: [i64; 3]| -> i128 {
-            let products = a.into_iter().zip(b).map(|(a, b)| i128::from(a * b));
-            products.sum()
-        };
-        let signed_square = |value: i128| value * value * value.signum();
+        let dot = |a: [i64; 3], b: [i64; 3]| (0..3).map(|n| a[n] * b[n]).sum::<i64>(); // below 2^42
         // Compares the cosine of the angle between the normals with the limit. Both are squared and
         // keep their signs; they stay below 2^115.
-        let found = signed_square(dot(one, other) << 15);
-        let limit = signed_square(i128::from(self.cosine)) * dot(one, one) * dot(other, other);
-        found.cmp(&limit) == Ordering::Less
+        let cosine = dot(one, other) << 15;
+        let limit = i64::from(self.cosine);
+        product(cosine, cosine.abs())
+            < product(dot(one, one), dot(other, other)) * i128::from(limit * limit.abs())
     }
 }
 

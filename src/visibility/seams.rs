@@ -2,7 +2,7 @@
 //! triangles have in common.
 
 use crate::array::MapEach;
-use crate::fixed::divide_down;
+use crate::fixed::{divide_down, product};
 use crate::geometry::{Vertex, plane_side};
 
 /// The bounding box of a face in view coordinates.
@@ -88,10 +88,12 @@ fn pierces(a: Vertex, b: Vertex, triangle: [Vertex; 3]) -> bool {
 /// Returns the point between a and b where the height is zero, rounded to the nearest whole
 /// coordinates.
 fn between(a: Vertex, b: Vertex, height_a: i64, height_b: i64) -> Vertex {
-    let (from, to) = (i128::from(height_a).abs(), i128::from(height_b).abs());
+    // The heights are within ±2^62.
+    let (from, to) = (height_a.abs(), height_b.abs());
+    let whole = i128::from(from) + i128::from(to);
     let mixed = |a: i32, b: i32| {
-        let sum = i128::from(a) * to + i128::from(b) * from;
-        divide_down(2 * sum + from + to, 2 * (from + to)) as i32
+        let sum = product(a.into(), to) + product(b.into(), from);
+        divide_down(2 * sum + whole, 2 * whole) as i32
     };
     Vertex::new(mixed(a.x, b.x), mixed(a.y, b.y), mixed(a.z, b.z))
 }

@@ -221,15 +221,19 @@ impl Sender<'_> {
             }
         }
         let number = PEN_DOWN.info().number;
-        let height_in = |reply: &Reply| match reply {
+        let value_of = |setting: Setting, reply: &Reply| match reply {
             Reply::Other(line) => {
-                let value = line.strip_prefix(&format!("${number}="))?;
+                let value = line.strip_prefix(&format!("${}=", setting.info().number))?;
                 value.split(' ').next()?.parse::<f64>().ok()
             }
             _ => None,
         };
         let changed = self.ask(SETTINGS).and_then(|replies| {
-            let Some(height) = replies.iter().find_map(height_in) else { return Ok(None) };
+            let [up, down] = [Setting::PenUpHeight, PEN_DOWN]
+                .map(|setting| replies.iter().find_map(|reply| value_of(setting, reply)));
+            let Some(height) = down else { return Ok(None) };
+            // A servo that is mounted the other way round lowers the pen by lesser numbers.
+            let by = if up > down { -by } else { by };
             let height = (height + by).clamp(0.0, 127.0);
             self.ask(&format!("${number}={height}"))?;
             Ok(Some(height))

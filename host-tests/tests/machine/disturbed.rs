@@ -123,11 +123,11 @@ proptest! {
         event_checker::check_speed(&drawn.runs, &job(), &Settings::default(), true);
         prop_assert!(drawn.last_step < time);
         prop_assert_eq!(drawn.end, pins);
-        if by_a_motor && drawn.runs.iter().any(|run| run.height == 20) {
-            prop_assert_eq!((drawn.pen, drawn.lift), raised(true));
-        } else {
-            // The position of the pen's motor was not known yet, or there is no such motor.
-            prop_assert_eq!(drawn.pen, 0);
+        let (height, lift) = raised(by_a_motor);
+        prop_assert_eq!(drawn.pen, height);
+        // Before the first step, the position of the pen's motor may not be known yet.
+        if by_a_motor && drawn.last_step > 0 {
+            prop_assert_eq!(drawn.lift, lift);
         }
     }
 }

@@ -39,12 +39,22 @@ fn after_a_restart_a_motor_raises_the_pen_and_then_has_no_current() {
 > unlock
 < State(Alarm(Restarted))
 > wait 1
+= the pen at height 20
 = drivers on
 = the pen's motor up 451 steps
 = the pen's motor down 62 steps
-= the pen at height 20
 = drivers off
 = Alarm(Restarted) at 0,0
+> unlock
+< ok
+> jog 50,60
+< ok
+> wait
+= drivers on
+= the pen's motor up 451 steps
+= the pen's motor down 62 steps
+= up 60 steps to 50,60
+= Idle at 50,60
 ";
     assert_eq!(transcript(lifted(Settings::default(), true), expected), expected);
 }

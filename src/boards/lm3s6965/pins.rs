@@ -4,9 +4,10 @@ use core::convert::Infallible;
 
 use embedded_hal::digital::{ErrorType, OutputPin};
 use penup::board_table::Pins;
-use penup::machine::{Axes, PinOrder};
+use penup::machine::{Axes, Pen, PinOrder, Solenoid};
 
 use super::registers::{GPIO_B, SYSTEM_CONTROL};
+use super::steps::STATE;
 use crate::boards::peripheral::Offset;
 
 /// The registers of the port that are used here, by their offset in bytes.
@@ -119,7 +120,8 @@ fn write(mask: u32, levels: u32) {
 /// Switches the drivers off, raises the pen and sets the step pins low. It is safe at any time,
 /// including in a fault.
 pub fn release() {
-    write(ALL, ENABLE);
+    Solenoid(Pin::<{ PINS.pen }>(())).set_height(STATE.up_height());
+    write(ALL & !(1 << PINS.pen), ENABLE);
 }
 
 /// Makes the pins outputs, with the levels of [`release`].

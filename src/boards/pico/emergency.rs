@@ -222,7 +222,7 @@ impl Fault for Pico {
     fn release() {
         UART0.receive_by_dma(false);
         steps::release();
-        pen::set_height(0);
+        pen::set_height(steps::STATE.up_height());
     }
 
     fn cause(info: &PanicInfo, _: usize) -> impl fmt::Display {

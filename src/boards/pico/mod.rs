@@ -93,8 +93,8 @@ pub struct Pico {
 }
 
 /// Sets up the clock, the pins, the serial lines, the state machine and the timer. Afterwards the
-/// drivers are off, the pen is up and nothing moves. It is a fault if the board was taken before,
-/// or if its crystal does not oscillate.
+/// drivers are off, the pen is not driven and nothing moves. It is a fault if the board was taken
+/// before, or if its crystal does not oscillate.
 pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     let (mut core, mut chip) = (once(Core::take()), once(Peripherals::take()));
     critical::move_vectors_to_ram();

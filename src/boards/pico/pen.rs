@@ -14,16 +14,21 @@ const DIVIDER: u32 = (super::clock::HERTZ / 1_000_000) << 4;
 /// The bit that lets the slice run.
 const ENABLE: u32 = 1;
 
-/// Starts the pulses with the pen raised.
+/// Prepares the slice, which makes no pulse yet. The servo stays where it is until the settings are
+/// read, which say at what height the pen is raised.
 pub fn set_up() {
     registers::restart(reset::PWM);
     PWM.ch(SLICE).div().put(DIVIDER);
     PWM.ch(SLICE).top().put(servo::PERIOD_MICROSECONDS - 1);
-    set_height(0);
+}
+
+/// Begins the pulses, with the pen at `height`.
+pub fn begin(height: u8) {
+    set_height(height);
     PWM.ch(SLICE).csr().put(ENABLE);
 }
 
-/// Moves the pen to `height`, from 0 (fully raised) to 127, with the next pulse.
+/// Moves the pen to `height`, from 0 to 127, with the next pulse.
 pub fn set_height(height: u8) {
     PWM.ch(SLICE).cc().put(servo::pulse_microseconds(height) << 16);
 }

@@ -1,9 +1,10 @@
 //! The rescue mode, which runs instead of the plotter when the program faults again and again as
 //! soon as it starts.
 //!
-//! Nothing moves, the drivers are off and the pen is up. Both ports answer: each line with the
-//! cause of the fault and `error:9`, `?` with a status, and ctrl-X with another attempt to start.
-//! `$UF2` and the 1200-baud touch open the drive for a new image.
+//! Nothing moves, the drivers are off, and the pen stays where the fault has raised it: its servo
+//! gets no pulses, because no settings are read that say at what height it is raised. Both ports
+//! answer: each line with the cause of the fault and `error:9`, `?` with a status, and ctrl-X with
+//! another attempt to start. `$UF2` and the 1200-baud touch open the drive for a new image.
 
 use core::fmt::Write;
 

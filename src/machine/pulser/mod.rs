@@ -160,7 +160,7 @@ impl<'q, A: Axes, P: Pen, const N: usize> Pulser<'q, A, P, N> {
     #[cold]
     #[inline(never)]
     pub fn stop(&mut self) {
-        self.pen.set_height(0);
+        self.pen.set_height(self.state.up_height());
         self.state.halt.store(Halt::Done as u8, Ordering::Relaxed);
         self.brake.stop();
         self.ring.set_running(false);

@@ -37,6 +37,8 @@ pub struct PulserState {
     inverted: AtomicU8,
     /// Whether the direction pin of z is inverted.
     z_inverted: AtomicBool,
+    /// The height of the raised pen.
+    up_height: AtomicU8,
     /// How many steps can be counted on to wait on a long path.
     queue_steps: AtomicU32,
     /// How the interrupt brakes when its queue runs empty.
@@ -71,6 +73,7 @@ impl PulserState {
             pulse_ticks: AtomicU32::new(50),
             inverted: AtomicU8::new(0),
             z_inverted: AtomicBool::new(false),
+            up_height: AtomicU8::new(0),
             queue_steps: AtomicU32::new(u32::MAX),
             brake: BrakeOrders::new(),
         }
@@ -195,9 +198,16 @@ impl PulserState {
         self.z_inverted.load(Ordering::Relaxed)
     }
 
-    /// Sets the width of a pulse in ticks, and the mask of inverted direction pins: bit 0 for x,
-    /// bit 1 for y, bit 2 for z.
-    pub(in crate::machine) fn configure(&self, pulse_ticks: u32, inverted: u8) {
+    /// The height of the raised pen, to which a halt or a fault sends it. A servo that is mounted
+    /// the other way round has it above that of the lowered pen.
+    pub fn up_height(&self) -> u8 {
+        self.up_height.load(Ordering::Relaxed)
+    }
+
+    /// Sets the width of a pulse in ticks, the mask of inverted direction pins (bit 0 for x, bit 1
+    /// for y, bit 2 for z), and the height of the raised pen.
+    pub(in crate::machine) fn configure(&self, pulse_ticks: u32, inverted: u8, up_height: u8) {
+        self.up_height.store(up_height, Ordering::Relaxed);
         self.pulse_ticks.store(pulse_ticks, Ordering::Relaxed);
         self.inverted.store(inverted & 3, Ordering::Relaxed);
         self.z_inverted.store(inverted & 4 != 0, Ordering::Relaxed);

@@ -106,21 +106,32 @@ impl Settings {
     }
 
     /// Restores settings that were read from [`Settings::iter`] before. `values` are pairs of
-    /// number and value; settings that are not among them get their defaults. Numbers that no
-    /// longer exist are ignored. If a value is out of its range, or if values conflict, all
-    /// settings get their defaults.
-    pub fn restored(values: impl IntoIterator<Item = (u16, Value)>) -> Self {
+    /// number and value; settings that are not among them get their defaults, and numbers that no
+    /// longer exist are ignored. A value that is out of its range, or conflicts with others, is
+    /// left out, too: that setting gets its default, and all others are restored.
+    pub fn restored(values: impl IntoIterator<Item = (u16, Value)> + Clone) -> Self {
+        let known = |(number, value)| Setting::numbered(number).map(|setting| (setting, value));
         let mut restored = Self::default();
-        for (setting, value) in values.into_iter().filter_map(|(number, value)| {
-            let setting = Setting::numbered(number)?;
-            Some((setting, value))
-        }) {
-            if setting.info().check(value).is_err() {
-                return Self::default();
+        for (setting, value) in values.clone().into_iter().filter_map(known) {
+            if setting.info().check(value).is_ok() {
+                restored.values[setting as usize] = value;
             }
-            restored.values[setting as usize] = value;
         }
-        if restored.check().is_ok() { restored } else { Self::default() }
+        if restored.check().is_ok() {
+            return restored;
+        }
+        // One by one, as a user would send them. Some are valid only behind others, which may come
+        // later, so they are tried again until a turn changes nothing.
+        let mut restored = Self::default();
+        loop {
+            let before = restored;
+            for (setting, value) in values.clone().into_iter().filter_map(known) {
+                let _ = restored.set(setting, value);
+            }
+            if restored == before {
+                return restored;
+            }
+        }
     }
 
     /// All settings with their values, sorted by number.
@@ -246,7 +257,7 @@ mod tests {
     }
 
     #[test]
-    fn restored_settings_are_those_that_were_kept_or_the_defaults() {
+    fn restored_settings_are_those_that_were_kept_but_for_those_that_are_refused() {
         let mut settings = Settings::default();
         settings.set(Setting::TravelX, Value::from_num(300)).expect("valid");
         settings.set(Setting::StepPulse, Value::from_num(1.5)).expect("valid");
@@ -257,10 +268,29 @@ mod tests {
         assert_eq!(Settings::restored(values.clone()), settings);
         values.push((9999, Value::ONE)); // of another version
         assert_eq!(Settings::restored(values.clone()), settings);
-        for (number, value) in [(130, 0.0), (20, 0.5), (0, 400.0)] {
+        // A value that is refused alone, one that is no whole number, and one that conflicts.
+        for (number, value) in [(131, 0.0), (20, 0.5), (0, 400.0), (209, 2.0)] {
             let mut spoilt = values.clone();
+            spoilt.retain(|(kept, _)| *kept != number);
             spoilt.push((number, Value::from_num(value)));
-            assert_eq!(Settings::restored(spoilt), Settings::default());
+            let setting = Setting::numbered(number).expect("a setting");
+            let mut expected = settings;
+            expected.set(setting, setting.info().default).expect("valid");
+            assert_eq!(Settings::restored(spoilt), expected, "{number}");
+        }
+        // Whichever comes first: the anchors of belts must lie above the page.
+        for (setting, value) in
+            [(Setting::AnchorHeight, 1500), (Setting::TravelY, 1000), (Setting::Kinematics, 2)]
+        {
+            settings.set(setting, Value::from_num(value)).expect("valid");
+        }
+        let mut values = kept(&settings);
+        values.push((0, Value::from_num(400)));
+        settings.set(Setting::StepPulse, Setting::StepPulse.info().default).expect("valid");
+        for _ in 0..2 {
+            values.reverse();
+            values.retain(|kept| *kept != (0, Value::from_num(1.5)));
+            assert_eq!(Settings::restored(values.clone()), settings);
         }
     }
 

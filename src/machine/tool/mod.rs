@@ -42,7 +42,8 @@ impl Tool {
     ///
     /// # Errors
     /// [`LimitsError::TooManySteps`] if the motor of z would have to step too fast,
-    /// `LimitsError::PenByMotor` if a motor is to lift the pen while the others move.
+    /// `LimitsError::PenByMotor` if a motor is to lift the pen while the others move,
+    /// [`LimitsError::PenUpsideDown`] if it is to raise the pen downward.
     pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
         match Self::of(settings) {
             Self::Actuator => Ok(()),
@@ -52,6 +53,11 @@ impl Tool {
                     || settings.is_on(Setting::TravelEarly) =>
             {
                 Err(LimitsError::PenByMotor)
+            }
+            Self::Stepper
+                if settings.get(Setting::PenUpHeight) > settings.get(Setting::PenDownHeight) =>
+            {
+                Err(LimitsError::PenUpsideDown)
             }
             Self::Stepper => stepper::rule(settings).map(|_| ()),
         }

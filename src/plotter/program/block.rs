@@ -355,9 +355,16 @@ impl Block {
         Ok(())
     }
 
-    /// Whether the numbers of the line belong to a word for another kind of machine.
-    pub(super) fn is_foreign(&self) -> bool {
-        self.takes_all
+    /// Whether S is that of the pen or the spindle.
+    pub(super) fn speed_counts(&self) -> bool {
+        !self.takes_all || self.action == Action::Servo
+    }
+
+    /// Whether the line tells the pen to go up or down: by M3 to M5, S, or a move of Z.
+    pub(super) fn tells_pen(&self) -> bool {
+        self.spindle.is_some()
+            || (self.has(b'S') && self.speed_counts())
+            || (self.has(b'Z') && self.axis_use == AxisUse::Motion)
     }
 
     fn use_axes(&mut self, axis_use: AxisUse) -> Result<(), CommandError> {

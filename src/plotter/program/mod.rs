@@ -145,6 +145,8 @@ pub(super) struct Context<'c> {
     pub(super) parameters: &'c Parameters,
     /// The position of G28.
     pub(super) park: [Millimetres; 2],
+    /// Whether the machine is idle, so that the pen is raised whatever the program says.
+    pub(super) is_idle: bool,
 }
 
 impl Default for Program {
@@ -238,7 +240,9 @@ impl Program {
         }
         if matches!(action, MachineAction::Nothing) {
             let has_dot = block.spindle == Some(5) && self.take_dot();
-            if has_dot || (self.is_down_at_rest(rule) && !was_down_at_rest) {
+            // A pen that was raised by itself goes down again if the line speaks of it.
+            let goes_down = !was_down_at_rest || (context.is_idle && block.tells_pen());
+            if has_dot || (self.is_down_at_rest(rule) && goes_down) {
                 action = MachineAction::Lower;
             }
         }
@@ -303,7 +307,7 @@ impl Program {
         }
         let servo = block.action == Action::Servo;
         if let Some(speed) = block.number(b'S')
-            && (servo || !block.is_foreign())
+            && block.speed_counts()
         {
             self.take_speed(clamped(speed), servo, settings);
         }

@@ -221,7 +221,8 @@ impl<I: Index, B: Board> Cancel for PartCancel<'_, '_, I, B> {
     fn check(&mut self) -> Result<(), Aborted> {
         let Self { inner, board, is_status_due, ends } = self;
         let requests = board.take_real_time();
-        report::greet_opened(inner.machine.state(), inner.resumption, *board);
+        let settings = Some(inner.machine.settings());
+        report::greet_opened(inner.machine.state(), inner.resumption, settings, *board);
         if requests.has(RealTime::ABORT) {
             inner.act(requests.only(RealTime::EMERGENCY));
             *ends = Some(EarlyEnd::ByUser);

@@ -7,7 +7,6 @@ use crate::drawing::PageError;
 use crate::fixed::{BinaryFraction, Length, Millimetres};
 use crate::machine::{MachineError, SettingError};
 use crate::model::{ElementKind, ModelError, PEN_LIMIT};
-#[cfg(feature = "pen-overlap")]
 use crate::motion::LimitsError;
 use crate::stage::OutOfScratch;
 use crate::view::ViewError;
@@ -275,6 +274,12 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
         SettingError::NotWhole(setting) => {
             row(SETTING_OUT_OF_RANGE, format_args!("{} is a whole number", setting.info().name))
         }
+        SettingError::Conflict(LimitsError::PenUpsideDown) => row(
+            error(151, "setting conflicts with another"),
+            format_args!(
+                "a motor raises the pen upward: set $210 below $211, and 4 in $3 turns it"
+            ),
+        ),
         #[cfg(feature = "pen-overlap")]
         SettingError::Conflict(LimitsError::PenByMotor) => row(
             error(151, "setting conflicts with another"),

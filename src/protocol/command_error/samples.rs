@@ -206,6 +206,7 @@ pub fn error_samples() -> Vec<CommandError> {
         Conflict(LimitsError::StepsPerMillimetre),
         Busy,
     );
+    let upside_down = [SettingError::Conflict(LimitsError::PenUpsideDown)];
     let samples = all.into_iter();
     #[cfg(feature = "tiles")]
     let samples = samples.chain(stored.map(CommandError::Stored));
@@ -218,6 +219,7 @@ pub fn error_samples() -> Vec<CommandError> {
         .chain(pages.map(CommandError::Page))
         .chain(machine.map(CommandError::Machine))
         .chain(settings.map(CommandError::Setting))
+        .chain(upside_down.map(CommandError::Setting))
         .collect()
 }
 

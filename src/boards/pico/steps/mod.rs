@@ -105,6 +105,8 @@ pub struct Steps {
     taken_seen: u32,
     /// The time at which this number was first seen, in microseconds.
     seen_at: u32,
+    /// Whether the pen is driven, which begins when its height is known.
+    drives_pen: bool,
 }
 
 /// Sets up the state machine and the channel; they start with the first events. Afterwards the pins
@@ -142,6 +144,7 @@ pub fn set_up(nvic: &mut NVIC) -> Steps {
         resting: true,
         taken_seen: 0,
         seen_at: 0,
+        drives_pen: false,
     }
 }
 
@@ -170,7 +173,7 @@ impl Steps {
     pub fn sync_consumed(&mut self) {
         if STATE.is_halted() {
             self.discard_waiting();
-            pen::set_height(0);
+            pen::set_height(STATE.up_height());
         }
         let taken = taken();
         if self.drained && self.written == self.taken {
@@ -206,8 +209,12 @@ impl Steps {
         self.room = words.min(self.heights.room() as u32);
     }
 
-    /// Adopts the settings, which change only while nothing moves.
+    /// Adopts the settings, which change only while nothing moves. The first time, the pen begins
+    /// to be driven, at the height at which it is raised.
     fn configure(&mut self) {
+        if !core::mem::replace(&mut self.drives_pen, true) {
+            pen::begin(STATE.up_height());
+        }
         let inverted_levels = inverted_levels();
         if inverted_levels != self.inverted_levels {
             self.inverted_levels = inverted_levels;
