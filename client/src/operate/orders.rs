@@ -71,9 +71,12 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
 /// Aborts whatever the machine does.
 ///
 /// # Errors
-/// See [`Sender::give_up`].
+/// The machine is locked after an alarm then, or see [`Sender::give_up`].
 pub fn abort(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let status = join(args, interrupt, |sender| sender.give_up())?;
+    if status.is_alarm() {
+        return Err(Error::Locked { alarm: status.alarm });
+    }
     Ok(done("given up: the machine stands with the pen up", &status))
 }
 
