@@ -30,6 +30,8 @@ const CAMERA = ["eye", "at", "up", "angles", "view", "azimuth", "elevation", "y-
 const DIRECTIONS = ["view", "azimuth", "elevation"];
 /** The heading of the options that arrange plans begins so. */
 const PLAN = "Plan";
+/** Options that lay a drawing on the page. */
+const LAYS = ["page", "margin", "fit", "title", "title-size"];
 /** Projections that have a direction of their own; a turn makes them orthographic. */
 const FIXED = /^(isometric|dimetric|trimetric|axonometric)/;
 
@@ -154,12 +156,14 @@ async function readFile(name, bytes, nextValues) {
 
 async function open(name, bytes, nextValues = values) {
   let opened;
+  let leftOut = [];
   try {
     opened = await readFile(name, bytes, nextValues).catch((text) => {
       // An option that arranges plans may not fit another file.
       const kept = new Map([...nextValues].filter(([own]) => !isOfPlans(own)));
       if (kept.size === nextValues.size) throw text;
       nextValues = kept;
+      leftOut = [`The options for plans are left out: ${text}`];
       return readFile(name, bytes, kept);
     });
   } catch (text) {
@@ -188,7 +192,7 @@ async function open(name, bytes, nextValues = values) {
     ? "Drag to turn. Shift and drag, or two fingers, to move. " +
       "Wheel to zoom, with Alt to step nearer."
     : "A flat drawing: drag to move, wheel to zoom.";
-  note(scene.notes);
+  note([...leftOut, ...scene.notes]);
   announce(`${name} is open: ${said}`);
   view.fit();
   changed();
@@ -203,8 +207,8 @@ function change(name, value) {
   if (value === null) values.delete(name);
   else values.set(name, value);
   reads ||= name === "pens";
-  // The page and the margin decide where a plan is laid that is arranged.
-  const lays = file?.handed.isRead && ["page", "margin"].includes(name);
+  // These decide where a plan is laid that is arranged, and how large it is.
+  const lays = file?.handed.isRead && LAYS.includes(name);
   arranges ||= isOfPlans(name) || lays;
   changed(name);
 }

@@ -50,6 +50,10 @@ pub fn pause(args: &PauseArgs, interrupt: &AtomicBool) -> Result<Outcome, Error>
 pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.plotter.port)?;
     let (mut sender, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
+    if status.is_holding() && args.at_origin {
+        let reason = "the machine holds and knows where the pen is: leave out --at-origin";
+        return Err(Error::NotResumed { reason: reason.to_owned() });
+    }
     if status.is_holding() || status.stopped.is_none() {
         return Ok(done("it goes on", &sender.resume()?));
     }
