@@ -1,9 +1,9 @@
 //! `penup setup`: leads through the settings of a new machine.
 //!
 //! Each part asks, moves the machine, and stores what it has learnt before the next one begins. No
-//! setting is changed for a while only. So whoever breaks off, or pulls the cable, finds the machine
-//! with the settings of the parts that are done, and is told which these are. Answers are lines of
-//! the standard input; its end breaks off.
+//! setting is changed for a while only. So whoever breaks off, or pulls the cable, finds the
+//! machine with the settings of the parts that are done, and is told which these are. Answers are
+//! lines of the standard input; its end breaks off.
 
 mod answers;
 mod directions;
@@ -379,8 +379,8 @@ fn room_for_moves(status: &Status, settings: &[AssignedSetting]) -> Result<[f64;
     Err(End::BrokenOff)
 }
 
-/// Draws the test square. This computer computes it and sends its stroke, so it depends on no option
-/// of an earlier job, changes none, and leaves the model in the plotter's memory alone.
+/// Draws the test square. This computer computes it and sends its stroke, so it depends on no
+/// option of an earlier job, changes none, and leaves the model in the plotter's memory alone.
 fn draw_square(sender: &mut Sender<'_>) -> Result<(), Error> {
     let [side, from] = SQUARE;
     let to = side + from;

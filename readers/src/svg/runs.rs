@@ -264,8 +264,8 @@ mod tests {
     fn lines_that_differ_in_their_place_alone_are_joined() {
         let text = "<svg>\n<line x1='1' y1='2' x2='3' y2='4' stroke='red'/>\n\
                     <line stroke='red' x2='5'\ny2='6' />\n<line stroke='blue' x2='5'/>\n</svg>";
-        let expected = "<svg>\n<path data-penup-count=\"2\" d=\"M1 2L3 4M0 0L5 6\" stroke=\"red\"/>\n\n\n\
-                        <line stroke='blue' x2='5'/>\n</svg>";
+        let expected = "<svg>\n<path data-penup-count=\"2\" d=\"M1 2L3 4M0 0L5 6\" \
+                        stroke=\"red\"/>\n\n\n<line stroke='blue' x2='5'/>\n</svg>";
         assert_eq!(joined(text).as_deref(), Some(expected));
         let text = "<g><path d='M1 2L3 4'/><path d='M1,2h9'/><polyline points='1,2 3 4'/></g>";
         let expected = "<g><path data-penup-count=\"3\" d=\"M1 2L3 4M1,2h9M1,2 3 4\"/></g>";
