@@ -600,7 +600,7 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
   await page.waitForFunction(() => /square/.test(document.getElementById("file-name").textContent));
   // The hatch is left out, and the user is told why.
   const left = await page.textContent("#notes");
-  assert.match(left, /options for plans are left out: .*hatch/);
+  assert.match(left, /Without options for plans: .*hatch/);
   await same(ply);
   // What cannot be read is an error, and the next file is read all the same.
   const nested = join(folder, "nested.svg");
