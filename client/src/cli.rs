@@ -159,7 +159,7 @@ pub enum TapeCommand {
     Encode(Box<TapeEncodeArgs>),
     /// Print the instructions of a tape
     Decode {
-        /// The tape
+        /// The tape; - is the standard input
         #[arg(value_name = "FILE")]
         file: PathBuf,
         /// How the answer is printed.
@@ -179,7 +179,8 @@ pub struct TapeEncodeArgs {
     /// The file to record.
     #[arg(value_name = "FILE", help = file_help("The file to record"))]
     pub file: PathBuf,
-    /// The tape to write [default: beside the file, with the ending .tape]
+    /// The tape to write; - is the standard output [default: beside the file, with the ending
+    /// .tape]
     #[arg(short, long, value_name = "FILE", help_heading = "Output")]
     pub output: Option<PathBuf>,
     /// The camera, the page and the order of the strokes.
@@ -193,7 +194,7 @@ pub struct TapeShowArgs {
     /// How the answer is printed.
     #[command(flatten)]
     pub format: FormatArgs,
-    /// The tape
+    /// The tape; - is the standard input
     #[arg(value_name = "FILE")]
     pub file: PathBuf,
     /// The page: A0 to A6, Letter, Legal, Tabloid, or its size such as 300x200, 11x17in
@@ -220,6 +221,7 @@ fn file_help(what: &str) -> String {
 
 /// Options of `penup plot`.
 #[derive(Debug, Args)]
+#[command(mut_arg("rejoin", |rejoin| rejoin.requires("port").conflicts_with("board")))]
 pub struct PlotArgs {
     /// How the answer is printed.
     #[command(flatten)]
@@ -358,13 +360,14 @@ pub struct PreviewArgs {
         help_heading = "Machine"
     )]
     pub set: Vec<AssignedSetting>,
-    /// Compute the drawing this many times and report the shortest time of each stage
+    /// Compute the drawing this many times and report the shortest time of each stage in --json
     #[arg(
         long,
         value_name = "N",
         default_value = "1",
         value_parser = clap::value_parser!(u32).range(1..),
         allow_hyphen_values = true,
+        requires = "json",
         help_heading = "Output"
     )]
     pub repeat: u32,
@@ -388,7 +391,7 @@ pub struct FitArgs {
         allow_hyphen_values = true
     )]
     pub tolerance: f64,
-    /// The OBJ file to write [default: FILE with -fitted in its name]
+    /// The OBJ file to write; - is the standard output [default: FILE with -fitted in its name]
     #[arg(long, value_name = "FILE")]
     pub output: Option<PathBuf>,
 }
@@ -461,10 +464,39 @@ mod tests {
         }
     }
 
+    /// What the value of an option would not reach is refused, and the option that it needs is
+    /// named.
+    #[test]
+    fn an_option_that_needs_another_one_is_refused_without_it() {
+        let parse = |line: &str| {
+            let words = line.split(' ');
+            Cli::try_parse_from(words).map(drop).map_err(|error| error.to_string())
+        };
+        for (line, needed) in [
+            ("penup preview f.obj --repeat 3", "--json <FILE>"),
+            ("penup plot f.obj --rejoin 9", "--port <DEVICE>"),
+            ("penup plot f.obj --board pico --rejoin 9", "cannot be used with"),
+            ("penup plot f.obj --resume", "--port <DEVICE>"),
+            ("penup plot f.obj --port auto --at-origin", "--resume"),
+        ] {
+            let error = parse(line).expect_err(line);
+            assert!(error.contains(needed), "{error}");
+        }
+        for line in [
+            "penup preview f.obj",
+            "penup preview f.obj --json f.json --repeat 3",
+            "penup plot f.obj --board pico",
+            "penup plot f.obj --port auto --rejoin 9",
+            "penup watch --rejoin 9",
+        ] {
+            assert_eq!(parse(line), Ok(()), "{line}");
+        }
+    }
+
     #[test]
     fn a_preview_runs_at_least_once() {
         for times in ["0", "-1"] {
-            let line = ["penup", "preview", "f.obj", "--repeat", times];
+            let line = ["penup", "preview", "f.obj", "--json", "f.json", "--repeat", times];
             let error = Cli::try_parse_from(line).expect_err("refused").to_string();
             assert!(error.contains(&format!("{times} is not in 1..")), "{error}");
             assert!(error.contains("'--repeat "), "{error}");

@@ -98,6 +98,20 @@ pub enum Error {
         /// The order, as a verb.
         order: &'static str,
     },
+    /// The machine stands, as it was told to, and is locked after an alarm.
+    #[error("the machine stands with the pen up, and stays locked after {}", locked(*alarm))]
+    Locked {
+        /// The `N` of its `ALARM:N`, if it reports that.
+        alarm: Option<u16>,
+    },
+    /// The user, or the end of the input, has broken the setup off.
+    #[error("the setup is broken off; {changes}")]
+    SetupBrokenOff {
+        /// Which settings were changed until then.
+        changes: String,
+        /// Whether it was broken off by Ctrl-C.
+        is_interrupted: bool,
+    },
     /// The plotter's memory is too small for the model.
     #[error(
         "the model has {count} {what}, and this plotter takes {limit}\nLeave something out, or \
@@ -381,7 +395,9 @@ impl Error {
     /// The exit code of the process, one of [`EXIT_CODES`].
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::Interrupted | Self::InterruptedUnconfirmed => EXIT_CODE,
+            Self::Interrupted
+            | Self::InterruptedUnconfirmed
+            | Self::SetupBrokenOff { is_interrupted: true, .. } => EXIT_CODE,
             Self::Port { .. }
             | Self::Ports { .. }
             | Self::NoPlotter { .. }
@@ -391,6 +407,7 @@ impl Error {
             | Self::Silent { line: None, .. } => NO_PLOTTER,
             Self::NotReady { .. }
             | Self::NothingToDo { .. }
+            | Self::Locked { .. }
             | Self::WithoutNumbers
             | Self::NotSet { .. }
             | Self::Refused { .. } => REFUSED,
@@ -403,6 +420,7 @@ impl Error {
             | Self::OtherContents
             | Self::Held
             | Self::Unconfirmed { .. }
+            | Self::SetupBrokenOff { is_interrupted: false, .. }
             | Self::Link(_) => BROKEN_OFF,
             Self::Read(_)
             | Self::File { .. }
@@ -463,19 +481,32 @@ fn waiting_for(line: Option<&JobLine>) -> String {
     }
 }
 
+/// The cause of an alarm, and what to do about it; `None` if this program does not know it.
+fn alarm(number: u16) -> Option<(&'static str, String)> {
+    let entry = alarm_entries().into_iter().find(|entry| u16::from(entry.number) == number)?;
+    Some((entry.cause.get(), sentence(entry.for_client.get())))
+}
+
 /// Says what an alarm means and what to do about it.
 fn alarmed(number: u16, messages: &[String]) -> String {
     let said = said(&for_client(&messages.join("; ")));
-    let entries = alarm_entries();
-    match entries.iter().find(|entry| u16::from(entry.number) == number) {
-        Some(entry) => {
-            let (cause, cure) = (entry.cause.get(), sentence(entry.for_client.get()));
+    match alarm(number) {
+        Some((cause, cure)) => {
             format!("the plotter stopped with alarm {number}: {cause}{said}\n{cure}")
         }
         None => format!(
             "the plotter stopped with alarm {number}, which this program does not know{said}\n\
              Its firmware is of another version than this program"
         ),
+    }
+}
+
+/// Names the alarm after which a machine is locked, and says what to do.
+fn locked(number: Option<u16>) -> String {
+    let Some(number) = number else { return format!("an alarm\n{}", remedy("Alarm")) };
+    match alarm(number) {
+        Some((cause, cure)) => format!("alarm {number}: {cause}\n{cure}"),
+        None => format!("alarm {number}\n{}", remedy("Alarm")),
     }
 }
 

@@ -9,7 +9,8 @@ use penup::checksum::CRC_16;
 use penup::machine::Settings;
 use penup::protocol::{CommandError, Label, Named, Numbering, Received};
 use penup_job::protocol::{
-    ABORT, AGAIN, BUILD, CLEAR, END, FASTER, HOLD, MODEL, PLOT, RESUME, SETTINGS, SLOWER,
+    ABORT, AGAIN, BUILD, CLEAR, END, FASTER, HOLD, MODEL, PAUSE_AFTER_STROKE, PLOT, RESUME,
+    SETTINGS, SLOWER,
 };
 use penup_job::twin;
 use penup_readers::lines::JobLine;
@@ -54,6 +55,8 @@ pub enum Fault {
     AlarmWhileDrawing(u16),
     /// Does not confirm the second and later aborts; the first opens the conversation.
     IgnoresAbort,
+    /// Is locked after this alarm.
+    Locked(u16),
 }
 
 /// The state of a simulated plotter; see the [module](self).
@@ -88,6 +91,10 @@ pub struct FakePlotter {
     pub percent: u16,
     /// The states in which it stood after it was told to hold, counted.
     pub holds: usize,
+    /// How many of the next bytes that hold or resume are lost on the line.
+    pub lost_bytes: usize,
+    /// How many of them are lost after it was told to hold.
+    pub lost_after_holds: usize,
     /// The number of status reports that it sends while it computes the picture. Meanwhile it reads
     /// no lines.
     pub reports_while_computing: usize,
@@ -149,6 +156,9 @@ impl FakePlotter {
     fn report(&mut self) {
         self.reports += 1;
         let Some(drawn) = self.drawn else {
+            if let Fault::Locked(number) = self.fault {
+                return self.say(&format!("<Alarm|MPos:0.000,0.000|Alarm:{number}>"));
+            }
             let state = if self.fault == Fault::Busy { "Run" } else { "Idle" };
             let all = self.finished;
             return self.say(&format!(
@@ -333,13 +343,15 @@ impl Link for FakePlotter {
                 }
                 b'?' => self.report(),
                 ABORT => self.abort(),
+                HOLD | PAUSE_AFTER_STROKE | RESUME if self.lost_bytes > 0 => self.lost_bytes -= 1,
                 RESUME => {
                     (self.pen_before, self.hold_before) = (None, None);
                     self.is_held = false;
                 }
-                HOLD if self.drawn.is_some() => {
+                HOLD | PAUSE_AFTER_STROKE if self.drawn.is_some() => {
                     self.is_held = true;
                     self.holds += 1;
+                    self.lost_bytes += std::mem::take(&mut self.lost_after_holds);
                 }
                 FASTER => self.percent += 10,
                 SLOWER => self.percent -= 10,

@@ -15,6 +15,28 @@ use std::thread;
 /// The name that stands for the standard input.
 pub const STANDARD_INPUT: &str = "-";
 
+/// What the standard input is called in messages.
+const STANDARD_NAME: &str = "the standard input";
+
+/// Whether `path` stands for the standard input.
+pub fn is_standard(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_INPUT
+}
+
+/// Reads all bytes of the file at `path`, or of the standard input if that is `-`.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
+    if is_standard(path) {
+        let mut bytes = Vec::new();
+        let read = io::stdin().lock().take(SIZE_LIMIT).read_to_end(&mut bytes);
+        read.map_err(|source| Error::File { file: STANDARD_NAME.to_owned(), source })?;
+        return Ok(bytes);
+    }
+    std::fs::read(path).map_err(|source| Error::File { file: path.display().to_string(), source })
+}
+
 /// The size in bytes of the stack on which a file that may be nested is read.
 const STACK: usize = 256 << 20;
 
@@ -25,12 +47,8 @@ const STACK: usize = 256 << 20;
 /// The file cannot be read, its format is unknown, or it contains something that no plotter
 /// accepts.
 pub fn read(path: &Path, arrangement: &Arrangement) -> Result<SourceFile, Error> {
-    if path.as_os_str() == STANDARD_INPUT {
-        let name = "the standard input".to_owned();
-        let mut bytes = Vec::new();
-        let read = io::stdin().lock().take(SIZE_LIMIT).read_to_end(&mut bytes);
-        read.map_err(|source| Error::File { file: name.clone(), source })?;
-        return Ok(parse(name, bytes, arrangement)?);
+    if is_standard(path) {
+        return Ok(parse(STANDARD_NAME.to_owned(), bytes(path)?, arrangement)?);
     }
     let name = path.display().to_string();
     let unreadable = |source| Error::File { file: name.clone(), source };

@@ -15,6 +15,8 @@
 //! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command
 //! returns an [`outcome`].
 //!
+//! [`idle`] tells which options change nothing.
+//!
 //! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a
 //! job as single motor steps, and [`motion_plot`] plots its speed.
 
@@ -27,6 +29,7 @@ pub mod error;
 pub mod fake;
 pub mod files;
 pub mod fit;
+pub mod idle;
 pub mod interrupt;
 pub mod keyboard;
 pub mod link;

@@ -41,7 +41,7 @@ pub fn check_outputs(outputs: &[&Path]) -> Result<(), Error> {
 }
 
 /// The name that stands for the standard output.
-const STANDARD_OUTPUT: &str = "-";
+pub const STANDARD_OUTPUT: &str = "-";
 
 /// Whether a file was written to the standard output.
 static STANDARD_HOLDS_A_FILE: AtomicBool = AtomicBool::new(false);

@@ -18,7 +18,7 @@ use crate::run::{Outputs, Source, note, read, summary, write_pictures};
 use crate::sender::{Sender, Stopped, Timeouts};
 use crate::workspace;
 use penup::index::Index;
-use penup::machine::{self, Setting};
+use penup::machine;
 use penup_job::picture::Picture;
 use penup_job::protocol::{GO_ON_AT_ORIGIN, Status};
 use penup_job::results::JobReport;
@@ -150,14 +150,7 @@ impl Plot<'_> {
         let passes = self.args.passes.multipass;
         let Some(mut host) = choice.host else { return draw_by(sender, job, passes, progress) };
         host.set_reloops(self.args.reloop);
-        let form = sender.form()?;
-        let shows_pen = known.settings.is_some_and(|settings| {
-            settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser)
-        });
-        if form == Form::GCode && !shows_pen {
-            let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
-            return Err(Error::NotStreamed { reason: reason.to_owned() });
-        }
+        let form = sender.form(&known.settings.unwrap_or_default())?;
         let (streamed, report) = host.streamed(form, self.args.from)?;
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(

@@ -8,11 +8,12 @@ use crate::cli::{
 use crate::error::Error;
 use crate::files;
 use crate::fit::fit_obj;
+use crate::idle::{changed, idle_options};
 use crate::machine_settings::simulated;
 use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
-use crate::output;
+use crate::output::{self, STANDARD_OUTPUT};
 use crate::plot::{draw, plot, relooped};
 use crate::png::png;
 use crate::preview::{Drawn, InMemory};
@@ -21,7 +22,6 @@ use crate::sender::{Sender, Timeouts};
 use crate::tape;
 use penup::index::Index;
 use penup::machine::Setting;
-use penup::plotter::{OPTIONS, PlotOption, PlotOptions};
 use penup::step::tape::BadCode;
 use penup_job::export::{self, Retracing};
 use penup_job::picture::Picture;
@@ -53,7 +53,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
         Command::Fit(args) => fit(args, quiet),
         Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, quiet, interrupt),
         Command::Tape(TapeCommand::Decode { file, .. }) => {
-            let text = tape::decode(&read_tape(file)?).map_err(damaged(file))?;
+            let text = tape::decode(&files::bytes(file)?).map_err(damaged(file))?;
             let instructions: Vec<&str> = text.lines().collect();
             Ok(Outcome::answer(text.trim_end(), json!({ "instructions": instructions })))
         }
@@ -229,11 +229,18 @@ fn write_exports<'a>(
     Ok(files)
 }
 
+/// The file to write: the one that is named, or else the one `beside` the file that is read. Beside
+/// the standard input is the standard output.
+fn output_for(named: Option<&PathBuf>, read: &Path, beside: PathBuf) -> PathBuf {
+    let beside = if files::is_standard(read) { STANDARD_OUTPUT.into() } else { beside };
+    named.cloned().unwrap_or(beside)
+}
+
 fn fit(args: &FitArgs, quiet: bool) -> Result<Outcome, Error> {
     let file = args.file.display().to_string();
     let stem = args.file.file_stem().unwrap_or_default().to_string_lossy();
-    let beside = || args.file.with_file_name(format!("{stem}-fitted.obj"));
-    let output = args.output.clone().unwrap_or_else(beside);
+    let beside = args.file.with_file_name(format!("{stem}-fitted.obj"));
+    let output = output_for(args.output.as_ref(), &args.file, beside);
     output::check(&args.file, &[&output])?;
     let source = files::read(&args.file, &Arrangement::default())?;
     if !quiet {
@@ -254,7 +261,8 @@ fn encode_tape(
     quiet: bool,
     interrupt: &AtomicBool,
 ) -> Result<Outcome, Error> {
-    let output = args.output.clone().unwrap_or_else(|| args.file.with_extension("tape"));
+    let beside = args.file.with_extension("tape");
+    let output = output_for(args.output.as_ref(), &args.file, beside);
     output::check(&args.file, &[&output])?;
     let job = read(&args.file, &args.view, quiet)?.job;
     let mut plotter =
@@ -274,7 +282,7 @@ fn encode_tape(
 fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, None);
     output::check(&args.file, &outputs.files())?;
-    let tape = read_tape(&args.file)?;
+    let tape = files::bytes(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
     let (picture, moves) = shown.map_err(damaged(&args.file))?;
     let files = write_pictures(&picture, &outputs)?;
@@ -282,11 +290,6 @@ fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
     let text = format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len());
     let json = json!({ "files": names, "moves": moves, "bytes": tape.len() });
     Ok(Outcome::done(text, json))
-}
-
-fn read_tape(file: &Path) -> Result<Vec<u8>, Error> {
-    let unreadable = |source| Error::File { file: file.display().to_string(), source };
-    std::fs::read(file).map_err(unreadable)
 }
 
 fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
@@ -300,54 +303,39 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> 
         .settings_for(&source)
         .map_err(|reason| ReadError::Content { file: file.display().to_string(), reason })?;
     if !quiet {
-        let (options, changed) = changed(&settings);
-        let has_crease = changed.iter().any(|name| name == "crease");
+        let has_crease = changed(&settings).1.iter().any(|name| name == "crease");
         let notes = source.notes().iter().filter(|note| !has_crease || *note != MOSTLY_FLAT);
         note(file, &notes.cloned().collect::<Vec<_>>());
         if let Some(bounds) = source.bounds() {
             note(file, settings.moves_plan(bounds).as_slice());
             note(file, settings.fits_turned(bounds).as_slice());
-            note(file, idle_on_plan(&options, &changed).as_slice());
+            note(file, too_small(&settings, bounds).as_slice());
         }
+        note(file, &idle_options(&settings, source.bounds().is_some()));
     }
     let (extent, is_plan) = (source.extent(), source.bounds().is_some());
-    Ok(Source { job: Job::new(source, &settings), settings, extent, is_plan })
+    let is_scaled_by_plotter =
+        is_plan && settings.value("fit") == Some("on") && !view.arrangement().scales_to_page();
+    let job = Job::new(source, &settings);
+    Ok(Source { job, settings, extent, is_plan, is_scaled_by_plotter })
 }
 
-/// The options of the plotter with these settings, and the names of those that are not as usual.
-fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
-    let mut options = PlotOptions::default();
-    let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
-    for (name, value) in &settings.values {
-        // If the plotter refuses an option, the user is told when the job is sent.
-        let _ = options.set(name, value);
-    }
-    let name = |line: String| Some(line.strip_prefix('$')?.split('=').next()?.to_owned());
-    let names = options
-        .lines()
-        .map(|line| line.to_string())
-        .zip(usual)
-        .filter(|(now, usual)| now != usual)
-        .filter_map(|(now, _)| name(now))
-        .collect();
-    (options, names)
-}
+/// The length in mm below which nothing is drawn: about a step of the usual motors.
+const SMALLEST: f64 = 0.0125;
 
-/// Names the options that change nothing because the drawing lies flat and is drawn as it lies:
-/// those of the camera. `None` if there are none, or if a view is chosen that shows it in space.
-fn idle_on_plan(options: &PlotOptions, changed: &[String]) -> Option<String> {
-    let is_of_camera = |name: &&String| {
-        let of = |option: &&PlotOption| option.name == name.as_str();
-        let flag = OPTIONS.iter().find(of).and_then(|option| option.flag.get());
-        flag.is_some_and(|flag| flag.heading == "Camera")
-    };
-    let idle: Vec<String> =
-        changed.iter().filter(is_of_camera).map(|name| format!("--{name}")).collect();
-    (options.shows_plans_flat() && !idle.is_empty()).then(|| {
+/// Says that a plan with these least and greatest coordinates is so small that nothing, or hardly
+/// anything, is drawn of it at true size.
+fn too_small(settings: &Settings, [low, high]: [[f64; 2]; 2]) -> Option<String> {
+    let [width, height] = [0, 1].map(|axis: usize| high[axis] - low[axis]);
+    let is_small = width.max(height) < SMALLEST && settings.value("fit") == Some("off");
+    // What coordinates of many decimals add is left out.
+    let digits = |length: f64| (length * 1e9).round() / 1e9;
+    is_small.then(|| {
         format!(
-            "the drawing lies flat and is drawn as it lies, so nothing is changed by {}: they are \
-             for models in space",
-            idle.join(", ")
+            "the drawing is {} x {} mm at true size, which is less than a step of the motors: \
+             --fit scales it to the page",
+            digits(width),
+            digits(height)
         )
     })
 }
@@ -361,6 +349,8 @@ pub struct Source {
     /// The least and the greatest coordinates.
     extent: Option<[[f64; 3]; 2]>,
     is_plan: bool,
+    /// Whether the coordinates are those of a plan before the plotter scales it to the page.
+    is_scaled_by_plotter: bool,
 }
 
 impl Source {
@@ -377,8 +367,8 @@ impl Source {
         });
         let (what, unit) = if self.is_plan { ("drawing", " mm") } else { ("model", "") };
         // What is drawn of a solid lies elsewhere, of course.
-        let is_scaled = self.is_plan && self.settings.value("fit") == Some("on");
-        let before = if is_scaled { "before it is fitted to the page, " } else { "" };
+        let before =
+            if self.is_scaled_by_plotter { "before it is fitted to the page, " } else { "" };
         outcome.text += &format!("; {before}the {what} reaches from {low} to {high}{unit}");
         if let Value::Object(fields) = &mut outcome.json {
             fields.insert("bounds".to_owned(), json!(corners));

@@ -339,6 +339,73 @@ fn a_running_job_is_joined_paused_resumed_and_aborted() {
     assert_eq!(plotter.aborts, aborts + 1, "only the abort that was asked for");
 }
 
+/// A byte without a checksum may be lost on the line, and nobody answers it.
+#[test]
+fn a_pause_whose_byte_is_lost_is_asked_for_again() {
+    let interrupt = AtomicBool::new(false);
+    for after_stroke in [false, true] {
+        let mut plotter = FakePlotter::new(Fault::None);
+        (plotter.strokes, plotter.lost_bytes) = (1000, 2);
+        plotter.draw_on();
+        let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+        assert!(sender.pause(after_stroke).expect("paused").is_standing);
+        assert_eq!((plotter.lost_bytes, plotter.holds), (0, 1));
+        plotter.lost_bytes = 3;
+        let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+        assert_eq!(sender.resume().expect("resumed").state, "Run");
+        assert_eq!(plotter.lost_bytes, 0);
+    }
+}
+
+#[test]
+fn a_plotter_that_does_not_obey_is_told() {
+    let interrupt = AtomicBool::new(false);
+    let mut plotter = FakePlotter::new(Fault::None);
+    (plotter.strokes, plotter.lost_bytes) = (1000, 1000);
+    plotter.draw_on();
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+    let error = sender.pause(false).expect_err("it goes on");
+    assert!(error.to_string().contains("did not confirm that it obeyed (pause)"), "{error}");
+    assert_eq!(error.exit_code(), 5);
+    plotter.lost_bytes = 0;
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+    sender.pause(false).expect("paused");
+    plotter.lost_bytes = 1000;
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+    let error = sender.resume().expect_err("it holds");
+    assert!(error.to_string().contains("did not confirm that it obeyed (resume)"), "{error}");
+}
+
+#[test]
+fn keys_whose_bytes_are_lost_act_all_the_same() {
+    let mut plotter = FakePlotter::new(Fault::None);
+    (plotter.strokes, plotter.lost_bytes) = (200, 2);
+    plotter.keys = VecDeque::from([(2, UserRequest::Pause)]);
+    plotter.draw_on();
+    let interrupt = AtomicBool::new(false);
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+    let mut reports = 0;
+    sender.watch(&mut Counter(&mut reports, &interrupt)).expect_err("interrupted in the pause");
+    assert_eq!((plotter.lost_bytes, plotter.holds), (0, 1));
+    // To go on, the key is pressed once, and nobody is asked whether the machine may go on.
+    let mut plotter = FakePlotter::new(Fault::None);
+    plotter.strokes = 20;
+    plotter.keys = VecDeque::from([(2, UserRequest::Pause), (2, UserRequest::Pause)]);
+    plotter.lost_after_holds = 2;
+    plotter.user = VecDeque::from([Answer::Yes]);
+    job(&mut plotter, 3).expect("a job without a fault");
+    assert_eq!((plotter.holds, plotter.user.len()), (1, 1));
+}
+
+#[test]
+fn an_abort_of_a_locked_machine_is_confirmed_by_its_status() {
+    let interrupt = AtomicBool::new(false);
+    let mut plotter = FakePlotter::new(Fault::Locked(10));
+    let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+    let status = sender.give_up().expect("it stands");
+    assert_eq!((status.is_alarm(), status.alarm), (true, Some(10)));
+}
+
 #[test]
 fn a_job_is_watched_to_its_end() {
     let mut plotter = FakePlotter::new(Fault::None);

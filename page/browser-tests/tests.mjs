@@ -578,6 +578,16 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
   await set("crop", "nowhere");
   await page.waitForSelector("#option-crop-problem:not([hidden])");
   await set("crop", "");
+  // A hatch keeps its distance on the paper where the plan is scaled to the page.
+  await page.evaluate(() => (window.penup.drawing.computed = null));
+  await page.uncheck("#option-center");
+  await set("scale", "");
+  await page.evaluate(() => (window.penup.drawing.computed = null));
+  await page.check("#option-fit");
+  await same(svg);
+  await page.evaluate(() => (window.penup.drawing.computed = null));
+  await page.uncheck("#option-fit");
+  await same(svg);
   const ply = join(folder, "square.ply");
   await writeFile(
     ply,
@@ -588,6 +598,9 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
   await page.evaluate(() => (window.penup.drawing.computed = null));
   await page.setInputFiles("#file", ply);
   await page.waitForFunction(() => /square/.test(document.getElementById("file-name").textContent));
+  // The hatch is left out, and the user is told why.
+  const left = await page.textContent("#notes");
+  assert.match(left, /Without options for plans: .*hatch/);
   await same(ply);
   // What cannot be read is an error, and the next file is read all the same.
   const nested = join(folder, "nested.svg");

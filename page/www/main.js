@@ -131,7 +131,7 @@ const openExample = (name) => openFrom(`scenes/${name}`, name);
 
 const tooLarge = (name, size) =>
   `${name} has ${Math.round(size / 1e6)} MB; the page opens files up to ` +
-  `${LARGEST_FILE >> 20} MB, which is more than any plotter holds.`;
+  `${LARGEST_FILE >> 20} MB.`;
 
 async function openFile(chosen) {
   if (chosen.size > LARGEST_FILE) return fail(tooLarge(chosen.name, chosen.size));
@@ -154,12 +154,14 @@ async function readFile(name, bytes, nextValues) {
 
 async function open(name, bytes, nextValues = values) {
   let opened;
+  let leftOut = [];
   try {
     opened = await readFile(name, bytes, nextValues).catch((text) => {
       // An option that arranges plans may not fit another file.
       const kept = new Map([...nextValues].filter(([own]) => !isOfPlans(own)));
       if (kept.size === nextValues.size) throw text;
       nextValues = kept;
+      leftOut = [`Without options for plans: ${text}`];
       return readFile(name, bytes, kept);
     });
   } catch (text) {
@@ -188,7 +190,7 @@ async function open(name, bytes, nextValues = values) {
     ? "Drag to turn. Shift and drag, or two fingers, to move. " +
       "Wheel to zoom, with Alt to step nearer."
     : "A flat drawing: drag to move, wheel to zoom.";
-  note(scene.notes);
+  note([...leftOut, ...scene.notes]);
   announce(`${name} is open: ${said}`);
   view.fit();
   changed();
@@ -203,15 +205,16 @@ function change(name, value) {
   if (value === null) values.delete(name);
   else values.set(name, value);
   reads ||= name === "pens";
-  // The page and the margin decide where a plan is laid that is arranged.
-  const lays = file?.handed.isRead && ["page", "margin"].includes(name);
+  // The options of the page decide where a plan is laid that is arranged, and how large it is.
+  const lays = file?.handed.isRead && isUnder("Page", name);
   arranges ||= isOfPlans(name) || lays;
   changed(name);
 }
 
-const isOfPlans = (name) =>
-  table.some((option) => option.name === name && option.heading.startsWith(PLAN)) ||
-  name === "landscape";
+const isUnder = (heading, name) =>
+  table.some((option) => option.name === name && option.heading.startsWith(heading));
+
+const isOfPlans = (name) => isUnder(PLAN, name) || name === "landscape";
 
 /** Notes the values before a change. Changes of one kind in a row, such as keys, are one step. */
 function remember(kind = "") {
@@ -495,11 +498,11 @@ function announce(text) {
 
 function listenToErrors() {
   addEventListener("error", (event) =>
-    fail(`The page broke, which is its own fault: ${event.message}. Reload it.`),
+    fail(`The page broke: ${event.message}. Reload it.`),
   );
   addEventListener("unhandledrejection", (event) =>
     fail(
-      "The page broke, which is its own fault: " +
+      "The page broke: " +
         `${event.reason?.message ?? event.reason}. Reload it.`,
     ),
   );

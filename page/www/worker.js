@@ -217,7 +217,7 @@ function reason(error) {
   } catch {
     // It is not loaded.
   }
-  return `The program of the page broke, which is its own fault: ${said || error}. Reload it.`;
+  return `The program of the page broke: ${said || error}. Reload it.`;
 }
 
 onmessage = async ({ data: { id, call, args } }) => {

@@ -169,12 +169,17 @@ impl Plan {
     pub(crate) fn into_lines(self) -> (PlanLines, Vec<String>) {
         let mut lines = PlanLines {
             file: self.file,
-            lines: Vec::new(),
+            text: String::new(),
+            begins: Vec::new(),
+            of_elements: Vec::new(),
             elements: self.elements,
-            vertices: HashMap::new(),
-            pen: None,
         };
-        let short = self.strokes.iter().filter(|stroke| !lines.draw(stroke)).count();
+        let (mut vertices, mut pen) = (Vertices::default(), None);
+        // The strokes are freed one by one.
+        let strokes = self.strokes.into_iter();
+        let short = strokes.filter(|it| !lines.draw(it, &mut pen, &mut vertices)).count();
+        lines.text.shrink_to_fit();
+        lines.begins.shrink_to_fit();
         let short = match short {
             0 => None,
             1 => Some("1 line is not drawn, because it is too short at this scale".to_owned()),
@@ -182,8 +187,7 @@ impl Plan {
                 "{short} lines are not drawn, because they are too short at this scale"
             )),
         };
-        let notes = short.into_iter().chain(super::capacity(lines.vertices.len())).collect();
-        lines.vertices = HashMap::new();
+        let notes = short.into_iter().chain(super::capacity(vertices.count)).collect();
         (lines, notes)
     }
 }
@@ -266,24 +270,57 @@ pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
     if plan.is_empty() { Err("has no lines".to_owned()) } else { Ok(plan) }
 }
 
+/// The vertices so far.
+#[derive(Debug, Default)]
+struct Vertices {
+    count: usize,
+    /// Their numbers, counted from 1, by their coordinates in thousandths of a millimetre. What is
+    /// farther than two kilometres away is not found again, which takes but a vertex more.
+    numbers: HashMap<[i32; 2], u32>,
+}
+
+impl Vertices {
+    /// The number of the vertex at this position, and whether it is a new one.
+    fn number(&mut self, [x, y]: [i64; 2]) -> (usize, bool) {
+        let next = self.count + 1;
+        let number = match (x.try_into(), y.try_into(), next.try_into()) {
+            (Ok(x), Ok(y), Ok(next)) => *self.numbers.entry([x, y]).or_insert(next) as usize,
+            _ => next,
+        };
+        self.count += usize::from(number == next);
+        (number, number == next)
+    }
+}
+
 /// The lines of a plan, each with the element of the file that it comes from.
+///
+/// They lie in one text, because a drawing may have millions of them.
 #[derive(Debug)]
 pub(crate) struct PlanLines {
     file: String,
-    /// The lines, and for each the number of its element.
-    lines: Vec<(String, u32)>,
+    /// All lines, one behind the other.
+    text: String,
+    /// Where each line begins in the text.
+    begins: Vec<usize>,
+    /// Which lines come from another element than the line before, and the number of that element.
+    of_elements: Vec<(usize, u32)>,
     /// The line of the file in which each element begins, and its text.
     elements: Vec<(usize, String)>,
-    /// The numbers of the vertices, counted from 1, by their coordinates in thousandths of a
-    /// millimetre.
-    vertices: HashMap<[i64; 2], usize>,
-    pen: Option<u32>,
 }
 
 impl PlanLines {
+    fn push(&mut self, line: std::fmt::Arguments<'_>, element: u32) {
+        if self.of_elements.last().is_none_or(|(_, last)| *last != element) {
+            self.of_elements.push((self.begins.len(), element));
+        }
+        self.begins.push(self.text.len());
+        // Writing to a string cannot fail.
+        let _ = self.text.write_fmt(line);
+    }
+
     /// Adds the lines of a stroke. Returns `false` if it has no length when it is rounded to
     /// thousandths of a millimetre.
-    fn draw(&mut self, stroke: &Stroke) -> bool {
+    fn draw(&mut self, stroke: &Stroke, pen: &mut Option<u32>, vertices: &mut Vertices) -> bool {
         let position = |value: f64| (value * PER_MM).round() as i64;
         let mut positions: Vec<[i64; 2]> =
             stroke.points.iter().map(|point| point.map(position)).collect();
@@ -291,12 +328,20 @@ impl PlanLines {
         if positions.len() < 2 {
             return false;
         }
-        if self.pen != Some(stroke.pen) {
-            self.pen = Some(stroke.pen);
-            self.lines.push((format!("usemtl pen{}", stroke.pen), stroke.element));
+        let element = stroke.element;
+        if *pen != Some(stroke.pen) {
+            *pen = Some(stroke.pen);
+            self.push(format_args!("usemtl pen{}", stroke.pen), element);
         }
-        let numbers: Vec<usize> =
-            positions.into_iter().map(|position| self.vertex(position, stroke.element)).collect();
+        let mut vertex = |position: [i64; 2]| {
+            let (number, is_new) = vertices.number(position);
+            if is_new {
+                let [x, y] = position.map(|value| value as f64 / PER_MM);
+                self.push(format_args!("v {x} {y} 0"), element);
+            }
+            number
+        };
+        let numbers: Vec<usize> = positions.into_iter().map(&mut vertex).collect();
         let mut line = String::from("l");
         let mut last = None;
         for number in numbers {
@@ -305,41 +350,34 @@ impl PlanLines {
             let _ = write!(line, " {number}");
             if line.len() > LINE_LIMIT {
                 line.truncate(before);
-                let whole = std::mem::replace(&mut line, String::from("l"));
-                self.lines.push((whole, stroke.element));
-                let _ = write!(line, " {} {number}", last.unwrap_or(number));
+                self.push(format_args!("{line}"), element);
+                line = format!("l {} {number}", last.unwrap_or(number));
             }
             last = Some(number);
         }
-        self.lines.push((line, stroke.element));
+        self.push(format_args!("{line}"), element);
         true
-    }
-
-    /// The number of the vertex at this position, which is made if there is none.
-    fn vertex(&mut self, position: [i64; 2], element: u32) -> usize {
-        let next = self.vertices.len() + 1;
-        let number = *self.vertices.entry(position).or_insert(next);
-        if number == next {
-            let [x, y] = position.map(|value| value as f64 / PER_MM);
-            self.lines.push((format!("v {x} {y} 0"), element));
-        }
-        number
     }
 }
 
 impl Lines for PlanLines {
     fn count(&self) -> usize {
-        self.lines.len()
+        self.begins.len()
     }
 
     fn line(&self, index: usize) -> Option<JobLine> {
-        let (sent, element) = self.lines.get(index)?;
-        let origin = self.elements.get(*element as usize).map(|(line, text)| Origin {
+        let begin = *self.begins.get(index)?;
+        let end = self.begins.get(index + 1).copied().unwrap_or(self.text.len());
+        let sent = self.text.get(begin..end)?.to_owned();
+        let of_element = self.of_elements.partition_point(|(first, _)| *first <= index);
+        let element = self.of_elements.get(of_element.checked_sub(1)?);
+        let place = element.and_then(|(_, element)| self.elements.get(*element as usize));
+        let origin = place.map(|(line, text)| Origin {
             file: self.file.clone(),
             line: *line,
             text: text.clone(),
         });
-        Some(JobLine { sent: sent.clone(), origin })
+        Some(JobLine { sent, origin })
     }
 }
 

@@ -3,7 +3,8 @@
 //! `usvg` resolves styles, units (96 pixels in an inch), the viewBox, references and transforms.
 //! [`flatten`] makes polylines of the paths, [`clip`] cuts them at the page and
 //! [`region`](crate::region) at clip paths, [`pens`] chooses pens by layers or colours, and
-//! [`Plan`] writes the lines that are sent. [`unread`] knows what all of this does not read.
+//! [`Plan`] writes the lines that are sent. [`unread`] knows what all of this does not read. Before
+//! all that, [`runs`] joins lines, which saves memory.
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
 //! a dot with round or square ends is a very short line; a shape that is only filled is drawn as
@@ -25,6 +26,7 @@ mod embedded;
 mod flatten;
 mod markup;
 mod pens;
+mod runs;
 #[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
 mod text;
 mod unread;
@@ -83,6 +85,10 @@ impl Format for Svg {
         }
         let text = String::from_utf8(bytes);
         let text = text.map_err(|_| refused("this is not UTF-8 text: save it as UTF-8".into()))?;
+        let text = match runs::joined(&text) {
+            Some(joined) => joined,
+            None => text,
+        };
         let text = text.strip_prefix('\u{FEFF}').unwrap_or(&text);
         contents(&file, text, arrangement).map_err(refused)
     }
@@ -116,7 +122,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let page = Page { width: size[0], height: size[1] };
     let markup = Markup::new(&document);
     let with_areas = arrangement.hatch.is_some();
-    let drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
+    let mut drawing = Drawing::new(&tree, size, &markup, with_areas).map_err(|_| {
         "the SVG has too many points, too large clip paths or masks, or a curve of kilometres: \
          leave it out"
             .to_owned()
@@ -125,10 +131,11 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let mut areas = Vec::new();
     let marks: Vec<_> = drawing.shapes.iter().map(|shape| shape.marks.clone()).collect();
     let chosen = pens::pens(&marks);
-    for (shape, &(pen, layer)) in drawing.shapes.iter().zip(&chosen.of_paths) {
+    for (shape, &(pen, layer)) in drawing.shapes.iter_mut().zip(&chosen.of_paths) {
         let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
         plan.begin(line, text);
-        for polyline in &shape.polylines {
+        // The lines of a shape are freed as soon as the plan has them.
+        for polyline in std::mem::take(&mut shape.polylines) {
             let points = polyline.positions();
             match points.first().filter(|_| shape.has_dots && length(&points) == 0.0) {
                 Some(dot) => plan.draw_dot(*dot, Some(size), pen, layer),

@@ -25,6 +25,8 @@ use penup_readers::{Arrangement, PLAN_OPTIONS, PlanOption, SourceFile, Turn};
 const PAGE: &str = "page";
 /// The name of the option whose value is any text. It is sent with escapes.
 const TITLE: &str = "title";
+/// The name of the option for the height of the title.
+const TITLE_SIZE: &str = "title-size";
 /// The units in which the size of a page may be written, and their lengths in mm.
 const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
 /// The name of the option for the margin of the page. A file that sets its own page needs no
@@ -122,6 +124,11 @@ impl FromArgMatches for ViewArgs {
             turn,
             margin.filter(|_| is_given(MARGIN)),
         );
+        if settings.value(FIT) == Some("on") {
+            let size = settings.value(TITLE_SIZE).and_then(|size| size.parse().ok());
+            let title = settings.value(TITLE).unwrap_or_default();
+            arrangement = arrangement.fitted(title, size.unwrap_or_default());
+        }
         for option in PLAN_OPTIONS {
             let text = match matches.try_get_one::<String>(option.name) {
                 _ if option.value.is_empty() => matches.get_flag(option.name).then(String::new),

@@ -50,6 +50,10 @@ pub fn pause(args: &PauseArgs, interrupt: &AtomicBool) -> Result<Outcome, Error>
 pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.plotter.port)?;
     let (mut sender, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
+    if status.is_holding() && args.at_origin {
+        let reason = "the machine holds and knows where the pen is: leave out --at-origin";
+        return Err(Error::NotResumed { reason: reason.to_owned() });
+    }
     if status.is_holding() || status.stopped.is_none() {
         return Ok(done("it goes on", &sender.resume()?));
     }
@@ -71,9 +75,12 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
 /// Aborts whatever the machine does.
 ///
 /// # Errors
-/// See [`Sender::give_up`].
+/// The machine is locked after an alarm then, or see [`Sender::give_up`].
 pub fn abort(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let status = join(args, interrupt, |sender| sender.give_up())?;
+    if status.is_alarm() {
+        return Err(Error::Locked { alarm: status.alarm });
+    }
     Ok(done("given up: the machine stands with the pen up", &status))
 }
 

@@ -19,13 +19,19 @@ use std::sync::atomic::AtomicBool;
 /// How often the settings are read while no two answers agree.
 const MOST_READINGS: u32 = 10;
 
-/// Sets settings of the machine.
+/// How far the shown value of a setting may be from what it was set to: the plotter rounds to 2^-16
+/// and shows three decimals.
+const SHOWN: f64 = 0.0006;
+
+/// Sets settings of the machine. All are sent: the plotter shows three decimals of a setting and
+/// keeps more, so one that it shows may be another.
 ///
 /// # Errors
 /// A setting is refused, or as [`Sender::ask`].
 pub fn set(args: &SetArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let (changed, all) = converse(&args.plotter, interrupt, |sender| {
-        let changed = change(sender, &args.settings)?;
+        let changed = differing(&read(sender)?, &args.settings).len();
+        assign(sender, &args.settings)?;
         Ok((changed, read(sender)?))
     })?;
     Ok(told(changed, &args.settings, &all))
@@ -86,7 +92,7 @@ fn told(changed: usize, wanted: &[AssignedSetting], all: &[AssignedSetting]) -> 
     let is_wanted = |now: &&AssignedSetting| wanted.iter().any(|it| it.number == now.number);
     let now: Vec<AssignedSetting> = all.iter().filter(is_wanted).cloned().collect();
     let text = match changed {
-        0 => "the machine has these settings already".to_owned(),
+        0 => "the machine has these settings".to_owned(),
         1 => "1 setting is changed".to_owned(),
         changed => format!("{changed} settings are changed"),
     };
@@ -99,15 +105,28 @@ pub(super) fn as_json(settings: &[AssignedSetting]) -> Value {
     json!({ "settings": pairs.collect::<Map<_, _>>() })
 }
 
-/// Sets those settings that differ, and checks that the machine then has them. Returns how many
-/// differed.
+/// The value of a setting that the plotter shows.
+fn shown(all: &[AssignedSetting], it: &AssignedSetting) -> Option<f64> {
+    all.iter().find(|now| now.number == it.number)?.value.parse().ok()
+}
+
+/// Those of the `wanted` settings that are not what the plotter shows.
+fn differing(shown_now: &[AssignedSetting], wanted: &[AssignedSetting]) -> Vec<AssignedSetting> {
+    let differs = |it: &&AssignedSetting| shown(shown_now, it) != it.value.parse().ok();
+    wanted.iter().filter(differs).cloned().collect()
+}
+
+/// Sets those settings that differ from what the plotter shows, because each one that is sent is
+/// written to its flash. Checks that the machine then has them. Returns how many differed.
 pub(super) fn change(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<usize, Error> {
-    let before = read(sender)?;
-    let differs = |all: &[AssignedSetting], it: &AssignedSetting| {
-        !all.iter().any(|now| now.number == it.number && is_same(&now.value, &it.value))
-    };
-    let mut left: Vec<&AssignedSetting> = wanted.iter().filter(|it| differs(&before, it)).collect();
-    let changed = left.len();
+    let wanted = differing(&read(sender)?, wanted);
+    assign(sender, &wanted)?;
+    Ok(wanted.len())
+}
+
+/// Sets all these settings, and checks that the machine then has them.
+fn assign(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<(), Error> {
+    let mut left: Vec<&AssignedSetting> = wanted.iter().collect();
     // Two settings may only fit each other once both are changed, whichever comes first; so what is
     // refused is tried again after the others.
     while !left.is_empty() {
@@ -128,17 +147,13 @@ pub(super) fn change(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Res
         }
     }
     let after = read(sender)?;
-    match wanted.iter().find(|it| differs(&after, it)) {
-        Some(setting) => Err(Error::NotSet { number: setting.number }),
-        None => Ok(changed),
-    }
-}
-
-/// Whether two values are the same setting. The plotter rounds to 2^-16 and writes three decimals.
-pub(super) fn is_same(a: &str, b: &str) -> bool {
-    match (a.parse::<f64>(), b.parse::<f64>()) {
-        (Ok(a), Ok(b)) => (a - b).abs() <= 0.0006,
+    let has_taken = |it: &&AssignedSetting| match (shown(&after, it), it.value.parse::<f64>()) {
+        (Some(now), Ok(wanted)) => (now - wanted).abs() <= SHOWN,
         _ => false,
+    };
+    match wanted.iter().find(|it| !has_taken(it)) {
+        Some(setting) => Err(Error::NotSet { number: setting.number }),
+        None => Ok(()),
     }
 }
 
@@ -182,4 +197,36 @@ pub(super) fn agreed<T: PartialEq>(
         }
     }
     Err(Error::Damaged { line: None, times: MOST_READINGS })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{assign, change};
+    use crate::fake::{FakePlotter, Fault};
+    use crate::machine_settings::AssignedSetting;
+    use crate::sender::{Sender, Timeouts};
+    use std::sync::atomic::AtomicBool;
+
+    /// What the plotter is sent that shows `$100=80.000`.
+    fn sent(value: &str, is_restored: bool) -> Vec<String> {
+        let wanted = [AssignedSetting { number: 100, value: value.to_owned() }];
+        let mut plotter = FakePlotter::new(Fault::None);
+        let interrupt = AtomicBool::new(false);
+        let (mut sender, _) =
+            Sender::open_for_orders(&mut plotter, Timeouts::default(), &interrupt).expect("opened");
+        match is_restored {
+            true => drop(change(&mut sender, &wanted).expect("set")),
+            false => assign(&mut sender, &wanted).expect("set"),
+        }
+        plotter.lines
+    }
+
+    #[test]
+    fn a_change_that_the_plotter_does_not_show_is_sent() {
+        assert_eq!(sent("80.0003", false), ["$100=80.0003"]);
+        assert_eq!(sent("80.0003", true), ["$100=80.0003"]);
+        // It may have been 80.0003 before.
+        assert_eq!(sent("80", false), ["$100=80"]);
+        assert!(sent("80", true).is_empty());
+    }
 }

@@ -2,8 +2,10 @@
 //! numbers and values.
 
 use crate::error::Error;
+use crate::files;
 use crate::machine_settings::AssignedSetting;
 use std::fmt::Write as _;
+use std::io;
 use std::path::Path;
 use toml::{Table, Value};
 
@@ -67,7 +69,8 @@ impl SavedSettings {
     pub fn read(file: &Path) -> Result<Self, Error> {
         let name = file.display().to_string();
         let unreadable = |source| Error::File { file: name.clone(), source };
-        let text = std::fs::read_to_string(file).map_err(unreadable)?;
+        let text = String::from_utf8(files::bytes(file)?)
+            .map_err(|error| unreadable(io::Error::new(io::ErrorKind::InvalidData, error)))?;
         Self::parse(&text).map_err(|source| Error::SettingsFile { file: name.clone(), source })
     }
 

@@ -1,8 +1,9 @@
 //! `penup setup`: leads through the settings of a new machine.
 //!
-//! Each part asks, moves the machine, and stores what it has learnt before the next one begins. So
-//! whoever breaks off finds the machine with the settings of the parts that are done, and is told
-//! which these are. Answers are lines of the standard input; its end breaks off.
+//! Each part asks, moves the machine, and stores what it has learnt before the next one begins. No
+//! setting is changed for a while only. So whoever breaks off, or pulls the cable, finds the
+//! machine with the settings of the parts that are done, and is told which these are. Answers are
+//! lines of the standard input; its end breaks off.
 
 mod answers;
 mod directions;
@@ -10,18 +11,21 @@ mod polargraph;
 
 use self::answers::{Answers, say};
 use super::open;
-use super::settings::{as_json, change, is_same, read};
+use super::settings::{as_json, change, read};
 use crate::cli::PlotterArgs;
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::link::SerialLink;
-use crate::machine_settings::AssignedSetting;
+use crate::machine_settings::{AssignedSetting, simulated};
 use crate::outcome::Outcome;
+use crate::preview::InMemory;
 use crate::progress::Quiet;
 use crate::sender::{Sender, Timeouts};
 use penup::machine::Setting;
-use penup_job::protocol::{CLEAR, HOME, PEN_DOWN, Status};
-use std::sync::atomic::AtomicBool;
+use penup_job::protocol::{HOME, PEN_DOWN, Status};
+use penup_job::room::Room;
+use penup_readers::lines::JobLine;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// The length of the moves that are measured, in mm.
@@ -87,8 +91,8 @@ struct Setup<'a> {
 /// Leads through the settings.
 ///
 /// # Errors
-/// The machine stops with an alarm, or as [`Sender::ask`]. What was changed until
-/// then was told on the standard error.
+/// The setup is broken off, the machine stops with an alarm, or as [`Sender::ask`]. What was
+/// changed until then is told.
 pub fn setup(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let _moving = MovingPlotter::new();
     let mut setup =
@@ -98,9 +102,10 @@ pub fn setup(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Erro
     let json = as_json(&setup.changed);
     match ended {
         Ok(()) => Ok(Outcome::done(format!("the machine is set up; {changed}"), json)),
-        Err(End::BrokenOff) => {
-            Ok(Outcome::done(format!("the setup is broken off; {changed}"), json))
-        }
+        Err(End::BrokenOff | End::Failed(Error::Interrupted)) => Err(Error::SetupBrokenOff {
+            changes: changed,
+            is_interrupted: interrupt.load(Ordering::Relaxed),
+        }),
         Err(End::Failed(error)) => {
             say(&format!("penup: the setup ends here; {changed}"));
             Err(error)
@@ -143,14 +148,8 @@ impl Setup<'_> {
                  motors off.",
             );
             setup.answers.ask("Press Enter when it is there.")?;
-            // From its current position, the pen may go in both directions.
-            let limits = value(&settings, Setting::SoftLimits);
-            setup.set(sender, Setting::SoftLimits, 0.0)?;
-            let done = setup.moving_parts(sender, machine, &settings);
-            if !matches!(done, Err(End::Failed(Error::Link(_)))) {
-                setup.set(sender, Setting::SoftLimits, limits)?;
-            }
-            done
+            let room = room_for_moves(&sender.status()?, &settings)?;
+            setup.moving_parts(sender, machine, &settings, room)
         })?;
         let has_switches = value(&settings, Setting::Homing) != 0.0;
         self.find_origin(args, link, has_switches, interrupt)
@@ -172,12 +171,14 @@ impl Setup<'_> {
         done
     }
 
-    /// The parts in which the pen moves about the middle of the machine.
+    /// The parts in which the pen moves about the middle of the machine, by up to `room` mm to the
+    /// right and up, and back.
     fn moving_parts(
         &mut self,
         sender: &mut Sender<'_>,
         machine: Machine,
         settings: &[AssignedSetting],
+        room: [f64; 2],
     ) -> Result<(), End> {
         let inverting = value(settings, Setting::InvertDirections) as u8;
         self.find_directions(sender, machine, inverting)?;
@@ -189,12 +190,13 @@ impl Setup<'_> {
             if axis == 1 && machine == Machine::CoreXy {
                 break;
             }
-            self.measure(sender, axis, setting, name, value(settings, setting))?;
+            let now = value(settings, setting);
+            self.measure(sender, axis, setting, name, now, room[axis])?;
         }
         self.pen_heights(sender, settings, 3)
     }
 
-    /// Moves the pen by a length that the user measures, and sets the steps in a mm by it.
+    /// Moves the pen by `way` mm, which the user measures, and sets the steps in a mm by it.
     fn measure(
         &mut self,
         sender: &mut Sender<'_>,
@@ -202,23 +204,24 @@ impl Setup<'_> {
         setting: Setting,
         name: &str,
         now: f64,
+        way: f64,
     ) -> Result<(), End> {
         let info = setting.info();
         let [least, most] = [info.least, info.greatest].map(|bound| bound.to_num::<f64>());
         self.answers
-            .ask(&format!("Mark where the pen is, then press Enter: it goes {LONG} mm {name}."))?;
+            .ask(&format!("Mark where the pen is, then press Enter: it goes {way} mm {name}."))?;
         let mut by = [0.0; 2];
-        by[axis] = LONG;
+        by[axis] = way;
         jog(sender, by)?;
         // The bounds are those of the setting.
-        let bounds = [(now * LONG / most).max(0.1), now * LONG / least];
+        let bounds = [(now * way / most).max(0.1), now * way / least];
         let measured = self.answers.number(
             "How many mm did it go? (Enter if it is right)",
             bounds.map(|bound| (bound * 10.0).round() / 10.0),
         );
         jog(sender, by.map(|part| -part))?;
         if let Some(measured) = measured?.filter(|measured| *measured > 0.0) {
-            let steps = (now * LONG / measured).clamp(least, most);
+            let steps = (now * way / measured).clamp(least, most);
             self.set(sender, setting, (steps * 1000.0).round() / 1000.0)?;
         }
         Ok(())
@@ -313,7 +316,7 @@ impl Setup<'_> {
         if change(sender, std::slice::from_ref(&setting))? > 0 {
             self.changed.retain(|it| it.number != number);
             let was = self.before.iter().find(|it| it.number == number);
-            if !was.is_some_and(|was| is_same(&was.value, &setting.value)) {
+            if was.and_then(|was| was.value.parse().ok()) != Some(value) {
                 self.changed.push(setting);
             }
         }
@@ -351,24 +354,53 @@ fn expect_origin(sender: &mut Sender<'_>) -> Result<(), End> {
     Err(End::BrokenOff)
 }
 
-/// Draws the test square, and takes it from the plotter again.
+/// How far the pen may move to the right and up from where the plotter takes it to be, up to
+/// [`LONG`] on each axis.
+///
+/// All moves of the setup go there and back. So the soft limits stay on, although the pen was
+/// brought elsewhere by hand. Breaks off if there is no room for them.
+fn room_for_moves(status: &Status, settings: &[AssignedSetting]) -> Result<[f64; 2], End> {
+    let place: Vec<f64> =
+        status.position.split(',').filter_map(|number| number.parse().ok()).collect();
+    let travel = [Setting::TravelX, Setting::TravelY].map(|axis| value(settings, axis));
+    let room = [0, 1].map(|axis| LONG.min(travel[axis]).floor());
+    let is_free = |axis: usize| {
+        place.get(axis).is_some_and(|at| *at >= 0.0 && at + room[axis] <= travel[axis])
+    };
+    if value(settings, Setting::SoftLimits) == 0.0 || is_free(0) && is_free(1) {
+        return Ok(room);
+    }
+    say(&format!(
+        "The plotter takes its place for {} mm, and its travel is {} x {} mm ($130, $131): from \
+         there it cannot go {} mm to the right and {} mm up. Switch it off and on, so that it \
+         begins at 0,0, and run `penup setup` again.",
+        status.position, travel[0], travel[1], room[0], room[1]
+    ));
+    Err(End::BrokenOff)
+}
+
+/// Draws the test square. This computer computes it and sends its stroke, so it depends on no
+/// option of an earlier job, changes none, and leaves the model in the plotter's memory alone.
 fn draw_square(sender: &mut Sender<'_>) -> Result<(), Error> {
     let [side, from] = SQUARE;
     let to = side + from;
     let lines = [
-        CLEAR.to_owned(),
         format!("v {from} {from} 0"),
         format!("v {to} {from} 0"),
         format!("v {to} {to} 0"),
         format!("v {from} {to} 0"),
         "l 1 2 3 4 1".to_owned(),
-        "$fit=off".to_owned(),
         format!("$page={0}x{0}", to + from),
         format!("$margin={from}"),
-    ];
-    for line in &lines {
-        sender.ask(line)?;
+    ]
+    .map(JobLine::command);
+    let settings = simulated(&read(sender)?)?;
+    let mut host = InMemory::<u32>::new(Room::for_job(&lines), settings);
+    if !host.take(&lines) {
+        let reason = "this machine cannot draw the test square".to_owned();
+        return Err(Error::NotStreamed { reason });
     }
-    sender.plot(&mut Quiet)?;
-    sender.ask(CLEAR).map(drop)
+    let form = sender.form(&settings)?;
+    let (streamed, _) = host.streamed(form, 0)?;
+    sender.draw_streamed(&streamed, &mut Quiet)
 }

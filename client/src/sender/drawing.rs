@@ -40,6 +40,10 @@ impl Standstill {
     }
 }
 
+/// The number of status reports without an effect after which a byte is sent again. The first ones
+/// may have been written before it came.
+pub(super) const REPORTS_BEFORE_REPEAT: u32 = 4;
+
 /// The state of a drawing that the sender follows.
 #[derive(Debug, Default)]
 pub(super) struct FollowedDrawing {
@@ -50,6 +54,9 @@ pub(super) struct FollowedDrawing {
     is_standing: bool,
     /// Whether the user of this program asked for the hold.
     paused_here: bool,
+    /// The byte that the user of this program asked for last, until a report shows its effect, and
+    /// the number of reports since it was sent.
+    asked: Option<(u8, u32)>,
 }
 
 /// Whether a line may be sent beside the drawing.
@@ -195,7 +202,29 @@ impl Sender<'_> {
                 // This request is carried out where interrupts are handled.
                 UserRequest::GiveUp => continue,
             };
+            if matches!(byte, HOLD | RESUME) {
+                followed.asked = Some((byte, 0));
+            }
             self.link.send(&[byte])?;
+        }
+        Ok(())
+    }
+
+    /// Sends the byte that the user asked for last again if it shows no effect: it may be lost.
+    fn repeat_if_lost(
+        &mut self,
+        status: &Status,
+        followed: &mut FollowedDrawing,
+    ) -> Result<(), Error> {
+        let Some((byte, reports)) = &mut followed.asked else { return Ok(()) };
+        // A picture is computed to its end before the machine holds.
+        if (*byte == HOLD) == status.is_holding() || status.is_idle() {
+            followed.asked = None;
+        } else if !status.is_computing {
+            *reports += 1;
+            if *reports % REPORTS_BEFORE_REPEAT == 0 {
+                self.link.send(&[*byte])?;
+            }
         }
         Ok(())
     }
@@ -255,13 +284,14 @@ impl Sender<'_> {
     ) -> Result<(), Error> {
         followed.is_holding = status.is_holding() && status.pen_wanted.is_none();
         followed.is_standing = status.is_standing;
+        self.repeat_if_lost(status, followed)?;
         let holds = followed.standstill.holds(status);
         if !status.is_holding() {
             followed.held_since = None;
             return Ok(());
         }
         let Some(pen) = holds else { return Ok(()) };
-        if pen.is_none() && followed.paused_here {
+        if pen.is_none() && (followed.paused_here || followed.asked.is_some()) {
             return Ok(());
         }
         if self.may_resume(pen, &mut followed.held_since)? {

@@ -1,6 +1,6 @@
 //! Orders to a machine: pause, resume, give up, and single lines with their answers.
 
-use super::drawing::Standstill;
+use super::drawing::REPORTS_BEFORE_REPEAT;
 use super::{Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
@@ -8,6 +8,9 @@ use crate::progress::Quiet;
 use penup_job::protocol::{HOLD, PAUSE_AFTER_STROKE, RESUME, Reply, Status};
 use penup_readers::lines::JobLine;
 use std::sync::atomic::AtomicBool;
+
+/// How often a byte is sent that the plotter does not obey.
+const MOST_ORDERS: u32 = 5;
 
 impl<'a> Sender<'a> {
     /// Joins a plotter, whatever it does, and returns its status. Nothing changes on the plotter.
@@ -58,15 +61,18 @@ impl<'a> Sender<'a> {
         if !matches!(status.state.as_str(), "Run" | "Hold") {
             return Err(Error::NothingToDo { order: "pause", state: status.state });
         }
-        let byte = if after_stroke { PAUSE_AFTER_STROKE } else { HOLD };
         if status.state == "Run" {
-            self.link.send(&[byte])?;
+            let byte = if after_stroke { PAUSE_AFTER_STROKE } else { HOLD };
+            // A job may end before the pause takes effect.
+            let is_obeyed = |status: &Status| status.state != "Run";
+            // A picture is computed to its end, and a stroke may be long.
+            let first = status.strokes.map_or(0, |(done, _)| done);
+            self.insist("pause", byte, is_obeyed, |status| {
+                let is_same_stroke = status.strokes.is_none_or(|(done, _)| done <= first + 1);
+                status.is_computing || after_stroke && is_same_stroke
+            })?;
         }
-        let stopped = self.wait_until(|status| {
-            status.is_standing || !matches!(status.state.as_str(), "Run" | "Hold")
-        })?;
-        // A job may end before the pause takes effect.
-        Ok(stopped)
+        self.wait_until(|status| status.is_standing || !status.is_holding())
     }
 
     /// Lets a machine that holds go on, and returns its status then.
@@ -78,32 +84,55 @@ impl<'a> Sender<'a> {
         if !status.is_holding() {
             return Err(Error::NothingToDo { order: "resume", state: status.state });
         }
-        self.link.send(&[RESUME])?;
-        // The byte may be lost; a machine that stands for three reports was not told.
-        let mut standstill = Standstill::default();
         let pen = status.pen_wanted;
+        // If the machine waits for another pen, this is already the next pause.
+        let is_obeyed = |status: &Status| !status.is_holding() || status.pen_wanted != pen;
+        self.insist("resume", RESUME, is_obeyed, |status| !status.is_standing)
+    }
+
+    /// Sends a byte that acts at once, and sends it again after some status reports, until one says
+    /// that it `is_obeyed`: a byte may be lost. Returns that status. Reports while it `may_last` do
+    /// not count as disobedience.
+    ///
+    /// # Errors
+    /// The plotter does not obey.
+    fn insist(
+        &mut self,
+        order: &'static str,
+        byte: u8,
+        is_obeyed: impl Fn(&Status) -> bool,
+        may_last: impl Fn(&Status) -> bool,
+    ) -> Result<Status, Error> {
+        let (mut reports, mut in_vain) = (0, 0);
         self.wait_watching(&mut |sender, status| {
-            // If the machine waits for another pen, this is already the next pause.
-            if !status.is_holding() || status.pen_wanted != pen {
+            if is_obeyed(status) {
                 return Ok(true);
             }
-            if standstill.holds(status).is_some() {
-                sender.link.send(&[RESUME])?;
-                standstill = Standstill::default();
+            if reports % REPORTS_BEFORE_REPEAT == 0 {
+                if in_vain == MOST_ORDERS {
+                    return Err(Error::Unconfirmed { order });
+                }
+                sender.link.send(&[byte])?;
+                in_vain += u32::from(!may_last(status));
             }
+            reports += 1;
             Ok(false)
         })
     }
 
-    /// Aborts whatever the machine does. Returns its status when it is at rest with the pen up.
+    /// Aborts whatever the machine does. Returns its status when it is at rest with the pen up,
+    /// which may be that of an alarm.
     ///
     /// # Errors
     /// The plotter does not confirm it.
     pub fn give_up(&mut self) -> Result<Status, Error> {
-        if self.abort()?.is_none() {
+        self.allows_alarm = true;
+        let is_confirmed = self.abort()?.is_some();
+        let is_at_rest = |status: &Status| status.is_idle() || status.is_alarm();
+        if !is_confirmed && !is_at_rest(&self.find_state()?) {
             return Err(Error::Unconfirmed { order: "abort" });
         }
-        self.wait_until(|status| status.is_idle() || status.is_alarm())
+        self.wait_until(is_at_rest)
     }
 
     /// Sends one line and returns what the plotter said until it had carried it out.

@@ -5,6 +5,7 @@ use super::{Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
 use crate::progress::{Progress, Quiet};
+use penup::machine::{Setting, Settings};
 use penup::protocol::{CommandError, MOST_TARGETS};
 use penup_job::protocol::{Reply, STREAM, Status};
 use penup_job::streamed::{Form, StreamedJob};
@@ -116,18 +117,25 @@ impl<'a> Sender<'a> {
         Ok(None)
     }
 
-    /// Whether the plotter takes strokes, or only G-code.
+    /// Whether the plotter, which has these settings, takes strokes, or only G-code.
     ///
     /// # Errors
-    /// As [`Sender::stream`].
-    pub fn form(&mut self) -> Result<Form, Error> {
-        match self.ask(STREAM) {
+    /// It takes only G-code in which a program cannot say when the pen is down, or as
+    /// [`Sender::stream`].
+    pub fn form(&mut self, settings: &Settings) -> Result<Form, Error> {
+        let form = match self.ask(STREAM) {
             Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
-                Ok(Form::Strokes)
+                Form::Strokes
             }
-            Err(Error::Refused { .. }) => Ok(Form::GCode),
-            other => other.map(|_| Form::Strokes),
+            Err(Error::Refused { .. }) => Form::GCode,
+            other => other.map(|_| Form::Strokes)?,
+        };
+        let shows_pen = settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser);
+        if form == Form::GCode && !shows_pen {
+            let reason = "this plotter takes G-code: set $206=0 and $32=0, so that G1 draws";
+            return Err(Error::NotStreamed { reason: reason.to_owned() });
         }
+        Ok(form)
     }
 
     /// How far a drawing has come that was sent while it was drawn and has stopped; `None` if there

@@ -307,6 +307,24 @@ fn the_machine_moves_is_set_and_refuses_in_its_words() {
     );
 }
 
+/// The emergency stop is pressed by the real-time byte 0xFD.
+#[test]
+fn an_abort_says_that_the_machine_is_locked() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
+    let mut port = serialport::new(&plotter.device, 115_200).open().expect("opened");
+    port.write_all(b"\xFD").expect("sent");
+    while plotter.heard.load(Ordering::Relaxed) == 0 {}
+    drop(port);
+    let (code, _, error) = run(&["abort"]);
+    assert_eq!(code, Some(4), "{error}");
+    assert!(error.contains("stays locked after alarm 10: the emergency stop"), "{error}");
+    assert!(error.contains("`penup unlock`"), "{error}");
+    assert_eq!(run(&["unlock"]).1, "the machine is unlocked\n");
+    assert_eq!(run(&["abort"]).0, Some(0));
+}
+
 #[test]
 fn settings_are_saved_changed_and_restored() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -335,7 +353,10 @@ fn settings_are_saved_changed_and_restored() {
     let (_, again, _) = run(&["settings", "save"]);
     assert_eq!(again, saved);
     let (code, said, _) = run(&["settings", "restore", "machine.toml"]);
-    assert_eq!((code, said), (Some(0), "the machine has these settings already\n".into()));
+    assert_eq!((code, said), (Some(0), "the machine has these settings\n".into()));
+    // The plotter keeps more decimals than it shows.
+    let (code, said, error) = run(&["set", "100=80.0003"]);
+    assert_eq!((code, said), (Some(0), "1 setting is changed\n".into()), "{error}");
     // A polargraph and its anchors only fit each other together.
     let anchors = ["set", "230=2", "231=300", "232=100", "233=1200"];
     let (code, said, error) = run(&anchors);
@@ -770,6 +791,30 @@ fn a_polargraph_is_set_up_by_its_own_measures() {
     assert_eq!(status["strokes"], serde_json::json!({ "done": 1, "all": 1 }));
 }
 
+/// The settings that are named in a sentence, such as `3=1 (inverted directions)`.
+fn settings_in(said: &str) -> Vec<(String, f64)> {
+    let words = said.split([' ', '\n', ',']).filter_map(|word| word.split_once('='));
+    words.filter_map(|(number, value)| Some((number.to_owned(), value.parse().ok()?))).collect()
+}
+
+/// Checks that what differs from a new machine is what was told, and that soft limits are on.
+fn assert_told(plotter: &Library, folder: &Path, told: &[(String, f64)]) {
+    let (_, now) = plotter.json(folder, &["settings", "show"]);
+    let (_, new) = Library::new().json(folder, &["settings", "show"]);
+    let (now, new) = (now["settings"].as_object().expect("a table"), &new["settings"]);
+    let differs: Vec<(&String, f64)> = now
+        .iter()
+        .filter(|(number, value)| new[number.as_str()] != **value)
+        .map(|(number, value)| (number, value.as_f64().expect("a number")))
+        .collect();
+    assert_eq!(differs.len(), told.len(), "{differs:?} {told:?}");
+    for (number, value) in differs {
+        let (_, told) = told.iter().find(|(told, _)| told == number).expect("it is told");
+        assert!((told - value).abs() < 0.001, "{number}: {told} {value}");
+    }
+    assert_eq!(now["20"], 1.0, "soft limits are on as before");
+}
+
 #[test]
 fn a_setup_that_is_broken_off_says_what_is_stored() {
     let all = "\nleft\nup\nright\nup\n\n98\n\n101\n\n90\n\n\n";
@@ -778,32 +823,50 @@ fn a_setup_that_is_broken_off_says_what_is_stored() {
     for end in std::iter::once(0).chain(ends) {
         let plotter = Library::new();
         let (code, said, noted) = set_up(&plotter, &all[..end]);
-        assert_eq!(code, Some(0), "{noted}");
-        let (_, now) = plotter.json(folder.path(), &["settings", "show"]);
-        let fresh = Library::new();
-        let (_, new) = fresh.json(folder.path(), &["settings", "show"]);
-        let (now, new) = (now["settings"].as_object().expect("a table"), new["settings"].clone());
-        // What differs from a new machine is what was told.
-        let differs: serde_json::Map<_, _> = now
-            .iter()
-            .filter(|(number, value)| new[number.as_str()] != **value)
-            .map(|(number, value)| (number.clone(), value.clone()))
-            .collect();
-        let told = said["settings"].as_object().expect("a table");
-        assert_eq!(differs.len(), told.len(), "{end}: {differs:?} {told:?}");
-        for (number, value) in told {
-            let (told, now) =
-                (value.as_f64().expect("one"), differs[number].as_f64().expect("one"));
-            assert!((told - now).abs() < 0.001, "{number}: {told} {now}");
-        }
-        assert_eq!(now["20"], 1.0, "soft limits are on as before");
+        assert_eq!(code, Some(5), "{noted}");
+        let error = said["error"].as_str().expect("an error");
+        assert!(error.starts_with("the setup is broken off; "), "{error}");
+        assert_told(&plotter, folder.path(), &settings_in(error));
     }
 }
 
+/// Ctrl-C breaks the setup off wherever it comes: at a question, or while the pen moves.
 #[test]
-fn the_console_sends_lines_and_prints_the_answers() {
+fn a_setup_is_broken_off_by_ctrl_c() {
     let folder = tempfile::tempdir().expect("a folder");
-    let plotter = Library::new();
+    for (answers, question) in
+        [("", "Press Enter when it is there"), ("\nleft\nup\nright\nup\n\n", "How many mm did")]
+    {
+        let plotter = Library::new();
+        plotter.slow.store(true, Ordering::Relaxed);
+        let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+            .args(["setup", "--port", &plotter.device])
+            .stdin(Stdio::piped())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        let mut typed = program.stdin.take().expect("a pipe");
+        typed.write_all(answers.as_bytes()).expect("written");
+        let mut noted = String::new();
+        let mut said = program.stderr.take().expect("a pipe");
+        let mut bytes = [0; 256];
+        while !noted.contains(question) {
+            let count = said.read(&mut bytes).expect("text");
+            assert!(count > 0, "it ended: {noted}");
+            noted += &String::from_utf8_lossy(&bytes[..count]);
+        }
+        let interrupted = Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+        assert!(interrupted.expect("kill runs").success());
+        said.read_to_string(&mut noted).expect("text");
+        assert_eq!(program.wait().expect("it ends").code(), Some(130), "{noted}");
+        let (_, told) = noted.split_once("penup: the setup is broken off; ").expect(&noted);
+        plotter.slow.store(false, Ordering::Relaxed);
+        assert_told(&plotter, folder.path(), &settings_in(told));
+    }
+}
+
+/// Has the plotter carry out lines as they are.
+fn console(plotter: &Library, lines: &str) -> String {
     let mut console = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(["console", "--port", &plotter.device])
         .stdin(Stdio::piped())
@@ -811,11 +874,55 @@ fn the_console_sends_lines_and_prints_the_answers() {
         .spawn()
         .expect("the program runs");
     let mut typed = console.stdin.take().expect("a pipe");
-    typed.write_all(b"$I\n$100=0\nG0 X5\nv 1 2\n?\n").expect("written");
+    typed.write_all(lines.as_bytes()).expect("written");
     drop(typed);
     let output = console.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(0));
-    let said = String::from_utf8(output.stdout).expect("text");
+    String::from_utf8(output.stdout).expect("text")
+}
+
+#[test]
+fn the_test_square_depends_on_no_earlier_job_and_changes_none() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let job = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n$projection=isometric\n$hidden=dashed\n\
+               $page=100x90\n$title=old\n$eye=3,4,5\n$margin=7\n";
+    let all = |said: &str| said.split("ok").collect::<Vec<_>>().join("");
+    let said = console(&plotter, job);
+    assert_eq!(said.matches("ok\r\n").count(), 10, "{said}");
+    let before = all(&console(&plotter, "$options\n$model\n"));
+    let (code, _, noted) = set_up(&plotter, "\nright\nup\n\n\n\n\n\n\n\nyes\n");
+    assert_eq!(code, Some(0), "{noted}");
+    let (_, status) = plotter.json(folder.path(), &["status"]);
+    assert_eq!(status["strokes"], serde_json::json!({ "done": 1, "all": 1 }));
+    assert_eq!(status["ink_mm"], serde_json::json!({ "done": 160, "all": 160 }), "{status}");
+    let after = all(&console(&plotter, "$options\n$model\n"));
+    let kept = |said: &str| {
+        let lines = said.lines().filter(|line| line.contains('=') || line.contains("MODEL:"));
+        lines.map(str::to_owned).collect::<Vec<_>>()
+    };
+    assert!(before.contains("title=old") && before.contains("vertices 3 "), "{before}");
+    assert_eq!(kept(&after), kept(&before));
+}
+
+/// A plotter that was left elsewhere has no room for the moves of the setup.
+#[test]
+fn a_setup_says_where_its_moves_have_no_room() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let (_, settings) = plotter.json(folder.path(), &["settings", "show"]);
+    let travel = settings["settings"]["130"].as_f64().expect("a number");
+    assert_eq!(plotter.run(folder.path(), &["jog", &(travel - 50.0).to_string(), "0"]).0, Some(0));
+    let (code, _, noted) = set_up(&plotter, "\n");
+    assert_eq!(code, Some(5), "{noted}");
+    assert!(noted.contains("Switch it off and on"), "{noted}");
+}
+
+#[test]
+fn the_console_sends_lines_and_prints_the_answers() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let said = console(&plotter, "$I\n$100=0\nG0 X5\nv 1 2\n?\n");
     assert!(said.contains("[VER:1.1h.penup"), "{said}");
     assert_eq!(said.matches("ok\r\n").count(), 2, "{said}");
     assert_eq!(said.matches("error:").count(), 2, "{said}");

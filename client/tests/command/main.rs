@@ -10,8 +10,9 @@ mod machine;
 mod many_points;
 
 use std::fs;
+use std::io::Write as _;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::{Command, Output, Stdio};
 
 fn penup(folder: &Path, arguments: &[&str]) -> (Option<i32>, String, String) {
     let Output { status, stdout, stderr } = Command::new(env!("CARGO_BIN_EXE_penup"))
@@ -214,9 +215,8 @@ fn options_that_change_nothing_on_a_plan_are_told() {
         let (code, _, noted) =
             penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
         assert_eq!(code, Some(0), "{noted}");
-        noted.split_once("nothing is changed by ").map(|(_, rest)| {
-            rest.split_once(": they are").map_or("", |(names, _)| names).to_owned()
-        })
+        let (_, names) = noted.split_once("nothing is changed by ")?;
+        names.lines().next().map(str::to_owned)
     };
     let (plan, solid) = ("v 0 0 0\nv 20 30 0\nl 1 2\n", "v 0 0 0\nv 20 30 0\nv 0 9 9\nf 1 2 3\n");
     let idle = ["--hidden", "dotted", "--crease", "30"];
@@ -227,6 +227,39 @@ fn options_that_change_nothing_on_a_plan_are_told() {
     assert_eq!(told(plan, &["--lift", "3", "--page", "A4"]), None);
     assert_eq!(told(plan, &[&idle[..], &["--eye=9,-9,9"]].concat()), None);
     assert_eq!(told(solid, &idle), None);
+    assert_eq!(told(solid, &["--fit"]).as_deref(), Some("--fit"));
+    assert_eq!(told(solid, &["--title-size", "9"]).as_deref(), Some("--title-size"));
+}
+
+#[test]
+fn the_standard_input_and_output_are_those_of_tape_and_fit_too() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let piped = |arguments: &[&str], given: &[u8]| {
+        let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+            .args(arguments)
+            .current_dir(folder.path())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        program.stdin.take().expect("a pipe").write_all(given).expect("written");
+        let output = program.wait_with_output().expect("it ends");
+        assert_eq!(output.status.code(), Some(0), "{arguments:?}");
+        output.stdout
+    };
+    let plan: &[u8] = b"v 20 20 0\nv 40 20 0\nv 40 30 0\nl 1 2 3\n";
+    let tape = piped(&["tape", "encode", "-", "--quiet"], plan);
+    let decoded = piped(&["tape", "decode", "-"], &tape);
+    fs::write(folder.path().join("plan.obj"), plan).expect("written");
+    piped(&["tape", "encode", "plan.obj"], b"");
+    assert_eq!(fs::read(folder.path().join("plan.tape")).expect("readable"), tape);
+    assert_eq!(piped(&["tape", "decode", "plan.tape"], b""), decoded);
+    let shown = piped(&["tape", "show", "-", "--svg", "-"], &tape);
+    assert_eq!(piped(&["tape", "show", "plan.tape", "--svg", "-"], b""), shown);
+    let fitted = piped(&["fit", "-", "--quiet"], plan);
+    piped(&["fit", "plan.obj"], b"");
+    assert_eq!(fs::read(folder.path().join("plan-fitted.obj")).expect("readable"), fitted);
+    assert_eq!(files(folder.path()), ["plan-fitted.obj", "plan.obj", "plan.tape"]);
 }
 
 #[test]
@@ -245,6 +278,20 @@ fn a_plan_that_the_margin_moves_is_told_and_a_solid_is_not() {
     assert!(!told("v 30 30 2\nv 50 50 2\nl 1 2\n", &[]));
     assert!(!told("v 0 0 0\nv 20 30 0\nv 0 9 0\nf 1 2 3\n", &[]));
     assert!(!told("v 0 0 0\nv 20 30 1\nl 1 2\n", &[]));
+}
+
+#[test]
+fn a_plan_that_is_too_small_to_be_drawn_is_told_its_size() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plan = "v 0 0 42\nv 0.00001 0 42\nv 0 0.00001 42\nl 1 2 3\n";
+    fs::write(folder.path().join("a.obj"), plan).expect("written");
+    let preview = ["preview", "a.obj", "--svg", "a.svg"];
+    let (code, _, noted) = penup(folder.path(), &preview);
+    assert_eq!(code, Some(4));
+    assert!(noted.contains("the drawing is 0.00001 x 0.00001 mm at true size"), "{noted}");
+    assert!(noted.contains("nothing to draw") && noted.contains("a motor step"), "{noted}");
+    let (code, said, noted) = penup(folder.path(), &[&preview[..], &["--fit"]].concat());
+    assert_eq!((code, noted.as_str()), (Some(0), ""), "{said}");
 }
 
 #[test]

@@ -18,8 +18,10 @@ use std::time::Duration;
 /// The points of a row.
 const ROW: usize = 1000;
 
-/// The bytes that the program may take for each point.
+/// The bytes that the program may take for each point of a long polyline, and for each point of a
+/// line of two, which has a stroke of its own to be ordered.
 const BYTES_A_POINT: usize = 200;
+const BYTES_A_SHORT_POINT: usize = 280;
 
 /// By how many bytes the memory of the program differs from one start to the next.
 const TOLERANCE: usize = 1_000_000;
@@ -29,21 +31,63 @@ const TOLERANCE: usize = 1_000_000;
 const POINTS: usize = 20_000;
 const STROKE: usize = ROW;
 
-/// An SVG file of so many points in rows, with so many in each polyline.
-fn svg(points: usize, stroke: usize) -> String {
+/// The elements of an SVG file that hold its points.
+#[derive(Debug, Clone, Copy)]
+enum Elements {
+    /// Polylines of so many points.
+    Polylines(usize),
+    /// `line` elements.
+    Lines,
+    /// `path` elements of one straight line.
+    Paths,
+}
+
+impl Elements {
+    /// The number of points of each.
+    fn points(self) -> usize {
+        match self {
+            Self::Polylines(points) => points,
+            Self::Lines | Self::Paths => 2,
+        }
+    }
+
+    /// The element that draws these points.
+    fn write(self, points: &[[f64; 2]], text: &mut String) {
+        // Writing to a string cannot fail.
+        let _ = match (self, points) {
+            (Self::Lines, [[x1, y1], [x2, y2]]) => writeln!(
+                text,
+                "<line stroke=\"black\" x1=\"{x1:.1}\" y1=\"{y1:.1}\" x2=\"{x2:.1}\" \
+                 y2=\"{y2:.1}\"/>"
+            ),
+            (Self::Paths, [[x1, y1], [x2, y2]]) => writeln!(
+                text,
+                "<path fill=\"none\" stroke=\"black\" d=\"M{x1:.1},{y1:.1}L{x2:.1},{y2:.1}\"/>"
+            ),
+            _ => {
+                let points = points.iter().map(|[x, y]| format!("{x:.1},{y:.1} "));
+                let points: String = points.collect();
+                writeln!(text, "<polyline fill=\"none\" stroke=\"black\" points=\"{points}\"/>")
+            }
+        };
+    }
+}
+
+/// An SVG file of so many points in rows, in these elements.
+fn svg(points: usize, elements: Elements) -> String {
     let mut text = String::from(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"400mm\" height=\"400mm\" \
          viewBox=\"0 0 400 400\">\n",
     );
-    for first in (0..points).step_by(stroke) {
-        text += "<polyline fill=\"none\" stroke=\"black\" points=\"";
-        for number in first..points.min(first + stroke) {
-            let (row, column) = (number / ROW, number % ROW);
-            let x = 20.0 + 0.2 * column as f64;
-            let y = 20.0 + 0.3 * row as f64 + 0.1 * (column % 2) as f64;
-            let _ = write!(text, "{x:.1},{y:.1} ");
-        }
-        text += "\"/>\n";
+    let place = |number: usize| {
+        let (row, column) = (number / ROW, number % ROW);
+        let x = 20.0 + 0.2 * column as f64;
+        [x, 20.0 + 0.3 * row as f64 + 0.1 * (column % 2) as f64]
+    };
+    for first in (0..points).step_by(elements.points()) {
+        let of_element = first..points.min(first + elements.points());
+        let places: Vec<[f64; 2]> = of_element.map(place).collect();
+        elements.write(&places, &mut text);
     }
     text + "</svg>\n"
 }
@@ -56,10 +100,10 @@ fn peak(process: &str) -> Option<usize> {
 }
 
 /// Lets the program draw so many points. Returns its greatest resident memory in bytes.
-fn memory_for(points: usize, stroke: usize) -> usize {
+fn memory_for(points: usize, elements: Elements) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
     let [file, said] = ["points.svg", "said.txt"].map(|name| folder.path().join(name));
-    fs::write(&file, svg(points, stroke)).expect("written");
+    fs::write(&file, svg(points, elements)).expect("written");
     let (mut wire, terminal) = TTYPort::pair().expect("a pseudo-terminal");
     wire.set_timeout(Duration::from_millis(1)).expect("set");
     let device = terminal.name().expect("a name");
@@ -91,22 +135,39 @@ fn memory_for(points: usize, stroke: usize) -> usize {
     };
     let said = fs::read_to_string(said).expect("what it said");
     assert!(status.success(), "{status}: {said}");
-    let (strokes, sent) = (points.div_ceil(stroke), format!("with {points} points are sent"));
+    let (strokes, sent) =
+        (points.div_ceil(elements.points()), format!("with {points} points are sent"));
     assert!(said.contains(&format!("{strokes} strokes {sent}")), "{said}");
     assert!(most > 0);
     most
 }
 
+/// A number that the environment says, or else the usual one.
+fn number(name: &str, usual: usize) -> usize {
+    std::env::var(name).map_or(usual, |text| text.parse().expect("a number of points"))
+}
+
+/// Checks that the program takes no more than so many bytes for each point.
+fn check(elements: Elements, limit: usize) {
+    let points = number("PENUP_POINTS", POINTS);
+    // So much is taken by the program itself.
+    let least = memory_for(10, elements);
+    let most = memory_for(points, elements);
+    let each = most.saturating_sub(least) as f64 / points as f64;
+    println!(
+        "{points} points as {elements:?}: {most} bytes at most, {each:.0} for each beside {least} \
+         for 10"
+    );
+    assert!(most <= least + limit * points + TOLERANCE, "{each:.0} bytes a point");
+}
+
 #[test]
 fn a_drawing_larger_than_the_board_takes_little_memory_for_each_point() {
-    let number = |name, usual| {
-        std::env::var(name).map_or(usual, |text| text.parse().expect("a number of points"))
-    };
-    let (points, stroke) = (number("PENUP_POINTS", POINTS), number("PENUP_STROKE", STROKE));
-    // So much is taken by the program itself.
-    let least = memory_for(10, stroke);
-    let most = memory_for(points, stroke);
-    let each = most.saturating_sub(least) as f64 / points as f64;
-    println!("{points} points: {most} bytes at most, {each:.0} for each beside {least} for 10");
-    assert!(most <= least + BYTES_A_POINT * points + TOLERANCE, "{each:.0} bytes a point");
+    check(Elements::Polylines(number("PENUP_STROKE", STROKE)), BYTES_A_POINT);
+}
+
+#[test]
+fn short_lines_take_little_memory_for_each_point_too() {
+    check(Elements::Lines, BYTES_A_SHORT_POINT);
+    check(Elements::Paths, BYTES_A_SHORT_POINT);
 }

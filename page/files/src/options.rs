@@ -3,6 +3,9 @@
 use penup_readers::page::Page;
 use penup_readers::{Arrangement, PLAN_OPTIONS, Turn};
 
+/// The height of the title's capitals in mm where the user says nothing.
+const DEFAULT_TITLE_SIZE: f64 = 5.0;
+
 /// What `options`, pairs of name and value, say about a plan.
 ///
 /// # Errors
@@ -23,6 +26,11 @@ pub fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> 
     };
     let margin = given("margin").and_then(|margin| margin.parse().ok());
     let mut arrangement = Arrangement::on(page, turn, margin);
+    if given("fit").is_some() {
+        let size = given("title-size").and_then(|size| size.parse().ok());
+        let title = given("title").unwrap_or_default();
+        arrangement = arrangement.fitted(title, size.unwrap_or(DEFAULT_TITLE_SIZE));
+    }
     for option in PLAN_OPTIONS {
         if let Some(value) = given(option.name) {
             let refused = |reason| format!("--{}: {reason}", option.name);

@@ -6,6 +6,9 @@
 //! are joined and simplified; and last the layers are given their pens. Where a closed stroke
 //! begins is nothing to choose here: that belongs to the order of the strokes.
 //!
+//! The plotter scales a plan to the page. If an option is a length on the paper, the plan is scaled
+//! here before that option acts, and the plotter has nothing left to scale.
+//!
 //! A file that is no plan is refused if any of the options is given, and so is a value that leaves
 //! nothing to draw.
 
@@ -24,6 +27,8 @@ use crate::files::Files;
 use crate::fonts::Fonts;
 use crate::page::{A4, Page};
 use crate::plan::{Plan, Point};
+use penup::drawing::Title;
+use penup::fixed::Millimetres;
 
 /// Whether the page is turned.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -68,6 +73,8 @@ pub struct Arrangement {
     turn: Turn,
     /// What stays free on each side of the page, in mm, if the user says so.
     margin: Option<f64>,
+    /// If the plan is scaled to the page, the height of the title below it, in mm.
+    fit: Option<f64>,
     pub(crate) layers: Vec<String>,
     pub(crate) scale: Option<[f64; 2]>,
     pub(crate) rotate: Option<f64>,
@@ -97,6 +104,24 @@ impl Arrangement {
     #[must_use]
     pub fn with_files(self, files: Files) -> Self {
         Self { files, ..self }
+    }
+
+    /// Returns the arrangement of a plan that is scaled to the page, above this title of this size
+    /// in mm.
+    #[must_use]
+    pub fn fitted(self, title: &str, title_size: f64) -> Self {
+        let height = Millimetres::saturating_from_num(title_size);
+        let title = Title { text: title, height };
+        let foot = title.rise().saturating_add(title.depth()).to_num();
+        let has_title = !title.text.trim().is_empty();
+        Self { fit: Some(if has_title { foot } else { 0.0 }), ..self }
+    }
+
+    /// Whether a plan is scaled to the page here, because an option is a length on the paper.
+    pub fn scales_to_page(&self) -> bool {
+        let has_lengths =
+            self.hatch.is_some() || self.linemerge.is_some() || self.simplify.is_some();
+        self.fit.is_some() && has_lengths
     }
 
     /// Whether the user says what stays free on each side of the page.
@@ -157,20 +182,31 @@ impl Arrangement {
             let (sine, cosine) = sine_cosine(-degrees);
             about_middle(plan, |[x, y]| [x * cosine - y * sine, x * sine + y * cosine]);
         }
+        let sheet = self.sheet(own, plan.bounds());
+        let is_own = self.page.is_none() && own.is_some() && self.fit.is_none();
+        let margin = self.margin.unwrap_or(if is_own { 0.0 } else { 10.0 });
+        let mut rectangle = self.crop.map(|crop| crop.rectangle(sheet, margin)).transpose()?;
+        if self.scales_to_page() {
+            // What is cut off does not count.
+            let mut rest = Plan::new(String::new());
+            rest.strokes.clone_from(&plan.strokes);
+            rectangle.into_iter().for_each(|rectangle| crop::crop(&mut rest, rectangle));
+            if let Some(map) = self.map_to(sheet, margin, rest.bounds()) {
+                transform(plan, &map);
+                rectangle = rectangle.map(|corners| corners.map(&map));
+            }
+        }
         if let Some(hatch) = self.hatch {
             hatch::hatch(plan, hatch)?;
         }
-        let sheet = self.sheet(own, plan.bounds());
         if let (true, Some([low, high])) = (self.center, plan.bounds()) {
             let middle = [sheet.width / 2.0, sheet.height / 2.0];
             let by: [f64; 2] =
                 [0, 1].map(|axis| middle[axis] - f64::midpoint(low[axis], high[axis]));
             transform(plan, |[x, y]| [x + by[0], y + by[1]]);
         }
-        if let Some(crop) = self.crop {
-            let is_own = self.page.is_none() && own.is_some();
-            let margin = self.margin.unwrap_or(if is_own { 0.0 } else { 10.0 });
-            crop::crop(plan, crop.rectangle(sheet, margin)?);
+        if let Some(rectangle) = rectangle {
+            crop::crop(plan, rectangle);
         }
         if let Some(tolerance) = self.linemerge {
             linemerge::merge(plan, tolerance);
@@ -187,6 +223,31 @@ impl Arrangement {
             return Err(format!("there is nothing left to draw after {}", options.join(", ")));
         }
         Ok(sheet)
+    }
+
+    /// The map that scales a plan with these bounds to the sheet, as the plotter does: as large as
+    /// the margins and the title leave room, and in the middle of that. `None` if the plotter will
+    /// say that there is nothing to scale, or no room.
+    fn map_to(
+        &self,
+        sheet: Page,
+        margin: f64,
+        bounds: Option<[Point; 2]>,
+    ) -> Option<impl Fn(Point) -> Point + use<>> {
+        let (foot, [low, high]) = (self.fit.unwrap_or(0.0), bounds?);
+        let side = [sheet.width, sheet.height - foot];
+        let factors = [0, 1].map(|axis: usize| {
+            let free = side[axis] - 2.0 * margin;
+            free / (high[axis] - low[axis])
+        });
+        let factor = factors[0].min(factors[1]);
+        let is_scale = factor.is_finite() && factor > 0.0;
+        let middle = [side[0] / 2.0, foot + side[1] / 2.0];
+        is_scale.then_some(move |point: Point| {
+            [0, 1].map(|axis: usize| {
+                middle[axis] + factor * (point[axis] - f64::midpoint(low[axis], high[axis]))
+            })
+        })
     }
 }
 

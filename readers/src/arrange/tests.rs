@@ -410,3 +410,60 @@ fn values_that_make_no_sense_are_refused_and_change_nothing() {
     let error = arranged("a.obj", &line, &[("hatch", "1")]).expect_err("nothing closed");
     assert_eq!(error, "a.obj: there is no closed, filled shape to hatch");
 }
+
+/// Reads a plan that is scaled to a page of 110 x 210 mm with margins of 5 mm, under these options.
+fn fitted(text: &str, options: &[(&str, &str)]) -> SourceFile {
+    let page = Page { width: 110.0, height: 210.0 };
+    let mut arrangement = Arrangement::on(Some(page), Turn::AsItIs, Some(5.0)).fitted(" ", 5.0);
+    for (option, value) in options {
+        arrangement.set(option, value).expect("an option");
+    }
+    SourceFile::arranged("a.obj".to_owned(), text.as_bytes().to_vec(), &arrangement).expect("read")
+}
+
+/// The y of the level lines of a plan, in order.
+fn levels(file: &SourceFile) -> Vec<f64> {
+    let strokes = strokes(file);
+    let level = strokes.iter().filter(|(_, points)| points.len() == 2);
+    let mut levels: Vec<f64> = level.map(|(_, points)| points[0][1]).collect();
+    levels.sort_by(f64::total_cmp);
+    levels
+}
+
+#[test]
+fn a_length_on_the_paper_is_not_scaled_to_the_page() {
+    let square = "v 0 0 0\nv 10 0 0\nv 10 10 0\nv 0 10 0\nl 1 2 3 4 1\n";
+    let file = fitted(square, &[("hatch", "2,0")]);
+    assert_eq!(file.bounds(), Some([[5.0, 55.0], [105.0, 155.0]]));
+    let hatch = levels(&file);
+    assert!((48..=50).contains(&hatch.len()), "{hatch:?}");
+    assert!(hatch.windows(2).all(|pair| (pair[1] - pair[0] - 2.0).abs() < 0.002), "{hatch:?}");
+    // What is left of the crop, a tenth of the square, fills the page, and its rectangle is in mm
+    // of the drawing.
+    let file = fitted(square, &[("hatch", "2,0"), ("crop", "0,0,1,10")]);
+    let hatch = levels(&file);
+    assert!((99..=101).contains(&hatch.len()), "{hatch:?}");
+    assert!(hatch.windows(2).all(|pair| (pair[1] - pair[0] - 2.0).abs() < 0.002), "{hatch:?}");
+    let [low, high] = file.bounds().expect("a plan");
+    assert!((high[0] - low[0] - 20.0).abs() < 0.01 && (high[1] - low[1] - 200.0).abs() < 0.01);
+    // A gap of 0.1 mm in the file is one of 1 mm on the paper.
+    let lines = "v 0 0 0\nv 5 0 0\nv 5.1 0 0\nv 10 0 0\nl 1 2\nl 3 4\n";
+    let count = |gap| strokes(&fitted(lines, &[("linemerge", gap)])).len();
+    assert_eq!((count("0.9"), count("1.1")), (2, 1));
+    // So is a bend.
+    let bend = "v 0 0 0\nv 5 0.1 0\nv 10 0 0\nl 1 2 3\n";
+    let points = |within| strokes(&fitted(bend, &[("simplify", within)]))[0].1.len();
+    assert_eq!((points("0.9"), points("1.1")), (3, 2));
+}
+
+#[test]
+fn a_plan_is_scaled_into_what_the_title_leaves() {
+    let square = "v 0 0 0\nv 10 0 0\nv 10 20 0\nv 0 20 0\nl 1 2 3 4 1\n";
+    let page = Page { width: 110.0, height: 210.0 };
+    let mut arrangement = Arrangement::on(Some(page), Turn::AsItIs, Some(5.0)).fitted("Ada", 6.0);
+    arrangement.set("hatch", "50").expect("an option");
+    let file = SourceFile::arranged("a.obj".into(), square.as_bytes().to_vec(), &arrangement);
+    let [low, high] = file.expect("read").bounds().expect("a plan");
+    // Capitals of 6 mm, as much above them, and a third of that below.
+    assert!((low[1] - 19.0).abs() < 0.01 && (high[1] - 205.0).abs() < 0.01, "{low:?} {high:?}");
+}

@@ -225,6 +225,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
     fn path(&mut self, path: &Path, context: &Context) -> Result<(), TooManyPoints> {
         let own = self.element(path.id(), context);
         self.seen.extend(own);
+        let count = self.markup.count(own);
         let stroke = path.stroke().filter(|stroke| stroke.opacity().get() > 0.0);
         let fill = path.fill().filter(|fill| fill.opacity().get() > 0.0);
         let paint = match (stroke, fill) {
@@ -233,17 +234,17 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             (None, fill) => fill.map(|fill| fill.paint()),
         };
         let Some(paint) = paint else {
-            self.invisible += 1;
+            self.invisible += count;
             let element = own.or(context.element).filter(|it| !self.markup.is_hidden(*it));
             let is_asked = |element| self.markup.asks_for_stroke(element);
             self.strokeless +=
-                usize::from(path.stroke().is_none() && element.is_some_and(is_asked));
+                count * usize::from(path.stroke().is_none() && element.is_some_and(is_asked));
             return Ok(());
         };
         let element = own.or(context.element);
         let place = context.element.or(own);
         if place.is_some_and(|place| self.markup.is_documentation(place)) {
-            self.documentation += 1;
+            self.documentation += count;
             return Ok(());
         }
         let dashes = stroke.and_then(|stroke| Some((stroke.dasharray()?, stroke.dashoffset())));
@@ -262,7 +263,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
                 let lengths = lengths.iter().map(|length| length * unit).collect();
                 let dash = StrokeDash::new(lengths, offset * unit);
                 let dashed = dash.and_then(|dash| path_data.dash(&dash, scale as f32));
-                self.undashed += usize::from(dashed.is_none());
+                self.undashed += count * usize::from(dashed.is_none());
                 dashed
             }
         };
@@ -292,11 +293,11 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             true => whole.clone(),
             false => self.clipped(&whole, path, stroke.is_none(), areas)?,
         };
-        let (mut parts, mut is_cut) = (Vec::new(), false);
+        let (mut parts, mut cut) = (Vec::new(), 0);
         for polyline in &polylines {
             let mut own = Vec::new();
             if self.page.cut(polyline, TOLERANCE, &mut own) {
-                is_cut = true;
+                cut += 1;
                 own.retain(|part| length(&part.positions()) > 2.0 * TOLERANCE);
             }
             parts.extend(own);
@@ -305,7 +306,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             self.backgrounds += 1;
             parts.clear();
         } else {
-            self.cut += usize::from(is_cut);
+            // Each line of a run was an element.
+            self.cut += count.min(cut);
         }
         self.patterns += usize::from(
             [stroke.map(|it| it.paint()), fill.map(|it| it.paint())]

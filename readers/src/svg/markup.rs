@@ -6,7 +6,7 @@
 use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
-use super::unread;
+use super::{runs, unread};
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use usvg::roxmltree::{Document, Error, Node, NodeId, ParsingOptions};
@@ -163,15 +163,14 @@ impl<'a, 'input> Markup<'a, 'input> {
         let text = self.document.input_text().get(start..).unwrap_or_default();
         let end = text.find(['>', '\n']).map_or(text.len(), |end| end + 1);
         let shown: String = text.get(..end).unwrap_or_default().chars().take(200).collect();
-        // The ids that this program adds are not the user's.
-        let shown = match (shown.find(" id=\"penup-"), shown.split(" id=\"penup-").nth(1)) {
-            (Some(from), Some(rest)) => {
-                let rest = rest.split_once('"').map_or("", |(_, rest)| rest);
-                format!("{}{rest}", shown.get(..from).unwrap_or_default())
-            }
-            _ => shown,
-        };
+        // The attributes that this program adds are not the user's.
+        let shown = without(&without(&shown, " id=\"penup-"), " data-penup-");
         (self.line_ends.partition_point(|end| *end < start) + 1, shown.trim().to_owned())
+    }
+
+    /// How many elements of the file this one stands for; 1 if it is not known.
+    pub(super) fn count(&self, element: Option<NodeId>) -> usize {
+        element.and_then(|element| self.node(element)).map_or(1, runs::count)
     }
 
     /// Which Béziers of this element's path are arcs.
@@ -301,6 +300,13 @@ impl<'a, 'input> Markup<'a, 'input> {
     }
 }
 
+/// The text of a tag without the attribute that begins so.
+fn without(tag: &str, attribute: &str) -> String {
+    let Some((before, rest)) = tag.split_once(attribute) else { return tag.to_owned() };
+    let behind = rest.split('"').skip(2 - attribute.matches('"').count()).collect::<Vec<_>>();
+    format!("{before}{}", behind.join("\""))
+}
+
 /// The value of a property that the element itself has.
 fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
     let style = unread::declarations(node.attribute("style").unwrap_or_default());
@@ -321,7 +327,7 @@ impl Count {
             // Only once for each kind, because the position is counted from the beginning.
             self.line = document.text_pos_at(node.range().start).row;
         }
-        self.number += 1;
+        self.number += runs::count(node);
     }
 
     pub(super) fn say(&self, said: &mut Vec<String>, [one, many]: [&str; 2], what: &str) {

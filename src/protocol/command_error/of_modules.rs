@@ -21,7 +21,7 @@ const NOT_A_CURVE: ErrorEntry = error(116, "not a curve");
 const CURVE_OUT_OF_ORDER: ErrorEntry = error(117, "curve out of order");
 /// The entry of the errors about a model that has nothing to draw.
 const NOTHING_TO_PLOT: ErrorEntry = error(120, "nothing to plot")
-    .client("there is nothing to draw: the file has no faces, lines or curves");
+    .client("there is nothing to draw: no faces, lines or curves as long as a motor step");
 /// The entry of the errors about working memory that is too small.
 const DRAWING_TOO_LARGE: ErrorEntry = error(140, "drawing too large for the memory");
 /// The entry of the errors about a value that a setting of the machine does not allow.

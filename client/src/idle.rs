@@ -1,0 +1,161 @@
+//! Options that change nothing in a drawing, of which the user is told.
+//!
+//! Each row of [`RULES`] says when some options change nothing, and why. Whether an option changes
+//! something in this very model is not asked, only whether it could. Options that contradict each
+//! other, or that need another one, are refused by the command line.
+
+use penup::plotter::{OPTIONS, PlotOption, PlotOptions, VisibilityMode};
+use penup_job::Settings;
+
+/// What decides whether an option can change anything.
+struct Choices<'s> {
+    options: PlotOptions,
+    settings: &'s Settings,
+    is_plan: bool,
+}
+
+impl Choices<'_> {
+    /// Whether the drawing is a plan that is laid on the page as it is.
+    fn is_flat(&self) -> bool {
+        self.is_plan && self.options.shows_plans_flat()
+    }
+}
+
+/// When some options change nothing.
+struct Rule {
+    applies: fn(&Choices<'_>) -> bool,
+    /// Whether the option with this name is one of them.
+    names: fn(&str) -> bool,
+    /// The reason, as the beginning of a sentence.
+    because: &'static str,
+}
+
+/// The rules. An option is told by the first one that names it.
+const RULES: [Rule; 6] = [
+    Rule {
+        applies: |choices| choices.is_flat(),
+        names: is_of_camera,
+        because: "the drawing lies flat and is drawn as it lies, as no model in space does",
+    },
+    Rule {
+        applies: |choices| !choices.is_flat(),
+        names: |name| name == "fit",
+        because: "a model in space is always scaled to the page",
+    },
+    Rule {
+        applies: |choices| choices.options.see == VisibilityMode::Wire,
+        names: |name| matches!(name, "hidden" | "seams" | "blocks"),
+        because: "in a wire frame nothing hides anything",
+    },
+    Rule {
+        applies: |choices| {
+            matches!(choices.options.see, VisibilityMode::Vertices | VisibilityMode::Edges)
+        },
+        names: |name| matches!(name, "seams" | "blocks" | "crease"),
+        because: "one convex solid has neither seams nor blocks, and all its edges are drawn",
+    },
+    Rule {
+        applies: |choices| choices.settings.value("angles").is_some(),
+        names: |name| matches!(name, "at" | "up"),
+        because: "--angles alone says where the camera looks",
+    },
+    Rule {
+        applies: |choices| choices.options.title().is_none(),
+        names: |name| name == "title-size",
+        because: "there is no --title",
+    },
+];
+
+fn is_of_camera(name: &str) -> bool {
+    let of = |option: &&PlotOption| option.name == name;
+    let flag = OPTIONS.iter().find(of).and_then(|option| option.flag.get());
+    flag.is_some_and(|flag| flag.heading == "Camera")
+}
+
+/// The options of the plotter with these settings, and the names of those that are not as usual.
+pub fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
+    let mut options = PlotOptions::default();
+    let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
+    for (name, value) in &settings.values {
+        // If the plotter refuses an option, the user is told when the job is sent.
+        let _ = options.set(name, value);
+    }
+    let name = |line: String| Some(line.strip_prefix('$')?.split('=').next()?.to_owned());
+    let names = options
+        .lines()
+        .map(|line| line.to_string())
+        .zip(usual)
+        .filter(|(now, usual)| now != usual)
+        .filter_map(|(now, _)| name(now))
+        .collect();
+    (options, names)
+}
+
+/// Names the options among the `settings` that change nothing, each with the reason, in sentences.
+/// The file `is_plan` if it lies flat.
+pub fn idle_options(settings: &Settings, is_plan: bool) -> Vec<String> {
+    let (options, mut names) = changed(settings);
+    let choices = Choices { options, settings, is_plan };
+    let mut sentences = Vec::new();
+    for rule in RULES.iter().filter(|rule| (rule.applies)(&choices)) {
+        let idle = names.extract_if(.., |name| (rule.names)(name));
+        let idle: Vec<String> = idle.map(|name| format!("--{name}")).collect();
+        if !idle.is_empty() {
+            sentences.push(format!(
+                "{}, so nothing is changed by {}",
+                rule.because,
+                idle.join(", ")
+            ));
+        }
+    }
+    sentences
+}
+
+#[cfg(test)]
+mod tests {
+    use super::idle_options;
+    use penup_job::Settings;
+    use penup_readers::page::A4;
+
+    #[test]
+    fn each_option_that_changes_nothing_is_told_once_with_the_reason() {
+        let told = |values: &[(&'static str, &str)], is_plan| {
+            let values = values.iter().map(|(name, value)| (*name, (*value).to_owned())).collect();
+            idle_options(&Settings { page: A4, values }, is_plan)
+        };
+        let all = [
+            ("at", "1,2,3"),
+            ("hidden", "dotted"),
+            ("seams", "off"),
+            ("blocks", "merged"),
+            ("crease", "30"),
+            ("title-size", "8"),
+            ("fit", "on"),
+        ];
+        let with = |name, value| [&all[..], &[(name, value)]].concat();
+        let no_title = "there is no --title, so nothing is changed by --title-size";
+        let scaled =
+            "a model in space is always scaled to the page, so nothing is changed by --fit";
+        assert_eq!(told(&all, false), [scaled, no_title]);
+        assert_eq!(told(&with("title", "Ada"), false), [scaled]);
+        assert_eq!(
+            told(&all, true),
+            [
+                "the drawing lies flat and is drawn as it lies, as no model in space does, so \
+                 nothing is changed by --at, --hidden, --seams, --blocks, --crease",
+                no_title
+            ]
+        );
+        let wire = "in a wire frame nothing hides anything, so nothing is changed by --hidden, \
+                    --seams, --blocks";
+        assert_eq!(told(&with("see", "wire"), false), [scaled, wire, no_title]);
+        for see in ["vertices", "edges"] {
+            let convex = "one convex solid has neither seams nor blocks, and all its edges are \
+                          drawn, so nothing is changed by --seams, --blocks, --crease";
+            assert_eq!(told(&with("see", see), false), [scaled, convex, no_title]);
+        }
+        let angles = "--angles alone says where the camera looks, so nothing is changed by --at";
+        assert_eq!(told(&with("angles", "10,20,30"), true), [scaled, angles, no_title]);
+        assert!(told(&[], false).is_empty() && told(&[], true).is_empty());
+    }
+}
