@@ -220,7 +220,7 @@ impl Sender<'_> {
                 return Ok(reason.to_owned());
             }
         }
-        let number = PEN_DOWN.info().number;
+        let number = PEN_DOWN.info().number();
         let height_in = |reply: &Reply| match reply {
             Reply::Other(line) => {
                 let value = line.strip_prefix(&format!("${number}="))?;
