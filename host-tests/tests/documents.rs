@@ -112,8 +112,8 @@ fn the_settings_are_those_of_the_source() {
         .map(|info| {
             let [least, greatest, default] =
                 [info.least, info.greatest, info.default].map(|value| Length(value).to_string());
-            let number = info.number.to_string();
-            vec![number, info.name.into(), info.unit.into(), least, greatest, default]
+            let number = info.number().to_string();
+            vec![number, info.name.into(), info.unit().into(), least, greatest, default]
         })
         .collect();
     assert_table(&["number", "name", "unit", "least", "greatest", "default"], &rows);

@@ -28,7 +28,7 @@ impl Session {
             Self { bench: Bench::new(), settings: Settings::default(), directions: Vec::new() };
         for &(setting, value) in values {
             session.settings.set(setting, Value::from_num(value)).expect("valid");
-            session.order(&format!("${}={value}", setting.info().number));
+            session.order(&format!("${}={value}", setting.info().number()));
         }
         let picture = job_lines("notched.obj", &["$page=20x20", "$margin=4"]);
         for line in picture.iter().filter(|line| *line != "$plot") {

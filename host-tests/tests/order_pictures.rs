@@ -219,13 +219,13 @@ fn a_closed_hatching_goes_down_one_column_and_up_the_other() {
     assert_tour(
         closed(),
         r"
-        +<-8--+     +<-7--+
+        +<-6--+     +<-5--+
 
-        +--1->+     +--6->+
+        +--7->+     +--4->+
 
-        +<-2--+     +<-5--+
+        +<-8--+     +<-3--+
 
-        +--3->+     +--4->+
+        +--1->+     +--2->+
         ",
     );
 }
@@ -246,11 +246,11 @@ fn parts_are_drawn_nearest_first_and_then_better() {
     let improved = assert_tour(
         open(),
         r"
-        +--2->+           +<-7--+
+        +<-1--+           +<-7--+
 
               +--3->+     +     +<-6--+
                           4v
-        +<-1--+           +     +--5->+
+        +--2->+           +     +--5->+
         ",
     );
     assert!(improved.pen_up < nearest.pen_up);

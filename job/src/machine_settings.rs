@@ -51,7 +51,7 @@ impl AssignedSetting {
 
     /// The name of the setting, if this program knows it.
     pub fn name(&self) -> Option<&'static str> {
-        SETTINGS.iter().find(|info| info.number == self.number).map(|info| info.name)
+        SETTINGS.iter().find(|info| info.number() == self.number).map(|info| info.name)
     }
 }
 

@@ -6,7 +6,6 @@ use super::{PAGE_LIMIT, Page, PageError, PagePoint, StepsPerMillimetre};
 use crate::array::MapEach;
 use crate::fixed::{divide, divide_rounding, half, product, shift_left, shift_right};
 use crate::geometry::{Projection, Vertex};
-use crate::model::Position;
 use crate::visibility::EdgeParameter;
 
 /// A bounding box of the image: the least and the greatest x/w and y/w.
@@ -24,46 +23,42 @@ impl Bounds {
     /// The number of fraction bits of the bounds of an image: their unit is 2^-24.
     pub const FRACTION_BITS: u32 = 24;
 
-    /// Returns the box around the images of `vertices`, which must have w > 0, or `None` if there
-    /// are no vertices.
-    pub fn around(vertices: impl Iterator<Item = Vertex>, projection: Projection) -> Option<Self> {
-        vertices
-            .map(|vertex| {
-                let w = match projection {
-                    Projection::Perspective => i64::from(vertex.z.max(1)),
-                    Projection::Parallel => 1,
-                };
-                let image = [vertex.x, vertex.y].map(|c| (i64::from(c) << Self::FRACTION_BITS) / w);
-                Self { low: image, high: image }
-            })
-            .reduce(Self::union)
+    /// The bounds of nothing, which contain no point.
+    pub const NOTHING: Self = Self { low: [i64::MAX; 2], high: [i64::MIN; 2] };
+
+    /// Extends the bounds to the image of a vertex, which must have w > 0.
+    pub fn add(&mut self, vertex: Vertex, projection: Projection) {
+        let w = match projection {
+            Projection::Perspective => i64::from(vertex.z.max(1)),
+            Projection::Parallel => 1,
+        };
+        let image = [vertex.x, vertex.y].map_each(|c| (i64::from(c) << Self::FRACTION_BITS) / w);
+        self.add_point(image);
     }
 
-    /// Returns the box around plan positions in units of 2^-`fraction_bits` mm, or `None` if there
-    /// are none.
+    /// Extends the bounds to a position of a plan, in units of 2^-`fraction_bits` mm.
     ///
     /// These bounds are in the same unit, for [`PageMap::true_size`] and [`PageMap::fit_plan`].
-    pub fn around_plan(positions: impl Iterator<Item = Position>) -> Option<Self> {
-        positions
-            .map(|position| {
-                let point = [i64::from(position.x), i64::from(position.y)];
-                Self { low: point, high: point }
-            })
-            .reduce(Self::union)
+    pub fn add_position(&mut self, x: i32, y: i32) {
+        self.add_point([i64::from(x), i64::from(y)]);
+    }
+
+    /// Extends the bounds to a point in their own unit.
+    fn add_point(&mut self, point: [i64; 2]) {
+        for ((low, high), at) in self.low.iter_mut().zip(&mut self.high).zip(point) {
+            *low = at.min(*low);
+            *high = at.max(*high);
+        }
+    }
+
+    /// Returns the bounds, or `None` if they contain nothing.
+    pub fn known(self) -> Option<Self> {
+        (self.low[0] <= self.high[0]).then_some(self)
     }
 
     /// Returns the width and the height.
     fn size(&self) -> [i64; 2] {
         [0, 1].map_each(|axis: usize| self.high[axis] - self.low[axis])
-    }
-
-    /// Returns the smallest box that contains both boxes.
-    #[must_use]
-    pub fn union(self, other: Self) -> Self {
-        Self {
-            low: [0, 1].map(|axis: usize| self.low[axis].min(other.low[axis])),
-            high: [0, 1].map(|axis: usize| self.high[axis].max(other.high[axis])),
-        }
     }
 }
 
@@ -330,6 +325,7 @@ fn between(p: Vertex, q: Vertex, along: EdgeParameter, projection: Projection) -
 mod tests {
     use super::*;
     use crate::fixed::Millimetres;
+    use crate::model::Position;
 
     fn page(width: i32, height: i32, margin: i32) -> Page {
         let [width, height, margin] = [width, height, margin].map(Millimetres::from_num);
@@ -350,10 +346,22 @@ mod tests {
         Vertex { x, y, z }
     }
 
+    fn around<const N: usize>(vertices: [Vertex; N], projection: Projection) -> Bounds {
+        let mut bounds = Bounds::NOTHING;
+        vertices.iter().for_each(|vertex| bounds.add(*vertex, projection));
+        bounds.known().unwrap()
+    }
+
+    fn around_plan<const N: usize>(positions: [Position; N]) -> Bounds {
+        let mut bounds = Bounds::NOTHING;
+        positions.iter().for_each(|position| bounds.add_position(position.x, position.y));
+        bounds.known().unwrap()
+    }
+
     #[test]
     fn what_is_wide_fills_the_width_and_is_centred() {
         let corners = [vertex(-400_000, -100_000, 9), vertex(200_000, 100_000, 7)];
-        let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
+        let bounds = around(corners, Projection::Parallel);
         let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
         let [low, high] = corners.map(|v| map.point(v.x.into(), v.y.into(), 1));
         assert_eq!((low.x, high.x), (800, 16000));
@@ -364,7 +372,7 @@ mod tests {
     #[test]
     fn perspective_divides_by_the_depth() {
         let corners = [vertex(-100, -100, 100), vertex(300, 300, 300), vertex(50, 50, 100)];
-        let bounds = Bounds::around(corners.into_iter(), Projection::Perspective).unwrap();
+        let bounds = around(corners, Projection::Perspective);
         let map = PageMap::fit(&bounds, &page(100, 100, 0), steps(10, 20)).unwrap();
         assert_eq!(map.point(-100, -100, 100), PagePoint { x: 0, y: 0 });
         assert_eq!(map.point(300, 300, 300), PagePoint { x: 1000, y: 2000 });
@@ -402,12 +410,12 @@ mod tests {
             ([vertex(-5, 0, 7), vertex(5, 0, 7)], (800, 11880), (16000, 11880)),
             ([vertex(0, -5, 7), vertex(0, 5, 7)], (8400, 800), (8400, 22960)),
         ] {
-            let bounds = Bounds::around(corners.into_iter(), Projection::Parallel).unwrap();
+            let bounds = around(corners, Projection::Parallel);
             let map = PageMap::fit(&bounds, &a4(), steps(80, 80)).unwrap();
             let found = corners.map(|v| map.point(v.x.into(), v.y.into(), 1)).map(|p| (p.x, p.y));
             assert_eq!(found, [low, high]);
         }
-        assert_eq!(Bounds::around([].into_iter(), Projection::Parallel), None);
+        assert_eq!(Bounds::NOTHING.known(), None);
     }
 
     fn plan(points: [[i32; 2]; 2]) -> [Position; 2] {
@@ -416,7 +424,7 @@ mod tests {
 
     fn true_size(points: [[i32; 2]; 2], page: &Page) -> Result<[(i32, i32); 2], PageError> {
         let positions = plan(points);
-        let bounds = Bounds::around_plan(positions.into_iter()).unwrap();
+        let bounds = around_plan(positions);
         let map = PageMap::true_size(&bounds, 8, page, steps(100, 80))?;
         Ok(positions.map(|p| map.point(p.x.into(), p.y.into(), 1)).map(|p| (p.x, p.y)))
     }
@@ -438,7 +446,7 @@ mod tests {
             Err(PageError::DoesNotFit { width: 1910, height: 50, foot: Millimetres::ZERO })
         );
         let positions = plan([[0, 0], [380, 5]]);
-        let bounds = Bounds::around_plan(positions.into_iter()).unwrap();
+        let bounds = around_plan(positions);
         let map = PageMap::fit_plan(&bounds, 8, &a4(), steps(100, 80)).unwrap();
         let ends = positions.map(|p| map.point(p.x.into(), p.y.into(), 1));
         assert_eq!(ends.map(|p| p.x), [1000, 20000]);

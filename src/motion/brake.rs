@@ -123,6 +123,7 @@ pub struct BrakeRule {
 
 impl BrakeRule {
     /// Converts the length of a step from 2^-32 mm to units. The result is even.
+    #[cfg_attr(feature = "lm3s6965", inline(never))] // Its 64-bit product is long.
     pub fn step_length(self, length: u64) -> u32 {
         let units = length.saturating_mul(self.reciprocal) >> RECIPROCAL_BITS;
         (units as u32).clamp(LEAST_LENGTH, GREATEST_LENGTH) & !1

@@ -249,7 +249,10 @@ impl<I: Index> Inner<'_, I> {
                     self.program = program;
                     Reply(board).line(format_args!(">{line}:ok"));
                 }
-                Err(error) => Reply(board).line(format_args!(">{line}:error:{}", error.number())),
+                Err(error) => {
+                    let number = u32::from(error.number());
+                    Reply(board).line(format_args!(">{line}:error:{number}"));
+                }
             }
         }
         // These lines are not part of a program, so there is nothing to report at its end.

@@ -628,28 +628,48 @@ impl<I: Index> Inner<'_, I> {
         let one_pen = self.options.one_pen;
         let (model, mut undo_copy, _) = self.split();
         let save_copy = &mut |model: &Model<'_, I>| undo_copy.save(model);
-        match command {
-            Command::Nothing => {}
-            Command::Vertex(coordinates) => {
-                model.add_vertex(coordinates, save_copy).map_err(CommandError::Model)?
-            }
-            Command::Face(numbers) => {
-                model.add_face(numbers.iter(), save_copy).map_err(CommandError::Model)?
-            }
-            Command::Polyline(numbers) => {
-                model.add_polyline(numbers.iter(), save_copy).map_err(CommandError::Model)?
-            }
-            Command::Degree(degree) => model.set_degree(degree).map_err(CommandError::Model)?,
-            Command::Curve { ends, control } => {
-                model.begin_curve(ends, control.iter()).map_err(CommandError::Model)?
-            }
-            Command::Knots(knots) => model.add_knots(knots.iter()).map_err(CommandError::Model)?,
+        let added = match command {
+            Command::Nothing => Ok(()),
+            Command::Vertex(coordinates) => model.add_vertex(coordinates, save_copy),
+            Command::Face(numbers) => model.add_face(numbers.iter(), save_copy),
+            Command::Polyline(numbers) => model.add_polyline(numbers.iter(), save_copy),
+            Command::Degree(degree) => model.set_degree(degree),
+            Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
+            Command::Knots(knots) => model.add_knots(knots.iter()),
             // With a single pen, choices of a pen are ignored: no file can then use too many pens.
-            Command::Pen { .. } if one_pen => {}
-            Command::Pen { by_material, name } => {
-                model.choose_pen(by_material, name, save_copy).map_err(CommandError::Model)?
+            Command::Pen { .. } if one_pen => Ok(()),
+            Command::Pen { by_material, name } => model.choose_pen(by_material, name, save_copy),
+            Command::EndCurve => model.end_curve(save_copy),
+            Command::Clear => {
+                save_copy(model);
+                model.clear();
+                Ok(())
             }
-            Command::EndCurve => model.end_curve(save_copy).map_err(CommandError::Model)?,
+            command => return self.carry_out_other(command, board),
+        };
+        added.map_err(CommandError::Model)?;
+        Ok(Next::Nothing)
+    }
+
+    /// Carries out a command that is no line of a model. Returns what is left to the caller to do.
+    #[inline(never)] // Inlined, its frame would take stack while a model is sent.
+    fn carry_out_other<B: Board>(
+        &mut self,
+        command: Command<'_>,
+        board: &mut B,
+    ) -> Result<Next, CommandError> {
+        match command {
+            // The caller has carried these out.
+            Command::Nothing
+            | Command::Vertex(_)
+            | Command::Face(_)
+            | Command::Polyline(_)
+            | Command::Degree(_)
+            | Command::Curve { .. }
+            | Command::Knots(_)
+            | Command::Pen { .. }
+            | Command::EndCurve
+            | Command::Clear => {}
             Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
             Command::BuildInfo => {
                 self.check_idle()?;
@@ -697,10 +717,6 @@ impl<I: Index> Inner<'_, I> {
             }
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
             Command::Model => self.report_model(board),
-            Command::Clear => {
-                save_copy(model);
-                model.clear();
-            }
             Command::Edit(edit) => self.edit(edit, board)?,
             Command::List(part, numbers) => self.begin_list(part, numbers)?,
             Command::Undo => self.undo()?,

@@ -2,7 +2,7 @@
 //!
 //! A plan needs no projection. It is laid on the page as it is, at true size or scaled to fit.
 
-use super::job::{Collector, FOR_BOUNDS, Found, HALF_A_STEP, Pipeline, union};
+use super::job::{Collector, FOR_BOUNDS, Found, HALF_A_STEP, Pipeline};
 use crate::array::MapEach;
 use crate::curve::{FRACTION_BITS, Point};
 use crate::drawing::{Bounds, LineType, PackedLine, PageMap};
@@ -28,17 +28,23 @@ pub(super) fn lay_out<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found,
         |map: PageMap| move |[x, y, _]: [i64; 3]| Some(map.fine(x, y, 1 << FRACTION_BITS));
     let corners = model.elements().corners().iter();
     let used = corners.filter_map(|c| vertices.get(c.vertex().get())).copied();
-    let mut bounds = Bounds::around_plan(used);
+    let mut bounds = Bounds::NOTHING;
+    for Position { x, y, .. } in used {
+        bounds.add_position(x, y);
+    }
     if !curves.is_empty() {
-        let all =
-            Bounds::around_plan(vertices.iter().copied()).ok_or(CommandError::NothingToPlot)?;
+        let mut all = Bounds::NOTHING;
+        for Position { x, y, .. } in vertices {
+            all.add_position(*x, *y);
+        }
+        let all = all.known().ok_or(CommandError::NothingToPlot)?;
         let rough = PageMap::fit_plan(&all, bits, page, steps).map_err(CommandError::Page)?;
-        curves.flatten(points, &on_page(rough), FOR_BOUNDS, *cancel, &mut |[x, y, z], _| {
-            bounds = union(bounds, Bounds::around_plan([Position { x, y, z }].into_iter()));
+        curves.flatten(points, &on_page(rough), FOR_BOUNDS, *cancel, &mut |[x, y, _], _| {
+            bounds.add_position(x, y);
             Ok(())
         })?;
     }
-    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+    let bounds = bounds.known().ok_or(CommandError::NothingToPlot)?;
     let map = if options.fit {
         PageMap::fit_plan(&bounds, bits, page, steps)
     } else {

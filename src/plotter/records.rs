@@ -72,7 +72,7 @@ pub(super) fn save_settings<B: Board>(
     let mut bytes = [0; SETTINGS.len() * SETTING_BYTES];
     let (entries, _) = bytes.as_chunks_mut::<SETTING_BYTES>();
     for (entry, (info, value)) in entries.iter_mut().zip(settings.iter()) {
-        let ([a, b], [c, d, e, f]) = (info.number.to_le_bytes(), value.to_bits().to_le_bytes());
+        let ([a, b], [c, d, e, f]) = (info.number().to_le_bytes(), value.to_bits().to_le_bytes());
         *entry = [a, b, c, d, e, f];
     }
     board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)

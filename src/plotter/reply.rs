@@ -1,4 +1,7 @@
 //! The replies to the user, written to the board as lines.
+//!
+//! Numbers of 16 bits are formatted as `u32`, because each type whose formatting a board stores takes
+//! some 160 bytes of its flash.
 
 use super::Board;
 use super::grbl::coordinate;
@@ -60,8 +63,10 @@ impl<B: Board + ?Sized> Reply<'_, B> {
         let number = Number(number);
         match outcome {
             Ok(()) => self.checked_line(format_args!("ok{number}"), with_crc),
-            Err(command_error) => self
-                .checked_line(format_args!("error:{}{number}", command_error.number()), with_crc),
+            Err(command_error) => self.checked_line(
+                format_args!("error:{}{number}", u32::from(command_error.number())),
+                with_crc,
+            ),
         }
     }
 

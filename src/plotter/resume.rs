@@ -116,7 +116,7 @@ mod with_feature {
         let [first, second, third] = more;
         let head = [layout, version(), strokes, first, second, third];
         let settings = PLACING.into_iter().flat_map(|setting| {
-            [setting.info().number.into(), settings.get(setting).to_bits().cast_unsigned()]
+            [setting.info().number().into(), settings.get(setting).to_bits().cast_unsigned()]
         });
         let mut notes: Notes = [[0; 4]; WORDS];
         for (slot, word) in notes.iter_mut().zip(head.into_iter().chain(settings)) {

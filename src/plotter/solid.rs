@@ -1,7 +1,7 @@
 //! Draws a convex solid that is given without faces: by its vertices alone, or by its vertices and
 //! edges. The visible edges become lines on the page.
 
-use super::job::{Collector, Found, PageSink, Pipeline, move_to_front, union};
+use super::job::{Collector, Found, PageSink, Pipeline, move_to_front};
 use super::{HiddenLines, VisibilityMode};
 use crate::array::MapEach;
 use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
@@ -62,12 +62,14 @@ pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found,
         let visible = edges.iter().take(shown).map(|ends| (ends, true));
         visible.chain(edges.iter().rev().take(hidden).map(|ends| (ends, false)))
     };
-    let mut bounds: Option<Bounds> = None;
+    let mut bounds = Bounds::NOTHING;
     for ends in all().filter_map(|(ends, _)| on_view(ends)) {
         cancel.check()?;
-        bounds = union(bounds, Bounds::around(ends.into_iter(), view.projection()));
+        for end in ends {
+            bounds.add(end, view.projection());
+        }
     }
-    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+    let bounds = bounds.known().ok_or(CommandError::NothingToPlot)?;
     let map = PageMap::fit(&bounds, &options.sheet(), *steps).map_err(CommandError::Page)?;
     let collector = Collector::new(line_words);
     let mut sink =

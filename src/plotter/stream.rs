@@ -259,7 +259,8 @@ impl<I: Index> Inner<'_, I> {
             }
             Listing::Settings => {
                 for (info, value) in self.machine.settings().iter() {
-                    let (number, name, unit) = (info.number, info.name, info.unit);
+                    let (name, unit) = (info.name, info.unit());
+                    let number = u32::from(info.number());
                     let units = value.to_bits().into();
                     let decimals = if info.whole { 0 } else { 3 };
                     let value = BinaryFraction { units, fraction_bits: 16, decimals };

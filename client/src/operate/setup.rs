@@ -74,7 +74,7 @@ impl Machine {
 
 /// The value of a setting that was read.
 fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
-    let number = setting.info().number;
+    let number = setting.info().number();
     let own = settings.iter().find(|it| it.number == number);
     own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
 }
@@ -311,7 +311,7 @@ impl Setup<'_> {
 
     /// Changes a setting, and remembers that.
     fn set(&mut self, sender: &mut Sender<'_>, setting: Setting, value: f64) -> Result<(), End> {
-        let number = setting.info().number;
+        let number = setting.info().number();
         let setting = AssignedSetting { number, value: value.to_string() };
         if change(sender, std::slice::from_ref(&setting))? > 0 {
             self.changed.retain(|it| it.number != number);

@@ -249,10 +249,10 @@ impl Sender<'_> {
                 return Ok(reason.to_owned());
             }
         }
-        let number = PEN_DOWN.info().number;
+        let number = PEN_DOWN.info().number();
         let value_of = |setting: Setting, reply: &Reply| match reply {
             Reply::Other(line) => {
-                let value = line.strip_prefix(&format!("${}=", setting.info().number))?;
+                let value = line.strip_prefix(&format!("${}=", setting.info().number()))?;
                 value.split(' ').next()?.parse::<f64>().ok()
             }
             _ => None,

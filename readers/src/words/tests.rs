@@ -12,7 +12,7 @@ fn no_refusal_of_the_library_shows_a_word_of_the_line() {
             let words = text.split('$').skip(1).map(|part| split_after(part, |c| c == '-').0);
             for word in words {
                 // Any number is written as a setting, so those of the messages must be settings.
-                let is_known = SETTINGS.iter().any(|info| word.parse() == Ok(info.number));
+                let is_known = SETTINGS.iter().any(|info| word.parse() == Ok(info.number()));
                 let is_number = word.parse::<u16>().is_ok();
                 assert!(is_known || !is_number && form(word).is_some(), "${word}: {text}");
             }

@@ -224,7 +224,7 @@ mod tests {
     #[test]
     fn every_setting_is_found_and_the_defaults_are_valid() {
         for info in SETTINGS {
-            assert_eq!(Setting::numbered(info.number), Some(info.setting));
+            assert_eq!(Setting::numbered(info.number()), Some(info.setting));
             assert_eq!(Settings::default().get(info.setting), info.default);
         }
         assert!(Settings::default().check().is_ok());
@@ -262,7 +262,10 @@ mod tests {
         settings.set(Setting::TravelX, Value::from_num(300)).expect("valid");
         settings.set(Setting::StepPulse, Value::from_num(1.5)).expect("valid");
         let kept = |settings: &Settings| {
-            settings.iter().map(|(info, value)| (info.number, value)).collect::<std::vec::Vec<_>>()
+            settings
+                .iter()
+                .map(|(info, value)| (info.number(), value))
+                .collect::<std::vec::Vec<_>>()
         };
         let mut values = kept(&settings);
         assert_eq!(Settings::restored(values.clone()), settings);

@@ -169,12 +169,12 @@ pub enum Setting {
 pub struct SettingInfo {
     /// The setting that this row of the table describes.
     pub setting: Setting,
-    /// The number by which the user changes it, as in `$100=80`.
-    pub number: u16,
+    /// The number by which the user changes it, below 256; see [`SettingInfo::number`].
+    number: u8,
     /// The name of the setting, as the list printed by `$$` shows it.
     pub name: &'static str,
-    /// The unit; empty for a plain number.
-    pub unit: &'static str,
+    /// The index of the unit in [`UNITS`]; see [`SettingInfo::unit`].
+    unit: u8,
     /// The least value that the setting may have.
     pub least: Value,
     /// The greatest value that the setting may have.
@@ -185,10 +185,44 @@ pub struct SettingInfo {
     pub whole: bool,
 }
 
+impl SettingInfo {
+    /// The number by which the user changes the setting, as in `$100=80`.
+    pub const fn number(&self) -> u16 {
+        self.number as u16
+    }
+
+    /// The unit; empty for a plain number.
+    pub fn unit(&self) -> &'static str {
+        UNITS.get(usize::from(self.unit)).copied().unwrap_or("")
+    }
+}
+
+/// All units of settings. A row holds the index of its unit, which takes less flash than a text.
+const UNITS: [&str; 14] = [
+    "", "us", "ms", "mm", "m", "mm/min", "mm/s2", "m/s3", "step/mm", "mask", "0|1", "0|1|2",
+    "0|1|2|3", "of 127",
+];
+
+/// Returns the index of a unit. A unit that is not among them does not compile.
+const fn unit_index(unit: &str) -> u8 {
+    let mut index = 0;
+    loop {
+        let (one, other) = (UNITS[index].as_bytes(), unit.as_bytes());
+        let mut equal = 0;
+        while equal < one.len() && equal < other.len() && one[equal] == other[equal] {
+            equal += 1;
+        }
+        if equal == one.len() && equal == other.len() {
+            return index as u8;
+        }
+        index += 1;
+    }
+}
+
 /// Makes a row; the range is the least, the greatest and the default value.
 const fn row(
     setting: Setting,
-    number: u16,
+    number: u8,
     name: &'static str,
     unit: &'static str,
     (least, greatest, default): (f64, f64, f64),
@@ -203,7 +237,7 @@ const fn row(
         setting,
         number,
         name,
-        unit,
+        unit: unit_index(unit),
         least: value(least),
         greatest: value(greatest),
         default: value(default),
@@ -349,7 +383,7 @@ impl Setting {
     /// assert_eq!(Setting::numbered(99), None);
     /// ```
     pub fn numbered(number: u16) -> Option<Self> {
-        let index = SETTINGS.binary_search_by_key(&number, |info| info.number);
+        let index = SETTINGS.binary_search_by_key(&number, |info| info.number());
         Some(SETTINGS.get(index.ok()?)?.setting)
     }
 }

@@ -75,6 +75,7 @@ impl Map {
 }
 
 /// Limits a coordinate to ±2^62, far beyond what a model can hold. Later checks refuse it.
+#[inline(never)] // Its 128-bit arithmetic is long.
 fn within(value: i128) -> i64 {
     const LIMIT: i128 = 1 << 62;
     value.clamp(-LIMIT, LIMIT) as i64
@@ -130,8 +131,12 @@ impl<I: Index> Model<'_, I> {
     /// `range` fit.
     pub(super) fn coarser_for(&self, map: &Map, range: Range<usize>) -> Result<u32, ModelError> {
         let positions = self.vertices.get(range).unwrap_or(&[]);
-        let images = positions.iter().flat_map(|position| map.apply(*position));
-        let largest = images.map(i64::unsigned_abs).max().unwrap_or(0);
+        let mut largest = 0;
+        for position in positions {
+            for part in map.apply(*position) {
+                largest = part.unsigned_abs().max(largest);
+            }
+        }
         (0..=self.fraction_bits)
             .find(|bits| largest >> bits <= POSITION_LIMIT as u64)
             .ok_or(ModelError::CoordinateTooLarge)

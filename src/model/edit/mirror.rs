@@ -63,7 +63,7 @@ impl<I: Index> Model<'_, I> {
             .map(|curve| curve.length())
             .sum();
         self.store.check_room(of_elements + of_curves)?;
-        let coarser = self.coarser_for(&map, range.clone())?;
+        let coarser = self.coarser_for(map, range.clone())?;
 
         before(self);
         for at in range.clone() {

@@ -60,7 +60,7 @@ impl<I: Index> Pipeline<'_, I> {
             Some(map) => map,
             None => {
                 let bounds = bounds_of(vertices, elements, projection, cancel)?;
-                let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+                let bounds = bounds.known().ok_or(CommandError::NothingToPlot)?;
                 fit(&view, is_cut, &bounds, options, steps)?
             }
         };

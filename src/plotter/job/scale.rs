@@ -4,7 +4,7 @@ use super::super::PlotOptions;
 use crate::drawing::{Bounds, PageMap, StepsPerMillimetre};
 use crate::geometry::{Projection, Vertex};
 use crate::index::Index;
-use crate::model::{Elements, Model, Position};
+use crate::model::{Elements, Model};
 use crate::protocol::CommandError;
 use crate::stage::{Aborted, Cancel, Scratch};
 use crate::view::{Flattening, View, project_scene};
@@ -17,19 +17,20 @@ pub(in crate::plotter) const FOR_BOUNDS: u16 = 32;
 /// Corners handled between two checks for cancelling: some 100,000 instructions.
 const CORNERS_BETWEEN_CHECKS: usize = 128;
 
-/// The bounds of all elements on the view plane; `None` if there are none.
+/// The bounds of all elements on the view plane.
 pub(super) fn bounds_of<I: Index>(
     vertices: &[Vertex],
     elements: Elements<'_, I>,
     projection: Projection,
     cancel: &mut dyn Cancel,
-) -> Result<Option<Bounds>, Aborted> {
+) -> Result<Bounds, Aborted> {
     // Each corner costs two divisions, so the check for cancelling comes after some of them.
-    let mut bounds: Option<Bounds> = None;
+    let mut bounds = Bounds::NOTHING;
     for corners in elements.corners().chunks(CORNERS_BETWEEN_CHECKS) {
         cancel.check()?;
-        let used = corners.iter().filter_map(|c| vertices.get(c.vertex().get())).copied();
-        bounds = union(bounds, Bounds::around(used, projection));
+        for vertex in corners.iter().filter_map(|corner| vertices.get(corner.vertex().get())) {
+            bounds.add(*vertex, projection);
+        }
     }
     Ok(bounds)
 }
@@ -46,16 +47,15 @@ pub(super) fn map_with_curves<I: Index>(
 ) -> Result<PageMap, CommandError> {
     let projection = view.projection();
     let near = view.near().unwrap_or(i32::MIN);
-    let in_front = |position: &Position| {
-        let vertex = view.vertex(*position);
-        Vertex { z: vertex.z.max(near), ..vertex }
-    };
-    let mut all = None;
+    let mut all = Bounds::NOTHING;
     for positions in model.vertices().chunks(CORNERS_BETWEEN_CHECKS) {
         cancel.check()?;
-        all = union(all, Bounds::around(positions.iter().map(in_front), projection));
+        for position in positions {
+            let vertex = view.vertex(*position);
+            all.add(Vertex { z: vertex.z.max(near), ..vertex }, projection);
+        }
     }
-    let all = all.ok_or(CommandError::NothingToPlot)?;
+    let all = all.known().ok_or(CommandError::NothingToPlot)?;
     let rough = PageMap::fit(&all, &options.sheet(), steps).map_err(CommandError::Page)?;
     let (mut bounds, is_cut) = {
         let mut scratch = scratch.reborrow();
@@ -64,9 +64,11 @@ pub(super) fn map_with_curves<I: Index>(
     };
     let flattening = Flattening { on_page: &|x, y, w| rough.fine(x, y, w), tolerance: FOR_BOUNDS };
     flattening.each_chord(view, model, scratch, cancel, &mut |chord| {
-        bounds = union(bounds, Bounds::around(chord.into_iter(), projection));
+        for end in chord {
+            bounds.add(end, projection);
+        }
     })?;
-    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+    let bounds = bounds.known().ok_or(CommandError::NothingToPlot)?;
     fit(view, is_cut, &bounds, options, steps)
 }
 
@@ -84,9 +86,4 @@ pub(in crate::plotter) fn fit(
         None => PageMap::fit(bounds, &options.sheet(), steps),
     }
     .map_err(CommandError::Page)
-}
-
-/// The union of both bounds, where either may be missing.
-pub(in crate::plotter) fn union(bounds: Option<Bounds>, more: Option<Bounds>) -> Option<Bounds> {
-    bounds.zip(more).map(|(a, b)| a.union(b)).or(bounds).or(more)
 }

@@ -7,14 +7,13 @@ use crate::index::Index;
 use crate::model::{Positions, StoredModel};
 use crate::order::{self, Leg};
 use crate::plotter::Unobserved;
-use crate::plotter::job::{Collector, Job, PageSink, fit, move_to_front, union};
+use crate::plotter::job::{Collector, Job, PageSink, fit, move_to_front};
 use crate::plotter::options::{HiddenLines, PlotOptions};
 use crate::protocol::{CommandError, StoredModelError};
 use crate::stage::{Cancel, Scratch, Stage};
 use crate::tiles::{ProjectedStored, Tiles, ViewParameters};
 use crate::view::View;
 use crate::visibility::{SinkFull, Stretch, StretchSink, VisibilityError};
-use core::iter;
 
 /// The lines of a part take at most the working memory divided by this number.
 const LINE_SHARE: usize = 8;
@@ -62,13 +61,11 @@ pub(super) fn prepare(
     let mut scratch = Scratch::new(words);
     let tiles = Tiles::new(&source, parameters, options.visibility(&view), &mut scratch, cancel);
     let tiles = tiles.map_err(refused)?.ok_or(CommandError::NothingToPlot)?;
-    let mut bounds = None;
-    let around = &mut |vertex| {
-        bounds = union(bounds, Bounds::around(iter::once(vertex), view.projection()));
-    };
+    let mut bounds = Bounds::NOTHING;
+    let around = &mut |vertex| bounds.add(vertex, view.projection());
     tiles.each_point(cancel, around).map_err(refused)?;
     let tiles = tiles.pause();
-    let bounds = bounds.ok_or(CommandError::NothingToPlot)?;
+    let bounds = bounds.known().ok_or(CommandError::NothingToPlot)?;
     let map = fit(&view, is_cut, &bounds, options, steps)?;
     let [mut least, mut greatest] = map.extent(&bounds, &options.page, steps);
     let around = [least.x, greatest.x, least.y];

@@ -422,7 +422,7 @@ impl CommandError {
                 ),
                 format_args!(
                     "${0} has changed since the job began: set ${0}={1}, or begin anew by $again",
-                    setting.info().number,
+                    setting.info().number(),
                     BinaryFraction {
                         units: before.to_bits().into(),
                         fraction_bits: 16,

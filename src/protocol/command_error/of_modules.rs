@@ -261,7 +261,7 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
         SettingError::Unknown => row(UNKNOWN_SYSTEM_COMMAND, format_args!("$$ lists the settings")),
         SettingError::OutOfRange(setting) => {
             let info = setting.info();
-            let (name, unit) = (info.name, info.unit);
+            let (name, unit) = (info.name, info.unit());
             let [least, greatest] = [info.least, info.greatest].map(Length);
             row(
                 SETTING_OUT_OF_RANGE,
