@@ -56,7 +56,7 @@ fn draws_as_previewed(board: &'static BoardRow, form: Form) -> Result<(), Box<dy
     let mut emulated = emulate(board)?;
     let mut strokes = Strokes::default();
     let mut sender = Sender::open(emulated.as_mut(), Timeouts::default(), &interrupt)?;
-    assert_eq!(sender.form()?, form);
+    assert_eq!(sender.form(&Settings::default())?, form);
     sender.draw_streamed(&streamed, &mut strokes)?;
     sender.end();
     assert_eq!(inked(emulated.pen_runs()?), previewed);

@@ -177,8 +177,8 @@ mod tests {
         fn new(seed: u32) -> Self {
             let mut random = Random(seed.wrapping_mul(0x9E37_79B9));
             let mut scene = Self { vertices: Vec::new(), elements: Vec::new() };
-            let bumps = if seed % 4 == 0 { 0.0 } else { 0.3 * random.part() };
-            let is_damaged = seed % 3 == 0;
+            let bumps = if seed.is_multiple_of(4) { 0.0 } else { 0.3 * random.part() };
+            let is_damaged = seed.is_multiple_of(3);
             let (turn, tilt) = (6.0 * random.part(), 0.2 + random.part());
             for _ in 0..1 + seed % 3 {
                 let middle = [(); 3].map(|()| 90_000.0 * (random.part() - 0.5));
@@ -293,10 +293,10 @@ mod tests {
                 unrounded: Unrounded::UNKNOWN,
             };
             let options = Options {
-                with_hidden: seed % 2 == 0,
+                with_hidden: seed.is_multiple_of(2),
                 with_seams: true,
                 merged_blocks: seed % 5 == 1,
-                crease: (seed % 7 == 2).then(|| Crease { cosine: 31_000, depth_stretch: (1, 1) }),
+                crease: (seed % 7 == 2).then_some(Crease { cosine: 31_000, depth_stretch: (1, 1) }),
             };
             let (expected, none) = find(&scene, options, false);
             let (found, some) = find(&scene, options, true);
