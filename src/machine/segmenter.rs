@@ -52,7 +52,7 @@ impl Machine<'_> {
         }
         let from = self.runner.page_end();
         let (dx, dy) = (to.x - from.x, to.y - from.y);
-        let length = self.runner.limits().length(dx, dy).ok_or(PushError::TooLong)?;
+        let length = self.runner.move_length(dx, dy).ok_or(PushError::TooLong)?;
         let position = PathLength::ZERO;
         self.segmenter = Some(Segmenter { from, to, length, position, cut: 0, dot: 0, ink, limit });
         self.push_segments();

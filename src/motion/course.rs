@@ -367,7 +367,7 @@ mod tests {
         for (dx, dy, move_length) in chords {
             let length = PathLength::from_bits(move_length * Line::by(dx, dy).remaining());
             let line = Block { dx, dy, length, ..Block::EMPTY };
-            if !ring.join(&line, &limits) {
+            if !ring.join(&line, false, &limits) {
                 ring.push(line).expect("room");
             }
         }

@@ -47,6 +47,8 @@ pub(super) struct Corner {
 impl Corner {
     /// A corner at which the machine must come to rest anyway.
     pub(super) const STOP: Self = Self { limit: PathLength::ZERO, is_sharp: true };
+    /// No corner: the path goes straight on.
+    pub(super) const NONE: Self = Self { limit: PathLength::MAX, is_sharp: false };
 }
 
 /// Computes how the corner between two blocks may be passed, given the length of the shorter one.
@@ -65,7 +67,6 @@ pub(super) fn corner(
     after: Heading,
     shorter: PathLength,
 ) -> Corner {
-    const NONE: Corner = Corner { limit: PathLength::MAX, is_sharp: false };
     // With unit vectors u, v: |u + v| = 2 cos(θ/2), |v - u| = 2 sin(θ/2).
     let (dx, dy) = (after.x.wrapping_sub(before.x), after.y.wrapping_sub(before.y));
     let rounding = u64::from(limits.rounding.to_bits()) << 30;
@@ -74,11 +75,11 @@ pub(super) fn corner(
     // square root.
     let most = dx.unsigned_abs() / 2 + dy.unsigned_abs() / 2 + 1;
     if u64::from(most) * u64::from(shorter) <= rounding {
-        return NONE;
+        return Corner::NONE;
     }
     let sine = half_length(dx, dy).saturating_sub(rounding / u64::from(shorter));
     if sine == 0 {
-        return NONE;
+        return Corner::NONE;
     }
     let cosine = half_length(before.x.wrapping_add(after.x), before.y.wrapping_add(after.y));
     // Lengths are rounded to whole units, and so are the directions. A path that turns back must

@@ -243,27 +243,30 @@ impl<'m> Lookahead<'m> {
         Ok(())
     }
 
-    /// Joins a line to the last block, if that is a line of the same ink, and if the blocks might
-    /// otherwise not hold the machine's stopping distance. Nothing may limit the speed between the
-    /// two. Returns whether it was joined.
+    /// Joins a line to the last block, if that is a line of the same ink. Nothing may limit the speed
+    /// between the two. Returns whether it was joined.
     ///
-    /// The limits of a bend apply to whole blocks. So a block is not made longer once it has its
-    /// share of 5/4 of that distance, nor while the whole path has that length or less than half of
-    /// the memory is in use.
+    /// A line that goes on in the same direction (`goes_on`) makes a short block longer, so that one
+    /// plan serves for both. Other lines are joined only if the blocks might otherwise not hold the
+    /// machine's stopping distance: nothing is joined while the whole path has 5/4 of that distance
+    /// or less than half of the memory is in use, nor to a block that has its share of it.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
-    pub(super) fn join(&mut self, line: &Block, limits: &Limits) -> bool {
+    pub(super) fn join(&mut self, line: &Block, goes_on: bool, limits: &Limits) -> bool {
         let needed = limits.longest_stop.to_bits().saturating_add(surely_known(limits) / 4);
         let enough = needed.saturating_add(needed / 4);
-        if self.is_short() || self.length >= u64::from(enough) {
-            return false;
-        }
-        self.join_to_last(line, enough / self.blocks.len().max(1) as u32)
+        let is_needed = !self.is_short() && self.length < u64::from(enough);
+        let share = if is_needed { enough / self.blocks.len().max(1) as u32 } else { 0 };
+        (goes_on || is_needed) && self.join_to_last(line, share, limits)
     }
 
-    /// Joins a line to the last block if that is shorter than `longest`. Returns whether it was
+    /// Joins a line to the last block if that is shorter than its `share`. Returns whether it was
     /// joined.
-    #[inline(never)] // Long paths never come here: it would only fill the cache.
-    fn join_to_last(&mut self, line: &Block, longest: u32) -> bool {
+    ///
+    /// The limits of a bend apply to whole blocks. So also one straight line becomes no longer than
+    /// that, or than 16 times what rounding explains, which is less than the circles through points
+    /// span that find the bend.
+    #[inline(never)] // Where chords are long it would only fill the cache.
+    fn join_to_last(&mut self, line: &Block, share: u32, limits: &Limits) -> bool {
         let Some(at) = self.count.checked_sub(1).map(|last| self.wrapped(last)) else {
             return false;
         };
@@ -279,19 +282,23 @@ impl<'m> Lookahead<'m> {
             let is_whole = is_whole && block.extra == 0;
             is_whole && block.kind == BlockKind::Line && block.offsets == [0; 2]
         });
-        let is_long = block.length.to_bits() >= longest;
-        if is_long || !are_lines || block.ink != line.ink || block.length == 0 {
+        let is_in_line =
+            block.chord_count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]);
+        let most = if is_in_line { share.max(16 * limits.rounding.to_bits()) } else { share };
+        if block.length.to_bits() >= most
+            || !are_lines
+            || block.ink != line.ink
+            || block.length == 0
+        {
             return false;
         }
         let Some(points) = block.points.checked_add(1) else {
             return false;
         };
-        if block.chord_count == 0 && is_in_line([block.dx, block.dy], [line.dx, line.dy]) {
+        if is_in_line {
             (block.dx, block.dy) = (block.dx + line.dx, block.dy + line.dy);
-        } else {
-            if !block.push_chord(line.dx, line.dy, line.length) {
-                return false;
-            }
+        } else if !block.push_chord(line.dx, line.dy, line.length) {
+            return false;
         }
         block.points = points;
         self.joined += usize::from(points == 2);
@@ -482,7 +489,7 @@ impl<'m> Lookahead<'m> {
 }
 
 /// Whether two vectors have the same direction, so that both together are one line.
-fn is_in_line([dx, dy]: [i32; 2], [more_x, more_y]: [i32; 2]) -> bool {
+pub(super) fn is_in_line([dx, dy]: [i32; 2], [more_x, more_y]: [i32; 2]) -> bool {
     let product = |a: i32, b: i32| i64::from(a) * i64::from(b);
     product(dx, more_y) == product(dy, more_x) && product(dx, more_x) + product(dy, more_y) > 0
 }
@@ -602,7 +609,7 @@ mod tests {
         for number in 0..19u32 {
             let line = line(3, (number % 2) as i32, 700 + number);
             sum += 700 + u64::from(number);
-            if !ring.join(&line, &limits) {
+            if !ring.join(&line, false, &limits) {
                 ring.push(line).expect("room");
             }
         }
@@ -619,7 +626,7 @@ mod tests {
             Block { ink: Some(LineType::Full), ..line(1, 0, 9) },
             line(1, 0, 9),
         ] {
-            assert!(!ring.join(&other, &limits), "{other:?}");
+            assert!(!ring.join(&other, false, &limits), "{other:?}");
         }
         // Moves in line take no room in a block.
         ring.clear();
@@ -627,13 +634,40 @@ mod tests {
             ring.push(line(2, 1, 50)).expect("room");
         }
         for _ in 0..100 {
-            assert!(ring.join(&line(4, 2, 100), &limits));
+            assert!(ring.join(&line(4, 2, 100), false, &limits));
         }
         let last = *ring.blocks()[0].last().expect("a block");
         assert_eq!((last.dx, last.dy, last.chords().len()), (402, 201, 0));
-        assert!(ring.join(&line(-4, -2, 100), &limits));
+        assert!(ring.join(&line(-4, -2, 100), false, &limits));
         let last = *ring.blocks()[0].last().expect("a block");
         assert_eq!((last.dx, last.dy, last.chords().len()), (402, 201, 1));
+    }
+
+    #[test]
+    fn short_moves_in_line_are_one_block_up_to_a_length_that_rounding_explains() {
+        let limits = limits();
+        let most = 16 * limits.rounding.to_bits();
+        let mut memory = [Block::EMPTY; 64];
+        let mut ring = Lookahead::new(&mut memory);
+        let line = |dx, dy, length| Block { dx, dy, ..block(length, u32::MAX) };
+        let mut push = |line: Block, goes_on| {
+            let is_joined = ring.join(&line, goes_on, &limits);
+            if !is_joined {
+                ring.push(line).expect("room");
+            }
+            let last = *ring.blocks()[0].last().expect("a block");
+            (is_joined, [last.dx, last.dy], last.points)
+        };
+        assert_eq!(push(line(5, 1, 5000), false), (false, [5, 1], 1));
+        assert_eq!(push(line(5, 1, 5000), true), (true, [10, 2], 2));
+        assert_eq!(push(line(10, 2, 10_000), true), (true, [20, 4], 3));
+        // The motors do not go on in this direction, although the pen does.
+        assert_eq!(push(line(5, 2, 5000), true), (false, [5, 2], 1));
+        assert_eq!(push(line(-5, -2, 5000), true), (false, [-5, -2], 1));
+        // The block is as long as may be before the next move.
+        assert_eq!(push(line(3, 0, most), true), (false, [3, 0], 1));
+        assert_eq!(push(line(3, 0, most), true), (false, [3, 0], 1));
+        assert_eq!(ring.known(), u64::from(30_000 + 2 * most) << 14);
     }
 
     #[test]

@@ -18,9 +18,9 @@
 //! The pulses leave when the plan is half a step from the new position: the pins are never more
 //! than half a step from where the plan is.
 //!
-//! Measured on a Cortex-M3, built for size, everything between target and queue included: 38
-//! instructions for each event of a line at 100,000 moves a second, and 61 to 148 with a limit on
-//! jerk; for chords of five moves at 5,000 a second 451, and 483 to 499. The step interrupt is not
+//! Measured on a Cortex-M3, built for size, everything between target and queue included: 39
+//! instructions for each event of a line at 100,000 moves a second, and 62 to 150 with a limit on
+//! jerk; for chords of five moves at 5,000 a second 354, and 363 to 394. The step interrupt is not
 //! counted in that. `cargo xtask bench --motion` counts both.
 //!
 //! The module `machine` is responsible for the limits of travel, the heights of the pen, and the

@@ -81,8 +81,17 @@ impl Slice {
     /// The duration of an ordinary slice, which is [`SLICE_TICKS`], in sixteenths of ticks.
     pub(super) const TIME: u32 = SLICE_TICKS << FRACTION_BITS;
     /// The most ordinary slices that are merged into one where the speed stays the same, which is
-    /// 1.3 ms.
-    pub(super) const MOST: u32 = 8;
+    /// 2.6 ms. Then a chord of a few moves is one slice.
+    pub(super) const MOST: u32 = 16;
+    /// The same while the pen travels: 1.3 ms, because the pen may be told at the end of a slice
+    /// only.
+    pub(super) const MOST_OF_TRAVEL: u32 = 8;
+
+    /// The most ordinary slices that are merged at this speed, which hardly changes within them.
+    /// They are fewer above 350 mm/s, because a slice must be shorter than 1 mm.
+    pub(super) const fn most(speed: u32) -> u32 {
+        if speed < 15 << 24 { Self::MOST } else { 8 }
+    }
 }
 
 /// The speed along one piece of the path: at most three phases of constant acceleration.
@@ -108,6 +117,7 @@ impl Profile {
     /// If `entry` is faster than `top`, the speed is first reduced to `top`. `exit_allowed` must be
     /// reachable, which is guaranteed if it comes from the same look-ahead as `entry`; otherwise
     /// the profile reduces the speed as far as it can.
+    #[inline(always)] // A copy of what it returns costs as much as the plan.
     pub(super) fn new(
         limits: &Limits,
         entry: PathSpeed,
@@ -115,8 +125,8 @@ impl Profile {
         top: PathSpeed,
         exit_allowed: PathLength,
     ) -> Self {
-        let (start, reach) = (entry.stopping_distance, length);
-        // Fast path: most chords are run at the greatest speed from end to end.
+        let start = entry.stopping_distance;
+        // Most chords are run at the greatest speed from end to end.
         if start == top.stopping_distance && start > 0 && exit_allowed >= start {
             let phase = Phase::new(limits, top.speed, top.speed, length);
             return Self {
@@ -127,6 +137,19 @@ impl Profile {
                 exit: top,
             };
         }
+        Self::in_phases(limits, entry, length, top, exit_allowed)
+    }
+
+    /// Does the work of [`Profile::new`] where the speed changes.
+    #[inline(never)] // Most chords never come here: it would only fill the cache.
+    fn in_phases(
+        limits: &Limits,
+        entry: PathSpeed,
+        length: PathLength,
+        top: PathSpeed,
+        exit_allowed: PathLength,
+    ) -> Self {
+        let (start, reach) = (entry.stopping_distance, length);
         let slowest = start.saturating_sub(reach);
         let fastest = start.saturating_add(reach);
         let exit = exit_allowed.min(fastest).max(slowest);
@@ -195,6 +218,24 @@ impl Profile {
         self.phase.time.saturating_add(flat.time).saturating_add(down.time)
     }
 
+    /// The speed at which the next slice begins, with its exact stopping distance, which follows
+    /// from what is left of the phase.
+    pub(super) fn state(&self) -> PathSpeed {
+        let Phase { distance, gain, .. } = self.phase;
+        let is_last = self.flat == 0 && self.down == 0;
+        let end = if is_last { self.exit } else { self.peak };
+        if distance == 0 {
+            return end;
+        }
+        let left = PathLength::from_bits((distance >> 14) as u32);
+        let stopping_distance = match gain.cmp(&0) {
+            core::cmp::Ordering::Less => end.stopping_distance.saturating_add(left),
+            core::cmp::Ordering::Equal => end.stopping_distance,
+            core::cmp::Ordering::Greater => end.stopping_distance.saturating_sub(left),
+        };
+        PathSpeed { stopping_distance, speed: self.phase.speed }
+    }
+
     /// The speed at which the next slice begins.
     pub(super) fn speed(&self) -> SliceSpeed {
         if self.phase.distance > 0 {
@@ -206,11 +247,13 @@ impl Profile {
         }
     }
 
-    /// Returns the next slice, or `None` at the end of the profile.
-    pub(super) fn next_slice(&mut self, limits: &Limits) -> Option<Slice> {
+    /// Returns the next slice, or `None` at the end of the profile. It merges at most `most`
+    /// ordinary slices.
+    pub(super) fn next_slice(&mut self, limits: &Limits, most: u32) -> Option<Slice> {
         loop {
             let phase = &mut self.phase;
-            let slices = if phase.gain == 0 { Slice::MOST } else { 1 };
+            let slices =
+                if phase.gain == 0 { Slice::most(phase.speed.to_bits()).min(most) } else { 1 };
             let time = u64::from(slices * Slice::TIME);
             if phase.time > time {
                 let speed = i64::from(phase.speed.to_bits());
@@ -220,8 +263,7 @@ impl Profile {
                 phase.speed = SliceSpeed::from_bits(after as u32);
                 phase.distance -= distance;
                 phase.time -= time;
-                // The distance fits 32 bits: a speed is at most 0.09 mm in an ordinary slice, and
-                // at most eight of these are merged.
+                // The distance fits 32 bits: an ordinary slice at the greatest speed is 0.09 mm.
                 return Some(Slice { distance: distance as u32, time: time as u32 });
             }
             // The rest is no longer than a slice, so it fits 32 bits, too.
@@ -249,7 +291,7 @@ mod tests {
     /// Distance (mm) and time (s) of all slices.
     fn run(limits: &Limits, mut profile: Profile) -> (f64, f64) {
         let (mut distance, mut time) = (0u64, 0u64);
-        while let Some(slice) = profile.next_slice(limits) {
+        while let Some(slice) = profile.next_slice(limits, Slice::MOST) {
             distance += u64::from(slice.distance);
             time += u64::from(slice.time);
         }
@@ -288,5 +330,28 @@ mod tests {
         let short = stopping(&limits, top, mm(1.0));
         assert_eq!(short.exit().stopping_distance, top.stopping_distance - mm(1.0));
         assert_eq!(run(&limits, stopping(&limits, PathSpeed::REST, mm(1.0))), (0.0, 0.0));
+    }
+
+    #[test]
+    fn wherever_a_profile_is_broken_off_its_end_stays_within_reach() {
+        let limits = Limits::new(&settings()).expect("valid");
+        let top = PathSpeed::of_speed(&limits, limits.draw_speed);
+        let cases = [(20.0, 0.0, 0.0), (9.3, 1.7, 3.1), (1.0, 4.0, 3.5), (3.0, 6.25, 3.25)];
+        for (length, entry, exit) in cases {
+            let entry = PathSpeed::of_stopping_distance(&limits, mm(entry));
+            let mut profile = Profile::new(&limits, entry, mm(length), top, mm(exit));
+            let mut left = u64::from(mm(length).to_bits()) << 14;
+            while let Some(slice) = profile.next_slice(&limits, Slice::MOST) {
+                left -= u64::from(slice.distance);
+                let PathSpeed { stopping_distance, speed } = profile.state();
+                let end = profile.exit().stopping_distance;
+                let reach = PathLength::from_bits((left >> 14) as u32);
+                assert!(stopping_distance <= end + reach, "{length}: {stopping_distance}");
+                assert!(end <= stopping_distance + reach + PathLength::DELTA, "{length}");
+                let of_speed = limits.stopping_distance(speed);
+                assert!(stopping_distance.abs_diff(of_speed) < mm(0.001), "{length}: {of_speed}");
+            }
+            assert_eq!(profile.state(), profile.exit());
+        }
     }
 }

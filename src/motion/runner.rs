@@ -1,14 +1,21 @@
 //! Carries out the blocks of the look-ahead: plans their speed slice by slice, and hands over the
 //! events of moves, pen changes and dwells.
 
+mod append;
 #[cfg_attr(not(feature = "pen-overlap"), path = "runner/pen_at_rest.rs")]
 mod pen;
+mod pen_moves;
+mod plan;
 #[cfg(feature = "spread-backlash")]
 mod reversals;
 
+use append::{Chord, LastMove};
+pub use append::{Move, PushError};
 #[cfg(feature = "pen-overlap")]
 pub use pen::PenOverlap;
 use pen::PenTiming;
+pub use pen_moves::PenPositions;
+use plan::{Committed, Plan};
 #[cfg(feature = "spread-backlash")]
 pub use reversals::{BacklashTakeUp, Reversal};
 
@@ -18,8 +25,8 @@ use super::emitter::{LineLevels, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
 use super::limits::{mm_per_min, square};
-use super::lookahead::BlockKind;
-use super::profile::{FRACTION_BITS, PathSpeed, Profile};
+use super::lookahead::{BlockKind, is_in_line};
+use super::profile::{FRACTION_BITS, PathSpeed, Profile, Slice};
 use super::smooth::{Interval, PathLimits, State};
 use super::{
     Block, BrakeRule, Emitter, EventQueue, Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed,
@@ -29,29 +36,6 @@ use crate::drawing::{LineType, PagePoint};
 use crate::fixed::Millimetres;
 use crate::step::Direction;
 use core::cmp::Ordering;
-
-/// The heights of the pen, and how long it takes to reach them.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct PenPositions {
-    /// The height of the raised pen, 0 (fully raised) to 127.
-    pub up_height: u8,
-    /// The height of the pen when it draws, 0 to 127.
-    pub down_height: u8,
-    /// The ticks from the order to raise the pen to the first move.
-    pub up_ticks: u32,
-    /// The ticks from the order to lower the pen to the first move.
-    pub down_ticks: u32,
-    /// The ticks from one height to the next while the pen is lowered or raised gradually; 0 if it
-    /// moves at once.
-    pub ramp_ticks: u32,
-    /// The length of a dot or gap of a dotted line.
-    pub dot_length: PathLength,
-    /// The motor that lifts the pen, if a motor does.
-    pub lift: Option<LiftRule>,
-    /// How long the pen may move while the machine moves, too.
-    #[cfg(feature = "pen-overlap")]
-    pub overlap: PenOverlap,
-}
 
 /// The result of one call of [`Runner::produce`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -63,36 +47,6 @@ pub enum Progress {
     /// The machine is at rest on the path with the pen raised, as [`Runner::stop`] or
     /// [`Runner::stop_after_stroke`] asked.
     Stopped,
-}
-
-/// A straight move of the pen, or a segment of one.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Move {
-    /// The positions of the motors at its end.
-    pub motors: PagePoint,
-    /// How far its ends lie beside the points that the motors can reach: see
-    /// [`Line::beside`](crate::step::Line::beside).
-    pub offsets: [i16; 2],
-    /// The position of the pen at its end.
-    pub page: PagePoint,
-    /// The displacement of the whole move on the page, in steps.
-    pub displacement: (i32, i32),
-    /// The length of the whole move.
-    pub whole_length: PathLength,
-    /// The length of this segment of it.
-    pub length: PathLength,
-    /// Whether this is a gap within an inked line, for which the pen is raised.
-    pub is_gap: bool,
-}
-
-/// The reasons why a block was not appended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "defmt", derive(defmt::Format))]
-pub enum PushError {
-    /// The look-ahead is full: produce events first.
-    Full,
-    /// The move is longer than 16 m, which exceeds every page.
-    TooLong,
 }
 
 /// What a runner has carried out so far. Lengths are in units of 2^-18 mm.
@@ -107,16 +61,6 @@ pub struct RunLengths {
     pub travelled: u64,
 }
 
-/// The plan of the speed.
-#[derive(Debug)]
-enum Plan {
-    /// A plan without a limit on jerk, for the rest of the current piece.
-    Profile(Profile),
-    /// A plan with a limit on jerk, for an interval of time, regardless of how many blocks end
-    /// within it.
-    Interval(Interval),
-}
-
 /// Turns the blocks of the look-ahead into step events.
 #[derive(Debug)]
 pub struct Runner<'m> {
@@ -128,11 +72,8 @@ pub struct Runner<'m> {
     emitter: Emitter,
     course: Option<BlockCursor>,
     plan: Option<Plan>,
-    /// The speed at the end of the last plan.
-    plan_end: PathSpeed,
-    /// The acceleration at the end of the last plan, as a ramp ([`State`]); only with a limit on
-    /// jerk.
-    ramp: i32,
+    /// The state of motion at the commit point, if nothing is planned from there on.
+    committed: Committed,
     /// The greatest speed with the pen down.
     draw: PathSpeed,
     /// The greatest speed with the pen up.
@@ -150,11 +91,6 @@ pub struct Runner<'m> {
     timing: PenTiming,
     stopping: bool,
     stopping_after_stroke: bool,
-    /// The stopping distance with which the current piece was allowed to end, if it is so low only
-    /// because few blocks are known. When a later block allows more, the piece is planned again.
-    provisional_exit: Option<PathLength>,
-    /// The stopping distance with which a discarded plan would have ended the current piece.
-    discarded_exit: Option<PathLength>,
     /// The runner stops after the stroke in which the total drawn length reaches this value.
     ink_bound: u64,
     /// The positions of the motors where the events so far end, without the steps that took up
@@ -168,8 +104,10 @@ pub struct Runner<'m> {
     end: PagePoint,
     /// The position of the pen where the blocks so far end.
     page_end: PagePoint,
-    /// The direction, length and ink of the last block appended.
-    last: Option<(Heading, PathLength, Option<LineType>)>,
+    /// The last move appended.
+    last: Option<LastMove>,
+    /// The last chord that was another one than that move.
+    other_chord: Option<Chord>,
     /// The stopping distance of the speed limit of the last block appended.
     last_limit: PathLength,
     run: RunLengths,
@@ -203,8 +141,7 @@ impl<'m> Runner<'m> {
             emitter: Emitter::new(&limits),
             course: None,
             plan: None,
-            plan_end: PathSpeed::REST,
-            ramp: 0,
+            committed: Committed::REST,
             draw: PathSpeed::REST,
             travel: PathSpeed::REST,
             curve: PathSpeed::REST,
@@ -218,8 +155,6 @@ impl<'m> Runner<'m> {
             raised_at: 0,
             stopping: false,
             stopping_after_stroke: false,
-            provisional_exit: None,
-            discarded_exit: None,
             ink_bound: u64::MAX,
             position: PagePoint::default(),
             backlash: PagePoint::default(),
@@ -227,6 +162,7 @@ impl<'m> Runner<'m> {
             end: PagePoint::default(),
             page_end: PagePoint::default(),
             last: None,
+            other_chord: None,
             last_limit: PathLength::ZERO,
             run: RunLengths::default(),
             in_stroke: false,
@@ -244,6 +180,7 @@ impl<'m> Runner<'m> {
     pub fn set_limits(&mut self, limits: Limits, pen: PenPositions) {
         self.limits = limits;
         self.curve = PathSpeed::REST;
+        (self.last, self.other_chord) = (None, None);
         if pen.lift != self.pen.lift {
             self.forget_lift();
         }
@@ -270,11 +207,7 @@ impl<'m> Runner<'m> {
     /// within them if t ≥ (v - (√2 - 1) u) / a: either the plan is slower in between, or it goes
     /// far enough.
     pub fn stopping_ticks(&self) -> u32 {
-        let end = match &self.plan {
-            Some(Plan::Profile(profile)) => profile.speed().to_bits(),
-            Some(Plan::Interval(interval)) => interval.state().speed,
-            None => self.plan_end.speed.to_bits(),
-        };
+        let end = self.planned_speed().to_bits();
         let speed = self.top(self.in_stroke).speed.max(self.waiting_top_speed).to_bits();
         let change = speed.saturating_sub(end / 8 * 3);
         let slices = change.checked_div(self.limits.acceleration.to_bits()).unwrap_or(u32::MAX);
@@ -283,12 +216,7 @@ impl<'m> Runner<'m> {
 
     /// The planned speed, in mm/min.
     pub fn speed(&self) -> Millimetres {
-        let speed = match &self.plan {
-            Some(Plan::Profile(profile)) => profile.speed().to_bits(),
-            Some(Plan::Interval(interval)) => interval.state().speed,
-            None => self.plan_end.speed.to_bits(),
-        };
-        mm_per_min(SliceSpeed::from_bits(speed))
+        mm_per_min(self.planned_speed())
     }
 
     /// How many more targets fit now.
@@ -313,7 +241,7 @@ impl<'m> Runner<'m> {
         self.waiting_top_speed = self.waiting_top_speed.max(self.top(self.in_stroke).speed);
         self.draw = draw;
         self.travel = travel;
-        self.plan_again();
+        self.replan();
     }
 
     /// The limits in force.
@@ -377,70 +305,6 @@ impl<'m> Runner<'m> {
         Ok(())
     }
 
-    /// Whether the pen was last told to go down.
-    pub fn pen_is_down(&self) -> bool {
-        self.pen_is_down == Some(true)
-    }
-
-    /// Whether the pen was last told to go up, and the dwell for it has been planned.
-    #[cfg(feature = "resume")]
-    pub fn is_pen_up(&self) -> bool {
-        self.pen_is_down == Some(false)
-    }
-
-    /// Whether the pen is up, if all events that the pins have begun lasted `ticks`.
-    #[cfg(feature = "resume")]
-    pub fn is_pen_up_at(&self, ticks: u32) -> bool {
-        self.is_pen_up() && ticks.wrapping_sub(self.raised_at).cast_signed() > 0
-    }
-
-    /// The number of strokes that are planned to their end; wraps.
-    #[cfg(feature = "resume")]
-    pub fn strokes_over(&self) -> u32 {
-        let next_is_travel = self.lookahead.front().is_some_and(|block| block.ink.is_none());
-        let is_over = !self.in_stroke || (self.course.is_none() && next_is_travel);
-        self.run.strokes.wrapping_sub(u32::from(!is_over))
-    }
-
-    /// Records that something other than this runner has raised the pen, which may still be moving.
-    pub fn forget_pen(&mut self) {
-        self.pen_is_down = None;
-        self.pen_height = None;
-        self.forget_timing();
-    }
-
-    /// Records that the motor of the pen had no current, so that its position is unknown.
-    pub fn forget_lift(&mut self) {
-        self.lift.forget();
-        self.forget_pen();
-    }
-
-    /// Records that the pins have carried out events of this many ticks. By then the motor of the
-    /// pen may have found its stop.
-    pub fn follow_lift(&mut self, ticks: u32) {
-        self.lift.sync_consumed(ticks);
-    }
-
-    /// Sets the position of the motor of the pen, the sum of all its pulses. No pulse may wait.
-    pub fn set_lift(&mut self, position: i32) {
-        self.lift.set_position(position);
-    }
-
-    /// Whether a motor still has to raise the pen. If the position of the motor is unknown, this is
-    /// only so if `anywhere`.
-    pub fn is_pen_held(&self, anywhere: bool) -> bool {
-        let is_lowered = self.pen_is_down != Some(false) && (anywhere || self.lift.is_known());
-        self.pen.lift.is_some() && (is_lowered || self.emitter.is_open())
-    }
-
-    /// Hands over the next few events that raise the pen while nothing else moves.
-    ///
-    /// # Errors
-    /// The event that the queue refused although it had room.
-    pub fn raise_pen(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
-        self.come_to_rest(Progress::Done, queue)
-    }
-
     /// What has been carried out since the runner was created.
     pub fn run(&self) -> RunLengths {
         self.run
@@ -464,211 +328,12 @@ impl<'m> Runner<'m> {
         self.emitter.restart(ticks);
     }
 
-    /// Appends a move whose speed is limited by a stopping distance ([`Limits::feed`]). Lengths,
-    /// corners and bends are measured on the page. A move without length is skipped.
-    ///
-    /// # Errors
-    /// See [`PushError`]; nothing is appended then.
-    pub fn push(
-        &mut self,
-        piece: &Move,
-        ink: Option<LineType>,
-        limit: PathLength,
-    ) -> Result<(), PushError> {
-        let Move { motors, offsets, page, mut displacement, mut whole_length, mut length, is_gap } =
-            *piece;
-        let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
-        if dx == 0 && dy == 0 {
-            // The pen may be only near this point, because the motors move in whole steps.
-            self.page_end = page;
-            return Ok(());
-        }
-        if displacement == (0, 0) || length == 0 {
-            // The move is shorter than a step on the page, so its direction is that of the motors.
-            displacement = (dx.signum(), dy.signum());
-            whole_length =
-                self.limits.length(displacement.0, displacement.1).ok_or(PushError::TooLong)?;
-            length = whole_length;
-        }
-        let inked = ink.filter(|_| !is_gap);
-        let heading = Heading::new(&self.limits, displacement.0, displacement.1, whole_length);
-        let corner = match self.last {
-            Some((before, length_before, ink_before)) if passes(ink_before, inked) => {
-                junction::corner(&self.limits, before, heading, length.min(length_before))
-            }
-            _ => Corner::STOP,
-        };
-        let bends_apart = self
-            .last
-            .is_some_and(|(_, before, _)| junction::bends_apart(&self.limits, before, length));
-        if corner.is_sharp || bends_apart {
-            self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
-        }
-        let (entry_limit, curve_limit) = (corner.limit, limit);
-        let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
-        #[cfg(feature = "spread-backlash")]
-        let (kind, extra) = core::mem::take(&mut self.backlash_take_up).of_block(kind);
-        let block = Block {
-            dx,
-            dy,
-            length,
-            entry_limit,
-            curve_limit,
-            ink,
-            offsets,
-            kind,
-            #[cfg(feature = "spread-backlash")]
-            extra,
-            ..Block::EMPTY
-        };
-        // The speed is checked only between blocks, so moves are joined only if nothing limits it
-        // there.
-        let is_free = corner.limit >= self.limits.top && limit == self.last_limit;
-        if self.lookahead.is_full() {
-            return Err(PushError::Full);
-        }
-        let is_joined = is_free && self.lookahead.join(&block, &self.limits);
-        if !is_joined && self.lookahead.push(block).is_err() {
-            return Err(PushError::Full);
-        }
-        self.last_limit = limit;
-        if self.limits.centripetal {
-            self.curvature.extend(&self.limits, page, &mut self.lookahead);
-        }
-        self.end = motors;
-        self.page_end = page;
-        self.last = Some((heading, length, inked));
-        self.slow_for_bends();
-        if self
-            .provisional_exit
-            .is_some_and(|exit| exit < self.lookahead.entry_allowed(PathLength::MAX, &self.limits))
-        {
-            self.provisional_exit = None;
-            self.plan_again();
-        }
-        Ok(())
-    }
-
-    /// Appends steps by which the motors take up their backlash, from rest to rest. The pen stays
-    /// where it is, and is lowered if there is `ink`. If the pen may move while the machine does,
-    /// and these steps come before a stroke, it is still raised.
-    ///
-    /// # Errors
-    /// See [`PushError`]; nothing is appended then.
-    pub fn push_backlash(&mut self, by: PagePoint, ink: Option<LineType>) -> Result<(), PushError> {
-        let PagePoint { x: dx, y: dy } = by;
-        let length = self.limits.length(dx, dy).ok_or(PushError::TooLong)?;
-        let ink = ink.map(|_| LineType::Full);
-        let block = Block { dx, dy, length, ink, kind: BlockKind::Backlash, ..Block::EMPTY };
-        self.end_path();
-        self.lookahead.push(block).map_err(|_| PushError::Full)?;
-        self.backlash_end.x = self.backlash_end.x.wrapping_add(dx);
-        self.backlash_end.y = self.backlash_end.y.wrapping_add(dy);
-        Ok(())
-    }
-
-    /// The steps in the waiting blocks that take up backlash. [`Runner::forget_path`] discards
-    /// them.
-    pub fn waiting_backlash(&self) -> PagePoint {
-        PagePoint {
-            x: self.backlash_end.x.wrapping_sub(self.backlash.x),
-            y: self.backlash_end.y.wrapping_sub(self.backlash.y),
-        }
-    }
-
-    /// For each motor, the sum of the steps that took up backlash at rest; wraps.
-    pub fn backlash(&self) -> PagePoint {
-        self.backlash
-    }
-
-    /// Lowers the pen where the path ends so far.
-    ///
-    /// # Errors
-    /// [`PushError::Full`]; nothing is appended then.
-    pub fn push_dot(&mut self) -> Result<(), PushError> {
-        let dot = Block { ink: Some(LineType::Full), ..Block::EMPTY };
-        self.lookahead.push(dot).map_err(|_| PushError::Full)?;
-        self.last = None;
-        Ok(())
-    }
-
-    /// Ends the path with the last block, and with it a curve.
-    pub fn end_path(&mut self) {
-        self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
-        self.last = None;
-        self.slow_for_bends();
-    }
-
-    /// Slows down for bends that became known late: those on the current piece, or behind a cruise
-    /// that would pass them too fast.
-    #[inline(never)] // Inlined, it would only fill the cache.
-    fn slow_for_bends(&mut self) {
-        let late = self.lookahead.late_limit();
-        if let Some(course) = &mut self.course
-            && late < course.curve_limit
-        {
-            course.curve_limit = late;
-            if let Some(Plan::Profile(_)) = &self.plan {
-                self.plan_again();
-            }
-        }
-        let limit = self.lookahead.take_lowered();
-        if limit < PathLength::MAX
-            && let Some(Plan::Interval(interval)) = &self.plan
-            && interval.is_cruise()
-            && square(interval.state().speed.into()) > self.limits.squared_speed(limit)
-        {
-            self.give_plan_up();
-        }
-    }
-
     /// Begins to slow down on the path with the next slice or interval, until the machine is at
     /// rest on a whole step with the pen raised. If the pen was already told to go down on a
     /// travel, the travel is completed first.
     pub fn stop(&mut self) {
-        self.plan_again();
+        self.replan();
         self.stopping = true;
-    }
-
-    /// Discards the plan, unless that would cause a jerk: an interval in which the acceleration
-    /// changes is completed, which takes at most 42 ms, and 1.3 ms from a jerk of 20 m/s³ at 800
-    /// mm/s² on. A travel on which the pen was told to go down is completed, too. Returns the
-    /// stopping distance with which the plan would have ended the current piece.
-    fn break_plan_off(&mut self) -> Option<PathLength> {
-        if self.timing.is_lowering() {
-            return None;
-        }
-        match &self.plan {
-            Some(Plan::Interval(interval)) if interval.changes() => None,
-            _ => self.give_plan_up(),
-        }
-    }
-
-    /// Discards the plan after its last slice. Returns the stopping distance with which it would
-    /// have ended the current piece, if it was to end it.
-    fn give_plan_up(&mut self) -> Option<PathLength> {
-        match self.plan.take()? {
-            Plan::Profile(profile) => {
-                self.plan_end = PathSpeed::of_speed(&self.limits, profile.speed());
-                Some(profile.exit().stopping_distance)
-            }
-            Plan::Interval(interval) => {
-                let State { speed, ramp } = interval.state();
-                self.plan_end =
-                    PathSpeed { speed: SliceSpeed::from_bits(speed), ..PathSpeed::REST };
-                self.ramp = ramp;
-                None
-            }
-        }
-    }
-
-    /// Plans the rest of the current piece anew, from the next slice on.
-    fn plan_again(&mut self) {
-        if !self.stopping
-            && let Some(exit) = self.break_plan_off()
-        {
-            self.discarded_exit = Some(exit);
-        }
     }
 
     /// Stops before the next travel, with the pen up.
@@ -704,7 +369,6 @@ impl<'m> Runner<'m> {
         self.rest();
         self.stopping = false;
         self.stopping_after_stroke = false;
-        self.discarded_exit = None;
         self.last = None;
         self.in_stroke = false;
         self.end = self.position;
@@ -756,6 +420,7 @@ impl<'m> Runner<'m> {
             if course.begin_rest() {
                 break;
             }
+            let most = if self.in_stroke { Slice::MOST } else { Slice::MOST_OF_TRAVEL };
             let slice = match &mut self.plan {
                 None => {
                     let progress = self.plan(queue)?;
@@ -764,8 +429,8 @@ impl<'m> Runner<'m> {
                     }
                     continue;
                 }
-                Some(Plan::Profile(profile)) => profile.next_slice(&self.limits),
-                Some(Plan::Interval(interval)) => interval.next_slice(course.room()),
+                Some(Plan::Profile { profile, .. }) => profile.next_slice(&self.limits, most),
+                Some(Plan::Interval(interval)) => interval.next_slice(course.room(), most),
             };
             let Some(slice) = slice else {
                 self.end_plan();
@@ -778,42 +443,6 @@ impl<'m> Runner<'m> {
         }
         self.run_slice(queue)?;
         Ok(Progress::More)
-    }
-
-    /// Handles the end of a plan, which is carried out or has reached the end of the current piece.
-    fn end_plan(&mut self) {
-        let Some(course) = &self.course else {
-            return;
-        };
-        let ends = match &self.plan {
-            Some(Plan::Profile(profile)) => {
-                self.plan_end = profile.exit();
-                self.plan = None;
-                course.moves_done == course.piece_moves
-            }
-            Some(Plan::Interval(_)) if course.room() > 0 => {
-                self.give_plan_up();
-                false
-            }
-            // The interval goes on, unless the next piece begins at rest.
-            _ => {
-                let next = self.lookahead.front().filter(|_| course.is_last_piece());
-                if next.is_none_or(|block| block.entry_limit == 0) {
-                    self.rest();
-                }
-                true
-            }
-        };
-        if ends {
-            self.end_piece();
-        }
-    }
-
-    /// Records that nothing moves.
-    fn rest(&mut self) {
-        self.plan = None;
-        self.plan_end = PathSpeed::REST;
-        self.ramp = 0;
     }
 
     /// Hands over the moves of the current slice, as far as the queue has room.
@@ -874,15 +503,11 @@ impl<'m> Runner<'m> {
         self.emitter.split_long_wait(self.now, queue)
     }
 
-    fn top(&self, inked: bool) -> PathSpeed {
-        if inked { self.draw } else { self.travel }
-    }
-
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         let stroke_ends =
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
         let stops = self.stopping || (stroke_ends && self.pauses());
-        if stops && self.plan.is_none() && self.plan_end == PathSpeed::REST {
+        if stops && self.plan.is_none() && self.committed == Committed::REST {
             return self.come_to_rest(Progress::Stopped, queue);
         }
         let dot_length = self.pen.dot_length;
@@ -912,221 +537,10 @@ impl<'m> Runner<'m> {
         Ok(Progress::More)
     }
 
-    /// Raises the pen, and then ends the sequence of events.
-    fn come_to_rest(
-        &mut self,
-        standing: Progress,
-        queue: &mut dyn EventQueue,
-    ) -> Result<Progress, StepEvent> {
-        if self.pen_is_down != Some(false) {
-            self.move_pen(false, queue)?;
-            return Ok(Progress::More);
-        }
-        if self.wait_for_rising(queue)? {
-            return Ok(Progress::More);
-        }
-        if self.emitter.is_open() {
-            let at = self.emitter.rest(self.now, true, queue)?;
-            self.advance_to(at);
-        }
-        if standing == Progress::Done {
-            self.last = None;
-            self.in_stroke = false;
-        }
-        Ok(standing)
-    }
-
-    /// Moves the pen up or down, or one height further on its ramp. After the last height the dwell
-    /// passes. Hands over at most four events.
-    fn move_pen(&mut self, down: bool, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
-        let (height, dwell) = if down {
-            (self.pen.down_height, self.pen.down_ticks)
-        } else {
-            (self.pen.up_height, self.pen.up_ticks)
-        };
-        if let Some(passed) = self.lowered_while_moving(down) {
-            return self.dwell_for_pen(down, dwell.saturating_sub(passed), queue);
-        }
-        // While it moves it is neither up nor down.
-        self.pen_is_down = None;
-        self.waiting_top_speed = SliceSpeed::ZERO;
-        let was_known = self.lift.is_known();
-        if let Some(rule) = self.pen.lift
-            && let Some(next) = self.lift.next(rule, height)
-        {
-            if !self.emitter.is_open() {
-                self.emitter.hold(self.now, queue)?;
-            }
-            let at = self.emitter.lift(next, self.now, queue)?;
-            self.advance_to(at);
-            if !was_known && self.lift.is_known() {
-                self.lift.found(self.emitter.ticks());
-            }
-            let ticks = next.ticks.max(self.limits.setup_ticks);
-            self.now = self.now.wrapping_add(ticks << FRACTION_BITS);
-            return Ok(());
-        }
-        // At the start and after an emergency stop the height is unknown, and the pen is taken to
-        // be raised.
-        let from = self.pen_height.unwrap_or(self.pen.up_height);
-        let next = self.next_height(from, height);
-        let at = self.emitter.pen(next, self.now, queue)?;
-        self.advance_to(at);
-        self.pen_height = Some(next);
-        if next != height {
-            self.now = self.now.wrapping_add(self.pen.ramp_ticks << FRACTION_BITS);
-            return Ok(());
-        }
-        self.dwell_for_pen(down, dwell, queue)
-    }
-
-    /// Returns the next height of a pen that moves between two heights.
-    fn next_height(&self, from: u8, to: u8) -> u8 {
-        match to.cmp(&from) {
-            _ if self.pen.ramp_ticks == 0 || self.pen.lift.is_some() => to,
-            Ordering::Less => from - 1,
-            Ordering::Equal => to,
-            Ordering::Greater => from + 1,
-        }
-    }
-
-    /// Lets the dwell pass after the pen was sent to its last height.
-    fn dwell_for_pen(
-        &mut self,
-        down: bool,
-        dwell: u32,
-        queue: &mut dyn EventQueue,
-    ) -> Result<(), StepEvent> {
-        self.pen_is_down = Some(down);
-        #[cfg(feature = "resume")]
-        if !down {
-            self.raised_at = self.emitter.ticks();
-        }
-        let dwell = if down { dwell } else { self.begin_rising(dwell) };
-        // Two waits of up to 0.67 s: the settings allow no longer dwell. With the pen raised, the
-        // queue may run dry in the second.
-        let half = dwell.div_ceil(2).min(StepEvent::MAX_TICKS);
-        self.now = self.now.wrapping_add(half << FRACTION_BITS);
-        let at = if down {
-            self.emitter.hold(self.now, queue)?
-        } else {
-            self.emitter.pause(self.now, queue)?
-        };
-        self.advance_to(at);
-        self.now = self.now.wrapping_add(half << FRACTION_BITS);
-        let at = self.emitter.hold(self.now, queue)?;
-        self.advance_to(at);
-        Ok(())
-    }
-
     /// Delays the plan to the time `at`, until which the pins needed.
     fn advance_to(&mut self, at: u32) {
         let late = at.wrapping_sub(whole_ticks(self.now));
         self.now = self.now.wrapping_add(late);
-    }
-
-    /// Plans the rest of the current piece.
-    fn plan(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
-        let Some(course) = &mut self.course else {
-            return Ok(Progress::More);
-        };
-        let at_rest = self.plan_end == PathSpeed::REST;
-        if self.stopping && at_rest {
-            return self.come_to_rest(Progress::Stopped, queue);
-        }
-        #[cfg(not(feature = "pen-overlap"))]
-        let inked = course.is_inked();
-        #[cfg(feature = "pen-overlap")]
-        let inked = {
-            let stays_raised = PenTiming::stays_raised(&self.pen, self.pen_is_down);
-            course.is_inked() && !(stays_raised && course.takes_up_backlash())
-        };
-        if at_rest {
-            // Before a stroke, the machine may come to rest once more so that motors take up their
-            // backlash.
-            #[cfg(feature = "pen-overlap")]
-            let must_move =
-                self.pen_is_down != Some(inked) && (inked || !self.timing.is_lowering());
-            #[cfg(not(feature = "pen-overlap"))]
-            let must_move = self.pen_is_down != Some(inked);
-            if must_move {
-                if inked && self.wait_for_rising(queue)? {
-                    return Ok(Progress::More);
-                }
-                self.move_pen(inked, queue)?;
-                return Ok(Progress::More);
-            }
-            if !self.emitter.is_open() {
-                self.emitter.hold(self.now, queue)?;
-            }
-        }
-        if course.moves_done == 0 && !course.takes_up_backlash() {
-            let units = self.brake.step_length(course.move_length);
-            queue.set_step_length(units, self.emitter.has_stepped())?;
-        }
-        let top = if inked { self.draw } else { self.timing.travel_top(self.travel) };
-        let stopping = self.stopping && !self.timing.is_lowering();
-        if let Some(jerk) = self.limits.jerk {
-            let state = State { speed: self.plan_end.speed.to_bits(), ramp: self.ramp };
-            let mut path_limits = PathLimits {
-                limits: &self.limits,
-                jerk,
-                top: top.speed,
-                room: course.room(),
-                curve_limit: course.curve_limit,
-                beyond: course.is_last_piece().then_some(&self.lookahead),
-            };
-            if stopping {
-                let least = jerk.braking_distance(state, 0);
-                if least <= path_limits.room {
-                    path_limits.room = course.stop_behind(least);
-                    (path_limits.top, path_limits.beyond) = (self.plan_end.speed, None);
-                } else {
-                    path_limits.top = SliceSpeed::ZERO;
-                }
-            }
-            self.plan = Some(Plan::Interval(path_limits.next(state)));
-            return self.planned(inked, at_rest, queue);
-        }
-        let left = course.left();
-        if let Some(exit) = self.discarded_exit.take() {
-            // The discarded plan would have reached this exit. The speed was rounded when it was
-            // recovered by a square root, which must not make the exit unreachable.
-            let bound = left.saturating_add(exit);
-            self.plan_end.stopping_distance = self.plan_end.stopping_distance.min(bound);
-        }
-        let mut top = top;
-        if course.curve_limit < top.stopping_distance {
-            if self.curve.stopping_distance != course.curve_limit {
-                self.curve = PathSpeed::of_stopping_distance(&self.limits, course.curve_limit);
-            }
-            top = self.curve;
-        }
-        let (length, exit_allowed) = if stopping {
-            let least = u64::from(self.plan_end.stopping_distance.to_bits()) << 14;
-            let length = course.to_whole_step(least).div_ceil(1 << 14) as u32;
-            (PathLength::from_bits(length).min(left), PathLength::ZERO)
-        } else {
-            let is_last = course.is_last_piece();
-            let exit_allowed = if is_last {
-                self.lookahead.entry_allowed(top.stopping_distance, &self.limits)
-            } else {
-                PathLength::ZERO
-            };
-            let may_change =
-                is_last && self.lookahead.is_short() && exit_allowed < top.stopping_distance;
-            self.provisional_exit = may_change.then_some(exit_allowed);
-            (left, exit_allowed)
-        };
-        // Constructed in place, because a copy costs as much as the plan.
-        self.plan = Some(Plan::Profile(Profile::new(
-            &self.limits,
-            self.plan_end,
-            length,
-            top,
-            exit_allowed,
-        )));
-        self.planned(inked, at_rest, queue)
     }
 
     /// Begins the next piece of a dotted line, or ends the block.
@@ -1147,11 +561,6 @@ impl<'m> Runner<'m> {
         }
         self.course = None;
     }
-}
-
-/// Whether the machine may pass from one block to the next without coming to rest.
-fn passes(before: Option<LineType>, after: Option<LineType>) -> bool {
-    before == after && matches!(after, None | Some(LineType::Full))
 }
 
 #[cfg(test)]

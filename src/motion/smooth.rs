@@ -322,20 +322,22 @@ impl Interval {
         let acceleration = (u64::from(limit.jerk.get()) * longest) >> 12;
         let is_straight =
             |slices: &u32| acceleration * u64::from(slices * slices) <= MOST_DEVIATION * 8;
-        let stride = [Slice::MOST, 4, 2].into_iter().find(is_straight).unwrap_or(1);
+        let strides = [Slice::most(from.speed), 8, 4, 2];
+        let stride = strides.into_iter().find(is_straight).unwrap_or(1);
         let (growth, stride, speed) = (growth as i8, stride as u8, from.speed);
         Self { limit, from, growth, stride, slices, done: 0, speed, rest: Slice::default() }
     }
 
     /// Returns the next slice, or as much of it as fits `room` (in units of 2^-32 mm); `None` at
-    /// the end of the interval or without room.
+    /// the end of the interval or without room. It merges at most `most` ordinary slices.
     #[inline(never)] // Without a limit of jerk, it would only fill the cache.
-    pub(super) fn next_slice(&mut self, room: u64) -> Option<Slice> {
+    pub(super) fn next_slice(&mut self, room: u64, most: u32) -> Option<Slice> {
         if room == 0 {
             return None;
         }
         // The rest of a slice is completed to a whole one.
-        let missing = (u32::from(self.stride) * Slice::TIME).saturating_sub(self.rest.time);
+        let missing =
+            (u32::from(self.stride).min(most) * Slice::TIME).saturating_sub(self.rest.time);
         let slices = ((missing / Slice::TIME) as u16).min(self.slices - self.done);
         let is_even = self.growth == 0 && self.from.ramp == 0;
         if slices > 0 && (is_even || self.rest.distance == 0) {
@@ -670,7 +672,7 @@ mod tests {
                 let path_limits =
                     PathLimits { limits: &limits, jerk, top, room, curve_limit, beyond: None };
                 let mut interval = path_limits.next(state);
-                while let Some(slice) = interval.next_slice(room) {
+                while let Some(slice) = interval.next_slice(room, Slice::MOST) {
                     room -= u64::from(slice.distance);
                 }
                 state = interval.state();
@@ -691,7 +693,7 @@ mod tests {
         let interval = Interval::new(limit, from, 7, limit.slices());
         let all = |room: u64| {
             let mut interval = interval;
-            core::iter::from_fn(|| interval.next_slice(room))
+            core::iter::from_fn(|| interval.next_slice(room, Slice::MOST))
                 .map(|slice| (u64::from(slice.distance), u64::from(slice.time)))
                 .fold((0, 0), |sum, slice| (sum.0 + slice.0, sum.1 + slice.1))
         };

@@ -73,8 +73,8 @@ fn a_height_that_changes_in_a_hold_counts_when_the_pen_goes_down_again() {
 > hold
 < ok
 > wait
-= down 525 steps to 1000,0
-= Hold at 1000,0
+= down 530 steps to 1005,0
+= Hold at 1005,0
 > $211=100
 < ok
 > $100=70
@@ -83,7 +83,7 @@ fn a_height_that_changes_in_a_hold_counts_when_the_pen_goes_down_again() {
 < ok
 > wait
 = the pen at height 100
-= down 3000 steps to 4000,0
+= down 2995 steps to 4000,0
 = up 4000 steps to 0,0
 = Idle at 0,0
 ";

@@ -128,7 +128,7 @@ impl Runner<'_> {
     fn time_to_stroke(&self) -> Option<u64> {
         let (distance, later) = self.distance_to_stroke()?;
         let time = match self.plan.as_ref()? {
-            Plan::Profile(profile) => {
+            Plan::Profile { profile, .. } => {
                 let exit = profile.exit();
                 // If the stopping distance at the exit equals the remaining distance, the machine
                 // brakes from there to rest, which takes v/a.

@@ -118,6 +118,6 @@ impl Runner<'_> {
 
     /// Whether the path ends within a full line that may be continued.
     pub fn is_in_line(&self) -> bool {
-        self.last.is_some_and(|(_, _, ink)| ink == Some(crate::drawing::LineType::Full))
+        self.last.is_some_and(|last| last.ink == Some(crate::drawing::LineType::Full))
     }
 }
