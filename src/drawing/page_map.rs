@@ -32,8 +32,9 @@ impl Bounds {
             Projection::Perspective => i64::from(vertex.z.max(1)),
             Projection::Parallel => 1,
         };
-        let image = [vertex.x, vertex.y].map_each(|c| (i64::from(c) << Self::FRACTION_BITS) / w);
-        self.add_point(image);
+        // The divisor is at least 1.
+        let ratio = |c: i32| (i64::from(c) << Self::FRACTION_BITS).checked_div(w).unwrap_or(0);
+        self.add_point([ratio(vertex.x), ratio(vertex.y)]);
     }
 
     /// Extends the bounds to a position of a plan, in units of 2^-`fraction_bits` mm.

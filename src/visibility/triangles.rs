@@ -161,8 +161,8 @@ struct Plane {
 impl Plane {
     /// Returns the coordinate plane to which a polygon is most nearly parallel. Returns `None` if
     /// the polygon has no area.
-    fn of(polygon: &mut dyn Iterator<Item = Vertex>) -> Option<Self> {
-        let areas = areas(polygon);
+    fn of(mut polygon: impl Iterator<Item = Vertex>) -> Option<Self> {
+        let areas = areas(&mut polygon);
         let leans_to = (0..3).rev().max_by_key(|&axis| areas[axis].abs())?;
         (areas[leans_to] != 0).then_some(Self { leans_to, flipped: areas[leans_to] < 0 })
     }
@@ -190,7 +190,7 @@ pub fn cut_of<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> Cut {
         return Cut::None;
     }
     let at = |corner: &Corner<I>| vertices[corner.vertex().get()];
-    let Some(plane) = Plane::of(&mut corners.iter().map(at)) else {
+    let Some(plane) = Plane::of(corners.iter().map(at)) else {
         return Cut::None;
     };
     if corners.len() == 3 {
@@ -224,7 +224,7 @@ fn cut_ears<I: Index>(
     yield_counter: &mut YieldCounter<'_>,
 ) -> Result<usize, VisibilityError> {
     let at = |number: I| vertices[number.get()];
-    let Some(plane) = Plane::of(&mut polygon.iter().map(|&number| at(number))) else {
+    let Some(plane) = Plane::of(polygon.iter().map(|&number| at(number))) else {
         return Ok(0);
     };
     let mut count = 0;
