@@ -11,16 +11,16 @@ mod polargraph;
 use self::answers::{Answers, say};
 use super::open;
 use super::settings::{as_json, change, is_same, read};
+use super::squares::{self, MARGIN};
 use crate::cli::PlotterArgs;
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::link::SerialLink;
 use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
-use crate::progress::Quiet;
 use crate::sender::{Sender, Timeouts};
 use penup::machine::Setting;
-use penup_job::protocol::{CLEAR, HOME, PEN_DOWN, Status};
+use penup_job::protocol::{HOME, PEN_DOWN, Status};
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
@@ -30,8 +30,8 @@ const LONG: f64 = 100.0;
 /// The speed of all moves, in mm/min.
 const SPEED: f64 = 1000.0;
 
-/// The side of the test square, and its distance from the edges of the sheet, in mm.
-const SQUARE: [f64; 2] = [40.0, 10.0];
+/// The side of the test square, in mm.
+const SQUARE: f64 = 40.0;
 
 /// How long a plotter is waited for after its power came back.
 const START: Duration = Duration::from_secs(60);
@@ -291,15 +291,14 @@ impl Setup<'_> {
     fn draw_test(&mut self, sender: &mut Sender<'_>) -> Result<(), End> {
         self.set(sender, Setting::SoftLimits, 1.0)?;
         say("5 of 5: a test square.");
-        let [side, from] = SQUARE;
         let question = format!(
-            "Draw a square of {side} mm, {from} mm from the corner of the sheet? Put a pen in \
+            "Draw a square of {SQUARE} mm, {MARGIN} mm from the corner of the sheet? Put a pen in \
              first."
         );
         if self.answers.is_yes(&question)? {
-            draw_square(sender)?;
+            squares::draw(sender, &[SQUARE])?;
             say(&format!(
-                "Measure it: each side is {side} mm, and both diagonals are the same. If not, run \
+                "Measure it: each side is {SQUARE} mm, and both diagonals are the same. If not, run \
                  `penup setup` again."
             ));
         }
@@ -349,26 +348,4 @@ fn expect_origin(sender: &mut Sender<'_>) -> Result<(), End> {
     }
     say(&format!("The plotter was not switched off: it takes its place for {place} mm."));
     Err(End::BrokenOff)
-}
-
-/// Draws the test square, and takes it from the plotter again.
-fn draw_square(sender: &mut Sender<'_>) -> Result<(), Error> {
-    let [side, from] = SQUARE;
-    let to = side + from;
-    let lines = [
-        CLEAR.to_owned(),
-        format!("v {from} {from} 0"),
-        format!("v {to} {from} 0"),
-        format!("v {to} {to} 0"),
-        format!("v {from} {to} 0"),
-        "l 1 2 3 4 1".to_owned(),
-        "$fit=off".to_owned(),
-        format!("$page={0}x{0}", to + from),
-        format!("$margin={from}"),
-    ];
-    for line in &lines {
-        sender.ask(line)?;
-    }
-    sender.plot(&mut Quiet)?;
-    sender.ask(CLEAR).map(drop)
 }
