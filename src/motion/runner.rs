@@ -1060,7 +1060,7 @@ impl<'m> Runner<'m> {
     /// Plans the rest of the current piece.
     fn plan(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         #[cfg(feature = "input-shaping")]
-        if self.waits_for_copies() && !self.let_copies_rest(queue)? {
+        if !self.shaper.is_resting() && !self.are_copies_ready(queue)? {
             return Ok(Progress::More);
         }
         let is_shaped = self.is_shaped();

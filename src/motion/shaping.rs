@@ -38,13 +38,14 @@ use crate::fixed::Millimetres;
 /// The number of copies that a shaper makes at most.
 const MOST_PULSES: usize = 3;
 
-/// The least time that an entry of the delay line lasts, in sixteenths of ticks: 0.66 ms.
-pub(super) const RUN_TIME: u32 = 1 << 18;
+/// The least time that an entry of the delay line lasts, in sixteenths of ticks: 1.3 ms.
+pub(super) const RUN_TIME: u32 = 1 << 19;
 
-/// The number of entries of the delay line.
-pub(super) const RUNS: usize = 200;
+/// The number of entries of the delay line, each of 12 bytes. They are on the stack of a board, and
+/// while it starts, several times.
+pub(super) const RUNS: usize = 100;
 
-/// The longest delay for which the delay line has room, in sixteenths of ticks: 126 ms. Entries
+/// The longest delay for which the delay line has room, in sixteenths of ticks: 121 ms. Entries
 /// besides are for a run that is cut short at a rest and for those that bring the copies to it.
 const LONGEST_DELAY: u32 = (RUNS as u32 - 8) * RUN_TIME;
 

@@ -57,16 +57,25 @@ impl Runner<'_> {
         self.shaper.make_steps(&self.limits, self.brake, &mut self.emitter, queue)
     }
 
-    /// Whether all copies must be at rest before the plan goes on: the pen is to move, or the steps
-    /// that come next take up backlash, which are not shaped.
-    #[inline(always)]
-    pub(super) fn waits_for_copies(&self) -> bool {
-        !self.shaper.is_resting() && self.plan_end == PathSpeed::REST && {
-            let must_rest = |course: &BlockCursor| {
-                course.takes_up_backlash() || self.pen_is_down != Some(course.is_inked())
-            };
-            self.course.as_ref().is_some_and(must_rest)
+    /// Lets all copies come to rest if they must before the plan goes on: the pen is to move, or
+    /// the steps that come next take up backlash, which are not shaped. Returns whether it may go
+    /// on; otherwise the queue has no room.
+    ///
+    /// # Errors
+    /// The event that the queue refused although it had room.
+    #[inline(never)] // Only with this setting: inlined, it would fill the cache.
+    pub(super) fn are_copies_ready(
+        &mut self,
+        queue: &mut dyn EventQueue,
+    ) -> Result<bool, StepEvent> {
+        let must_rest = |course: &BlockCursor| {
+            course.takes_up_backlash() || self.pen_is_down != Some(course.is_inked())
+        };
+        let at_rest = self.plan_end == PathSpeed::REST;
+        if at_rest && self.course.as_ref().is_some_and(must_rest) {
+            return self.let_copies_rest(queue);
         }
+        Ok(true)
     }
 
     /// Lets all copies come to rest where the plan is. Returns whether they are, and the queue has
