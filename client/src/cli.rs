@@ -93,6 +93,8 @@ pub enum Command {
     Again(AgainArgs),
     /// Set up a new machine step by step: directions, steps in a mm, pen, origin, test square
     Setup(PlotterArgs),
+    /// Draw squares that show at what frequency the machine shakes, for input shaping
+    Shake(PlotterArgs),
     /// Talk to a plotter line by line
     Console(ConsoleArgs),
     /// Print the completions for a shell
@@ -140,7 +142,8 @@ impl Command {
             | Self::Abort(plotter)
             | Self::Home(plotter)
             | Self::Unlock(plotter)
-            | Self::Setup(plotter) => &plotter.format,
+            | Self::Setup(plotter)
+            | Self::Shake(plotter) => &plotter.format,
             Self::Tape(TapeCommand::Decode { format, .. })
             | Self::Completions { format, .. }
             | Self::Man { format, .. } => format,

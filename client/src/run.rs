@@ -78,6 +78,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
         }
         Command::Again(args) => operate::again(args, quiet, interrupt),
         Command::Setup(args) => operate::setup(args, interrupt),
+        Command::Shake(args) => operate::shake(args, interrupt),
         Command::Console(args) => operate::console(&args.port, args.format.json, interrupt),
         Command::Completions { shell, .. } => Ok(manual::completions(*shell)),
         Command::Man { folder, .. } => manual::pages(folder.as_deref()),

@@ -135,6 +135,34 @@ fn backlash_is_taken_up_while_the_pen_draws_curves() -> Result<(), Box<dyn Error
     Ok(())
 }
 
+/// With different shapers on a CoreXY machine, and as fast as motion is shaped, 40,000 steps a
+/// second.
+#[test]
+fn shaped_motion_has_the_same_steps_at_the_same_times() -> Result<(), Box<dyn Error>> {
+    let slow = ["$230=1", "$227=12", "$228=31", "$226=2", "$page=30x25"];
+    let fast = [
+        "$100=400",
+        "$101=400",
+        "$120=4000",
+        "$121=4000",
+        "$201=5990",
+        "$202=5990",
+        "$238=0",
+        "$227=25",
+        "$228=20",
+        "$226=3",
+        "$page=40x30",
+    ];
+    for settings in [&slow[..], &fast] {
+        let lines = LOOPS.iter().chain(&["l 6 10", "$fit=on", "$margin=5"]);
+        let job = lines.chain(settings).chain(&["$plot"]).map(|line| (*line).to_owned());
+        let (strokes, pulses, noted) = draw_in_time(&job.collect::<Vec<_>>())?;
+        println!("{settings:?}: {strokes} strokes, {pulses} pulses, noted within {noted} us");
+        assert!(pulses > 4_000, "{pulses}");
+    }
+    Ok(())
+}
+
 #[test]
 fn a_motor_raises_the_pen_after_an_emergency_stop() -> Result<(), Box<dyn Error>> {
     stop_at_once(&PICO)

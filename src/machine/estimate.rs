@@ -67,9 +67,8 @@ impl Estimate {
     /// Adds the time of the current part and begins a new one.
     fn end_part(&mut self, settings: &Settings) {
         let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
-        let acceleration = [Setting::AccelerationX, Setting::AccelerationY];
-        let acceleration = acceleration.map_each(|setting| settings.positive_bits(setting));
-        let acceleration = acceleration[0].min(acceleration[1]);
+        let (acceleration, _) = settings.acceleration_and_corners();
+        let acceleration = u64::from(acceleration.to_bits().unsigned_abs()).max(1);
         let per_second = settings.positive_bits(speed) / 60;
         self.milliseconds += rest_to_rest(self.length >> 2, per_second, acceleration);
         // Each change of speed takes longer by about the time in which the acceleration builds up.

@@ -119,11 +119,14 @@ impl Machine<'_> {
             if queue.room() < crate::motion::Runner::ROOM {
                 return true;
             }
-            if self.runner.rest_on_paper(queue).is_err() {
-                self.alarm(super::Alarm::Queue);
-                return true;
+            match self.runner.rest_on_paper(queue) {
+                Ok(true) => self.rest = StrokeRest::Planned,
+                Ok(false) => return true,
+                Err(_) => {
+                    self.alarm(super::Alarm::Queue);
+                    return true;
+                }
             }
-            self.rest = StrokeRest::Planned;
         }
         if self.rest == StrokeRest::Planned && !self.log.is_open() {
             self.rest = StrokeRest::None;

@@ -159,10 +159,14 @@ impl Limits {
     ///
     /// The brake decelerates by 1/32 more than the machine accelerates, so that it never slows a
     /// plan that is in time. Only above `BUSY_RATE` it may decelerate more, up to four times as
-    /// much.
+    /// much, and at half as much again where motion is shaped: where the copies of both axes
+    /// accelerate at different times, each axis keeps the acceleration, but both together may have
+    /// √2 times as much.
     pub fn brake(&self, longer: u64, queue: u32) -> BrakeRule {
         let acceleration = u64::from(self.acceleration.to_bits());
         let harder = if MAY_BE_BUSY { self.least_braking(queue) } else { 0 };
+        #[cfg(feature = "input-shaping")]
+        let harder = if self.shaping.is_some() { harder.max(acceleration * 3 / 2) } else { harder };
         let braking = (acceleration + acceleration / 32).max(harder).clamp(1, u64::from(u32::MAX));
         let [x, y] = self.step_length.map(|step| u64::from(step.to_bits()));
         let longest_step = longer * hypotenuse(x, y);

@@ -4,6 +4,8 @@ use super::emitter::Train;
 use super::lookahead::{BlockKind, Chord, MOST_CHORDS};
 use super::profile::Slice;
 use super::{Block, PathLength};
+#[cfg(feature = "input-shaping")]
+use crate::array::MapEach;
 use crate::drawing::LineType;
 use crate::step::{Line, Pattern};
 
@@ -290,6 +292,26 @@ impl BlockCursor {
     pub(super) fn next_due(&self) -> Option<u32> {
         let moves = self.slice.as_ref().filter(|moves| moves.left > 0)?;
         Some(moves.due >> Train::BITS_BELOW)
+    }
+
+    /// How far the plan is ahead of the moves made, for each motor, in 2^-32 steps.
+    #[cfg(feature = "input-shaping")]
+    pub(super) fn ahead(&self) -> [i64; 2] {
+        const HALF: i64 = 1 << 31;
+        // The next move is due half of it before its end, and it is not much further away.
+        let to_next = (self.to_next << 30).checked_div(self.move_length).unwrap_or(0) << 2;
+        let mut moves = HALF - i64::try_from(to_next).unwrap_or(HALF);
+        // The length of a move is rounded down, so the plan may seem to be behind the last one.
+        if self.line.remaining() == 0 {
+            moves = moves.min(0);
+        }
+        let [lag, fewer, more] = self.line.ahead();
+        let slower = ((lag << 32) + fewer * moves).checked_div(more).unwrap_or(0);
+        let [straight, diagonal] = self.line.moves().map_each(|direction| direction.delta());
+        let motor = |straight: i32, diagonal: i32| {
+            i64::from(straight) * moves + i64::from(diagonal - straight) * slower
+        };
+        [motor(straight.0, diagonal.0), motor(straight.1, diagonal.1)]
     }
 
     /// Begins the next piece of a dotted line.

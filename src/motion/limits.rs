@@ -1,5 +1,7 @@
 //! The settings of motion, converted to the units in which motion is computed.
 
+#[cfg(feature = "input-shaping")]
+use super::shaping::{MOST_SHAPED_STEPS, Shaping};
 use super::smooth::{JerkLimit, State};
 use super::{PathLength, SLICE_TICKS, SliceSpeed, StepEvent, TICKS_PER_SECOND};
 use crate::fixed::Millimetres;
@@ -63,6 +65,22 @@ pub enum LimitsError {
     /// together.
     #[cfg(feature = "spread-backlash")]
     BacklashOfBelts,
+    /// Motion is to be shaped on a polargraph, whose pen does not move as the sum of its motors, or
+    /// together with what moves the pen or the motors beside the plan, or in bends of any speed.
+    #[cfg(feature = "input-shaping")]
+    ShapingConflict,
+    /// A frequency is so low that the copies of the motion would not fit into the memory.
+    #[cfg(feature = "input-shaping")]
+    ShapingFrequency {
+        /// The least frequency that works, in hundredths of hertz.
+        least: u32,
+    },
+    /// More steps a second are asked for than are shaped.
+    #[cfg(feature = "input-shaping")]
+    ShapedSteps {
+        /// The most steps a second.
+        possible: u32,
+    },
     /// So many steps per second are asked for that the pulses would merge: lower the speed or the
     /// width of the pulse.
     TooManySteps {
@@ -98,6 +116,9 @@ pub struct Limits {
     pub(super) rounding: PathLength,
     pub(super) pulse_ticks: u32,
     pub(super) setup_ticks: u32,
+    /// The shapers of both axes; `None` if motion is not shaped.
+    #[cfg(feature = "input-shaping")]
+    pub(super) shaping: Option<Shaping>,
 }
 
 impl Default for Limits {
@@ -119,6 +140,8 @@ impl Default for Limits {
             rounding: rounding([step_length; 2]),
             pulse_ticks: 50,
             setup_ticks: 25,
+            #[cfg(feature = "input-shaping")]
+            shaping: None,
         }
     }
 }
@@ -182,6 +205,8 @@ impl Limits {
             rounding: rounding(step_length),
             pulse_ticks: settings.pulse_ticks.max(1),
             setup_ticks: settings.direction_setup_ticks,
+            #[cfg(feature = "input-shaping")]
+            shaping: None,
         };
         let held = limits.held_by(settings.queue_steps);
         limits.draw_speed = draw_speed.min(held);
@@ -196,6 +221,23 @@ impl Limits {
         });
         limits.check_step_rate()?;
         Ok(limits)
+    }
+
+    /// The same limits for motion that is shaped.
+    ///
+    /// # Errors
+    /// [`LimitsError::ShapedSteps`] if that would be too many steps a second.
+    #[cfg(feature = "input-shaping")]
+    pub fn shaped(self, shaping: Option<Shaping>) -> Result<Self, LimitsError> {
+        let shaped = Self { shaping, ..self };
+        let asked = self.step_rate(self.draw_speed.max(self.travel_speed));
+        // Changes of direction come between the steps at any speed, and leave room for that.
+        let pulses = TICKS_PER_SECOND.checked_div(2 * self.least_interval()).unwrap_or(u32::MAX);
+        let possible = pulses.min(MOST_SHAPED_STEPS);
+        if shaping.is_some() && asked > u64::from(possible) {
+            return Err(LimitsError::ShapedSteps { possible });
+        }
+        Ok(shaped)
     }
 
     fn check_step_rate(&self) -> Result<(), LimitsError> {

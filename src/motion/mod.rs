@@ -37,6 +37,10 @@ mod limits;
 mod lookahead;
 mod profile;
 mod runner;
+#[cfg(feature = "input-shaping")]
+mod shaper;
+#[cfg(feature = "input-shaping")]
+mod shaping;
 mod smooth;
 mod steady;
 
@@ -52,6 +56,8 @@ pub use runner::PenOverlap;
 #[cfg(feature = "spread-backlash")]
 pub use runner::{BacklashTakeUp, Reversal};
 pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
+#[cfg(feature = "input-shaping")]
+pub use shaping::{Resonance, ShaperKind, Shaping};
 pub use steady::SteadySpeed;
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.

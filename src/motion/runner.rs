@@ -8,6 +8,8 @@ mod pen_moves;
 mod plan;
 #[cfg(feature = "spread-backlash")]
 mod reversals;
+#[cfg(feature = "input-shaping")]
+mod shaped;
 
 use append::{Chord, LastMove};
 pub use append::{Move, PushError};
@@ -27,6 +29,8 @@ use super::lift::{Lift, LiftRule};
 use super::limits::{mm_per_min, square};
 use super::lookahead::{BlockKind, is_in_line};
 use super::profile::{FRACTION_BITS, PathSpeed, Profile, Slice};
+#[cfg(feature = "input-shaping")]
+use super::shaper::Shaper;
 use super::smooth::{Interval, PathLimits, State};
 use super::{
     Block, BrakeRule, Emitter, EventQueue, Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed,
@@ -70,6 +74,8 @@ pub struct Runner<'m> {
     lookahead: Lookahead<'m>,
     curvature: Curvature,
     emitter: Emitter,
+    #[cfg(feature = "input-shaping")]
+    shaper: Shaper,
     course: Option<BlockCursor>,
     plan: Option<Plan>,
     /// The state of motion at the commit point, if nothing is planned from there on.
@@ -139,6 +145,8 @@ impl<'m> Runner<'m> {
             lookahead: Lookahead::new(blocks),
             curvature: Curvature::default(),
             emitter: Emitter::new(&limits),
+            #[cfg(feature = "input-shaping")]
+            shaper: Shaper::new(),
             course: None,
             plan: None,
             committed: Committed::REST,
@@ -190,6 +198,8 @@ impl<'m> Runner<'m> {
         }
         self.pen = pen;
         self.emitter.set_limits(&limits);
+        #[cfg(feature = "input-shaping")]
+        self.shaper.set_shaping(limits.shaping);
         self.lookahead.pass_limits_on(limits.jerk.is_none());
         self.set_override(100, 100);
     }
@@ -208,6 +218,9 @@ impl<'m> Runner<'m> {
     /// far enough.
     pub fn stopping_ticks(&self) -> u32 {
         let end = self.planned_speed().to_bits();
+        // The copies of faster motion may come later.
+        #[cfg(feature = "input-shaping")]
+        let end = if self.is_shaped() { 0 } else { end };
         let speed = self.top(self.in_stroke).speed.max(self.waiting_top_speed).to_bits();
         let change = speed.saturating_sub(end / 8 * 3);
         let slices = change.checked_div(self.limits.acceleration.to_bits()).unwrap_or(u32::MAX);
@@ -291,18 +304,23 @@ impl<'m> Runner<'m> {
         self.course.is_none() && self.lookahead.is_empty()
     }
 
-    /// Ends the events of all blocks that are carried out, and leaves the pen where it is.
+    /// Ends the events of all blocks that are carried out, and leaves the pen where it is. Returns
+    /// whether that is done; otherwise the queue has no room.
     ///
     /// # Errors
     /// The event that the queue refused although it had room.
     #[cfg(feature = "resume")]
     #[inline(never)] // Rarely called: inlined, it would fill the cache.
-    pub fn rest_on_paper(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+    pub fn rest_on_paper(&mut self, queue: &mut dyn EventQueue) -> Result<bool, StepEvent> {
+        #[cfg(feature = "input-shaping")]
+        if !self.let_copies_rest(queue)? {
+            return Ok(false);
+        }
         if self.emitter.is_open() {
             let at = self.emitter.rest(self.now, true, queue)?;
             self.advance_to(at);
         }
-        Ok(())
+        Ok(true)
     }
 
     /// What has been carried out since the runner was created.
@@ -371,6 +389,8 @@ impl<'m> Runner<'m> {
         self.stopping_after_stroke = false;
         self.last = None;
         self.in_stroke = false;
+        #[cfg(feature = "input-shaping")]
+        self.shaper.forget();
         self.end = self.position;
         self.backlash_end = self.backlash;
         self.page_end = page;
@@ -408,6 +428,10 @@ impl<'m> Runner<'m> {
     /// # Errors
     /// The event that the queue refused although it had room.
     pub fn produce(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        #[cfg(feature = "input-shaping")]
+        if !self.shaper.is_resting() && !self.make_waiting_steps(queue)? {
+            return Ok(Progress::More);
+        }
         if self.course.is_none() {
             let progress = self.begin_block(queue)?;
             if self.course.is_none() {
@@ -447,6 +471,12 @@ impl<'m> Runner<'m> {
 
     /// Hands over the moves of the current slice, as far as the queue has room.
     fn run_slice(&mut self, queue: &mut dyn EventQueue) -> Result<(), StepEvent> {
+        #[cfg(feature = "input-shaping")]
+        if self.is_shaped()
+            && self.course.as_ref().is_some_and(|course| !course.takes_up_backlash())
+        {
+            return self.shape_slice(queue);
+        }
         let Some(course) = &mut self.course else {
             return Ok(());
         };
@@ -503,6 +533,12 @@ impl<'m> Runner<'m> {
         self.emitter.split_long_wait(self.now, queue)
     }
 
+    /// Whether motion is shaped. The shaper tells the brake how long the steps are.
+    #[cfg(not(feature = "input-shaping"))]
+    const fn is_shaped(&self) -> bool {
+        false
+    }
+
     fn begin_block(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
         let stroke_ends =
             self.in_stroke && self.lookahead.front().is_some_and(|block| block.ink.is_none());
@@ -529,7 +565,7 @@ impl<'m> Runner<'m> {
         if course.reverses() {
             self.reversals.add(Reversal::new(self.emitter.ticks(), self.position, self.backlash));
         }
-        if self.plan.is_some() {
+        if self.plan.is_some() && !self.is_shaped() {
             // The current interval continues with these moves.
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;

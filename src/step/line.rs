@@ -153,6 +153,17 @@ impl Line {
         self.remaining = self.remaining.saturating_sub(moves as u32);
     }
 
+    /// How far the true line is ahead of the moves made, and how far a move leads, both along the
+    /// axis of fewer moves: two numerators, for steps, over the third number.
+    #[cfg(feature = "input-shaping")]
+    pub(crate) fn ahead(&self) -> [i64; 3] {
+        let [fewer, rest] =
+            [self.straight_gain, self.diagonal_loss].map_each(|twice| i64::from(twice / 2));
+        let more = fewer + rest;
+        // A line begins with a balance of 2 fewer - more.
+        [i64::from(self.balance) + more - 2 * fewer, 2 * fewer, 2 * more]
+    }
+
     /// The number of moves still to come.
     pub const fn remaining(&self) -> u32 {
         self.remaining

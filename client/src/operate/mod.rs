@@ -6,6 +6,8 @@ mod rehearsal;
 mod settings;
 mod settings_file;
 mod setup;
+mod shake;
+mod squares;
 mod status;
 
 pub use console::console;
@@ -15,6 +17,7 @@ pub(crate) use settings::read as read_settings;
 pub use settings::{restore, save, set, show};
 pub use settings_file::{SavedSettings, SettingsFileError};
 pub use setup::setup;
+pub use shake::shake;
 pub use status::{ports, status};
 
 use crate::cli::{PlotterArgs, PortArgs};

@@ -12,19 +12,16 @@ mod polargraph;
 use self::answers::{Answers, say};
 use super::open;
 use super::settings::{as_json, change, read};
+use super::squares::{self, MARGIN};
 use crate::cli::PlotterArgs;
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::link::SerialLink;
-use crate::machine_settings::{AssignedSetting, simulated};
+use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
-use crate::preview::InMemory;
-use crate::progress::Quiet;
 use crate::sender::{Sender, Timeouts};
 use penup::machine::Setting;
 use penup_job::protocol::{HOME, PEN_DOWN, Status};
-use penup_job::room::Room;
-use penup_readers::lines::JobLine;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -34,8 +31,8 @@ const LONG: f64 = 100.0;
 /// The speed of all moves, in mm/min.
 const SPEED: f64 = 1000.0;
 
-/// The side of the test square, and its distance from the edges of the sheet, in mm.
-const SQUARE: [f64; 2] = [40.0, 10.0];
+/// The side of the test square, in mm.
+const SQUARE: f64 = 40.0;
 
 /// How long a plotter is waited for after its power came back.
 const START: Duration = Duration::from_secs(60);
@@ -294,15 +291,14 @@ impl Setup<'_> {
     fn draw_test(&mut self, sender: &mut Sender<'_>) -> Result<(), End> {
         self.set(sender, Setting::SoftLimits, 1.0)?;
         say("5 of 5: a test square.");
-        let [side, from] = SQUARE;
         let question = format!(
-            "Draw a square of {side} mm, {from} mm from the corner of the sheet? Put a pen in \
+            "Draw a square of {SQUARE} mm, {MARGIN} mm from the corner of the sheet? Put a pen in \
              first."
         );
         if self.answers.is_yes(&question)? {
-            draw_square(sender)?;
+            squares::draw(sender, &[SQUARE])?;
             say(&format!(
-                "Measure it: each side is {side} mm, and both diagonals are the same. If not, run \
+                "Measure it: each side is {SQUARE} mm, and both diagonals are the same. If not, run \
                  `penup setup` again."
             ));
         }
@@ -377,30 +373,4 @@ fn room_for_moves(status: &Status, settings: &[AssignedSetting]) -> Result<[f64;
         status.position, travel[0], travel[1], room[0], room[1]
     ));
     Err(End::BrokenOff)
-}
-
-/// Draws the test square. This computer computes it and sends its stroke, so it depends on no
-/// option of an earlier job, changes none, and leaves the model in the plotter's memory alone.
-fn draw_square(sender: &mut Sender<'_>) -> Result<(), Error> {
-    let [side, from] = SQUARE;
-    let to = side + from;
-    let lines = [
-        format!("v {from} {from} 0"),
-        format!("v {to} {from} 0"),
-        format!("v {to} {to} 0"),
-        format!("v {from} {to} 0"),
-        "l 1 2 3 4 1".to_owned(),
-        format!("$page={0}x{0}", to + from),
-        format!("$margin={from}"),
-    ]
-    .map(JobLine::command);
-    let settings = simulated(&read(sender)?)?;
-    let mut host = InMemory::<u32>::new(Room::for_job(&lines), settings);
-    if !host.take(&lines) {
-        let reason = "this machine cannot draw the test square".to_owned();
-        return Err(Error::NotStreamed { reason });
-    }
-    let form = sender.form(&settings)?;
-    let (streamed, _) = host.streamed(form, 0)?;
-    sender.draw_streamed(&streamed, &mut Quiet)
 }

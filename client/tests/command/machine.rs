@@ -1015,3 +1015,26 @@ fn what_the_machine_cannot_draw_is_told_before_it_is_sent() {
     assert_eq!(code, Some(0), "{error}");
     assert!(said.starts_with("a.obj is drawn: 1 strokes, 270.0 mm drawn"), "{said}");
 }
+
+#[test]
+fn squares_show_how_the_machine_shakes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let (_, said) = plotter.json(folder.path(), &["shake"]);
+    // The defaults are 50 mm/s and 800 mm/s².
+    assert_eq!(said["speed"], 50.0, "{said}");
+    assert_eq!(said["run_up"], 1.5625, "{said}");
+    assert_eq!(said["shaped"], false, "{said}");
+    let (_, status) = plotter.json(folder.path(), &["status"]);
+    assert_eq!(status["strokes"], serde_json::json!({ "done": 3, "all": 3 }));
+    let (code, _, error) = plotter.run(folder.path(), &["set", "226=1", "227=20", "228=25"]);
+    assert_eq!(code, Some(0), "{error}");
+    let (code, said, error) = plotter.run(folder.path(), &["shake"]);
+    assert_eq!(code, Some(0), "{error}");
+    assert!(said.contains("frequency = 50 x wiggles / mm"), "{said}");
+    assert!(said.contains("Motion is shaped ($226)"), "{said}");
+    // An own frequency that the shaper cannot have is refused by the one that it can.
+    let (code, _, error) = plotter.run(folder.path(), &["set", "227=2"]);
+    assert_eq!(code, Some(4), "{error}");
+    assert!(error.contains("such a shaper works from 4."), "{error}");
+}

@@ -12,4 +12,5 @@ mod fixtures;
 mod homing;
 mod pen;
 mod pen_overlap;
+mod shaping;
 mod underrun;

@@ -4,6 +4,8 @@ use super::{Setting, Settings, Value};
 use crate::array::MapEach;
 use crate::machine::{Kinematics, Tool};
 use crate::motion::{BrakeRule, Limits, LimitsError, MotionSettings, PathLength};
+#[cfg(feature = "input-shaping")]
+use crate::motion::{Resonance, ShaperKind, Shaping};
 use crate::order::TimeModel;
 
 impl Settings {
@@ -14,7 +16,11 @@ impl Settings {
     pub(super) fn check(&self) -> Result<(), LimitsError> {
         Kinematics::check(self)?;
         Tool::check(self)?;
-        Limits::new(&self.motion_settings()).map(|_| ())
+        let limits = Limits::new(&self.motion_settings())?;
+        #[cfg(feature = "input-shaping")]
+        limits.shaped(self.shaping()?)?;
+        let _ = limits;
+        Ok(())
     }
 
     /// Returns the limits that the motion planner needs if this many steps are sure to wait in the
@@ -22,12 +28,17 @@ impl Settings {
     ///
     /// Speed and acceleration are measured along the path, so the slower axis determines both.
     pub fn limits(&self, queue: u32) -> Limits {
-        self.limits_with(self.get(Setting::TravelSpeed), self.get(Setting::Jerk), queue)
+        let limits =
+            self.limits_with(self.get(Setting::TravelSpeed), self.get(Setting::Jerk), queue);
+        // `set` refuses whatever would be refused here.
+        #[cfg(feature = "input-shaping")]
+        let limits = limits.shaped(self.shaping().unwrap_or_default()).unwrap_or(limits);
+        limits
     }
 
     /// Returns the limits for homing. They differ from [`Settings::limits`] in two ways: the speed
-    /// with the pen up is that of the setting `travel`, and the jerk is not limited, because the
-    /// machine must brake soon at a switch.
+    /// with the pen up is that of the setting `travel`, and the jerk is not limited nor motion
+    /// shaped, because the machine must brake soon at a switch.
     pub(in crate::machine) fn limits_at(&self, travel: Setting, queue: u32) -> Limits {
         self.limits_with(self.get(travel), Value::ZERO, queue)
     }
@@ -50,6 +61,8 @@ impl Settings {
         let asked = speeds.into_iter().map(|speed| self.get(speed)).fold(Value::ZERO, Value::max);
         let asked = asked.min(self.axes_rate());
         let limits = self.limits_with(asked, Value::ZERO, queue);
+        #[cfg(feature = "input-shaping")]
+        let limits = limits.shaped(self.shaping().unwrap_or_default()).unwrap_or(limits);
         let held = limits.greatest_rate();
         // A speed is rounded by less than that.
         let is_less = asked - held > const { Value::lit("0.001") };
@@ -97,20 +110,69 @@ impl Settings {
         self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
     }
 
+    /// The greatest acceleration along the path in mm/s², and the junction deviation in mm. Shaped
+    /// motion has lesser ones where it would leave the path too far.
+    #[inline(never)] // Inlining it at every call would cost too much flash.
+    pub(in crate::machine) fn acceleration_and_corners(&self) -> (Value, Value) {
+        let acceleration = self.get(Setting::AccelerationX).min(self.get(Setting::AccelerationY));
+        let corners = self.get(Setting::JunctionDeviation);
+        #[cfg(feature = "input-shaping")]
+        if let Ok(Some(shaping)) = self.shaping() {
+            let deviation = self.get(Setting::ShapingDeviation);
+            if deviation > 0 {
+                return shaping.bounds(deviation, acceleration, corners);
+            }
+        }
+        (acceleration, corners)
+    }
+
+    /// The shapers of both axes; `None` if motion is not shaped.
+    ///
+    /// # Errors
+    /// [`LimitsError::ShapingConflict`] or [`LimitsError::ShapingFrequency`].
+    #[cfg(feature = "input-shaping")]
+    #[inline(never)] // Inlining it at every call would cost too much flash.
+    pub(in crate::machine) fn shaping(&self) -> Result<Option<Shaping>, LimitsError> {
+        let kind = match self.whole(Setting::Shaper) {
+            0 => return Ok(None),
+            1 => ShaperKind::Zv,
+            2 => ShaperKind::Zvd,
+            _ => ShaperKind::Ei,
+        };
+        // With these the pen would not draw the sum of the copies, or not when it is expected.
+        let couples_axes = match self.kinematics() {
+            Kinematics::Cartesian => false,
+            Kinematics::CoreXy => true,
+            Kinematics::Polargraph(_) => return Err(LimitsError::ShapingConflict),
+        };
+        let moves_beside = self.is_on(Setting::PenDownEarly)
+            || self.is_on(Setting::TravelEarly)
+            || self.is_on(Setting::BacklashDistance);
+        if moves_beside || !self.is_on(Setting::Centripetal) {
+            return Err(LimitsError::ShapingConflict);
+        }
+        let resonance = Resonance {
+            kind,
+            hertz: [Setting::ShakeX, Setting::ShakeY].map(|axis| self.get(axis)),
+            damping: self.get(Setting::Damping),
+        };
+        let shaping = Shaping::new(&resonance, couples_axes);
+        shaping.map(Some).map_err(|least| LimitsError::ShapingFrequency { least })
+    }
+
     /// Returns the settings in the units of the motion planner.
     fn motion_settings(&self) -> MotionSettings {
         let steps = self.page_steps();
         let motor_ratio = Kinematics::properties(self).motor_ratio;
+        let (acceleration_mm_per_s2, junction_deviation_mm) = self.acceleration_and_corners();
         MotionSettings {
             steps_per_mm: steps,
             motor_steps_per_mm: steps[0].max(steps[1]).saturating_mul(motor_ratio),
             draw_mm_per_min: self.get(Setting::DrawSpeed).min(self.axes_rate()),
             travel_mm_per_min: self.get(Setting::TravelSpeed).min(self.axes_rate()),
-            acceleration_mm_per_s2: self
-                .get(Setting::AccelerationX)
-                .min(self.get(Setting::AccelerationY)),
+            acceleration_mm_per_s2,
             jerk_m_per_s3: self.get(Setting::Jerk),
-            junction_deviation_mm: self.get(Setting::JunctionDeviation),
+            junction_deviation_mm,
             centripetal: self.is_on(Setting::Centripetal),
             pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),
             direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),

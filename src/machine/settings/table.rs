@@ -139,6 +139,19 @@ pub enum Setting {
     /// `$225` How long before the pen is up a travel begins; no longer than `$212`.
     #[cfg(feature = "pen-overlap")]
     TravelEarly,
+    /// `$226` How motion is shaped so that the machine does not shake: 0 not at all, 1 ZV, 2 ZVD,
+    /// 3 EI.
+    #[cfg(feature = "input-shaping")]
+    Shaper,
+    /// `$227` The frequency at which x shakes; 0 if x is not shaped.
+    #[cfg(feature = "input-shaping")]
+    ShakeX,
+    /// `$228` The frequency at which y shakes; 0 if y is not shaped.
+    #[cfg(feature = "input-shaping")]
+    ShakeY,
+    /// `$229` The damping ratio: how soon the shaking ends by itself.
+    #[cfg(feature = "input-shaping")]
+    Damping,
     /// `$230` The kinematics of the machine: 0 Cartesian, 1 CoreXY, 2 polargraph.
     Kinematics,
     /// `$231` The distance from the left anchor of the belts to the right one.
@@ -158,6 +171,9 @@ pub enum Setting {
     /// 0 to take it up at rest.
     #[cfg(feature = "spread-backlash")]
     BacklashDistance,
+    /// `$238` How far the pen may be off the line where motion is shaped; 0 for no limit.
+    #[cfg(feature = "input-shaping")]
+    ShapingDeviation,
     /// `$240` The x coordinate at which the pen is parked (G28).
     ParkX,
     /// `$241` The y coordinate at which the pen is parked (G28).
@@ -198,9 +214,9 @@ impl SettingInfo {
 }
 
 /// All units of settings. A row holds the index of its unit, which takes less flash than a text.
-const UNITS: [&str; 14] = [
+const UNITS: [&str; 15] = [
     "", "us", "ms", "mm", "m", "mm/min", "mm/s2", "m/s3", "step/mm", "mask", "0|1", "0|1|2",
-    "0|1|2|3", "of 127",
+    "0|1|2|3", "of 127", "Hz",
 ];
 
 /// Returns the index of a unit. A unit that is not among them does not compile.
@@ -342,6 +358,14 @@ pub const SETTINGS: &[SettingInfo] = {
         row(PenDownEarly, 224, "pen goes down before a travel ends", "ms", (0.0, 500.0, 0.0), false),
         #[cfg(feature = "pen-overlap")]
         row(TravelEarly, 225, "travel begins before the pen is up", "ms", (0.0, 500.0, 0.0), false),
+        #[cfg(feature = "input-shaping")]
+        row(Shaper, 226, "input shaping: off, ZV, ZVD, EI", "0|1|2|3", (0.0, 3.0, 0.0), true),
+        #[cfg(feature = "input-shaping")]
+        row(ShakeX, 227, "x shakes at", "Hz", (0.0, 500.0, 40.0), false),
+        #[cfg(feature = "input-shaping")]
+        row(ShakeY, 228, "y shakes at", "Hz", (0.0, 500.0, 40.0), false),
+        #[cfg(feature = "input-shaping")]
+        row(Damping, 229, "damping ratio of the shaking", "", (0.0, 0.5, 0.1), false),
         row(Kinematics, 230, "kinematics", "0|1|2", (0.0, 2.0, 0.0), true),
         row(AnchorWidth, 231, "distance between anchors", "mm", (100.0, 8000.0, 800.0), false),
         row(AnchorLeft, 232, "left anchor to the origin", "mm", (0.0, 8000.0, 190.0), false),
@@ -351,6 +375,8 @@ pub const SETTINGS: &[SettingInfo] = {
         row(BacklashY, 236, "backlash of y", "mm", (0.0, 10.0, 0.0), false),
         #[cfg(feature = "spread-backlash")]
         row(BacklashDistance, 237, "backlash taken up within", "mm", (0.0, 10.0, 0.0), false),
+        #[cfg(feature = "input-shaping")]
+        row(ShapingDeviation, 238, "shaping rounds lines by", "mm", (0.0, 10.0, 0.25), false),
         row(ParkX, 240, "park at x", "mm", (0.0, 8000.0, 0.0), false),
         row(ParkY, 241, "park at y", "mm", (0.0, 8000.0, 0.0), false),
     ]

@@ -120,6 +120,10 @@ impl Tool {
             Self::Actuator => 0,
             Self::Stepper => 2 * stepper::move_milliseconds(settings),
         };
+        // The copies of shaped motion come to rest before the pen goes down, and before it goes up.
+        #[cfg(feature = "input-shaping")]
+        let moves = moves
+            + settings.shaping().ok().flatten().map_or(0, |it| 2 * u64::from(it.milliseconds()));
         u64::from(dwells) + moves
     }
 }

@@ -96,6 +96,10 @@ impl Runner<'_> {
         standing: Progress,
         queue: &mut dyn EventQueue,
     ) -> Result<Progress, StepEvent> {
+        #[cfg(feature = "input-shaping")]
+        if !self.let_copies_rest(queue)? {
+            return Ok(Progress::More);
+        }
         if self.pen_is_down != Some(false) {
             self.move_pen(false, queue)?;
             return Ok(Progress::More);

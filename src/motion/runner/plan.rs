@@ -155,6 +155,11 @@ impl Runner<'_> {
 
     /// Plans the rest of the current piece.
     pub(super) fn plan(&mut self, queue: &mut dyn EventQueue) -> Result<Progress, StepEvent> {
+        #[cfg(feature = "input-shaping")]
+        if !self.shaper.is_resting() && !self.are_copies_ready(queue)? {
+            return Ok(Progress::More);
+        }
+        let is_shaped = self.is_shaped();
         let Some(course) = &mut self.course else {
             return Ok(Progress::More);
         };
@@ -188,7 +193,7 @@ impl Runner<'_> {
                 self.emitter.hold(self.now, queue)?;
             }
         }
-        if course.moves_done == 0 && !course.takes_up_backlash() {
+        if course.moves_done == 0 && !course.takes_up_backlash() && !is_shaped {
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }

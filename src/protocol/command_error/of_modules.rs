@@ -290,6 +290,30 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
             error(151, "setting conflicts with another"),
             format_args!("belts take slack up at rest only: set $237=0, or $230=0 or 1"),
         ),
+        #[cfg(feature = "input-shaping")]
+        SettingError::Conflict(LimitsError::ShapingConflict) => row(
+            error(151, "setting conflicts with another"),
+            format_args!(
+                "shaped motion takes $203=1, $224=0, $225=0, $230=0 or 1, and $237=0: set these, \
+                 or $226=0"
+            ),
+        ),
+        #[cfg(feature = "input-shaping")]
+        SettingError::Conflict(LimitsError::ShapingFrequency { least }) => row(
+            error(151, "setting conflicts with another"),
+            format_args!(
+                "such a shaper works from {}.{:02} Hz on: set $227 and $228 to that or 0, or $226=1",
+                least / 100,
+                least % 100
+            ),
+        ),
+        #[cfg(feature = "input-shaping")]
+        SettingError::Conflict(LimitsError::ShapedSteps { possible }) => row(
+            error(151, "setting conflicts with another"),
+            format_args!(
+                "at most {possible} steps a second are shaped: set lesser speeds, or $226=0"
+            ),
+        ),
         SettingError::Conflict(_) => row(
             error(151, "setting conflicts with another"),
             format_args!("with it the steps would come too fast or the ramps too slow"),
