@@ -1,6 +1,6 @@
 //! Options that change nothing in a drawing, of which the user is told.
 //!
-//! Each row of [`RULES`] says when some options change nothing, and why. Whether an option changes
+//! Each row of `RULES` says when some options change nothing, and why. Whether an option changes
 //! something in this very model is not asked, only whether it could. Options that contradict each
 //! other, or that need another one, are refused by the command line.
 

@@ -1,8 +1,8 @@
 //! Drives the RP2040's USB controller as a device with the endpoints of one serial port (data
 //! sheet, section 4.1).
 //!
-//! [`Bus`] is the driver that the crate `usb-device` asks for, [`buffers`] is what both sides
-//! share, and [`endpoints`] has what that crate leaves undone. Nothing here panics, waits for the
+//! [`Bus`] is the driver that the crate `usb-device` asks for, `buffers` is what both sides
+//! share, and `endpoints` has what that crate leaves undone. Nothing here panics, waits for the
 //! host, or needs an allocator or a lock: the interrupt handler calls it, or code that masks that
 //! handler.
 //!
