@@ -38,14 +38,14 @@ use crate::fixed::Millimetres;
 /// The number of copies that a shaper makes at most.
 const MOST_PULSES: usize = 3;
 
-/// The least time that an entry of the delay line lasts, in sixteenths of ticks: 1.3 ms.
-pub(super) const RUN_TIME: u32 = 1 << 19;
+/// The least time that an entry of the delay line lasts, in sixteenths of ticks: 2.6 ms.
+pub(super) const RUN_TIME: u32 = 1 << 20;
 
 /// The number of entries of the delay line, each of 12 bytes. They are on the stack of a board, and
 /// while it starts, several times.
-pub(super) const RUNS: usize = 100;
+pub(super) const RUNS: usize = 60;
 
-/// The longest delay for which the delay line has room, in sixteenths of ticks: 121 ms. Entries
+/// The longest delay for which the delay line has room, in sixteenths of ticks: 136 ms. Entries
 /// besides are for a run that is cut short at a rest and for those that bring the copies to it.
 const LONGEST_DELAY: u32 = (RUNS as u32 - 8) * RUN_TIME;
 
@@ -385,6 +385,7 @@ mod tests {
         let (acceleration, junction) = bounds(0.25);
         assert!((acceleration - 0.8 * 2f64.sqrt() * 0.25 / 0.025f64.powi(2)).abs() < 0.1);
         let change = (8.0 * acceleration * junction).sqrt();
-        assert!((change * (0.0125 + 0.000164) - 0.05).abs() < 0.001, "{change}");
+        let cut = f64::from(RUN_TIME) / PER_SECOND as f64 / 4.0;
+        assert!((change * (0.0125 + cut) - 0.05).abs() < 0.001, "{change}");
     }
 }

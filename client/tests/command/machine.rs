@@ -1036,5 +1036,5 @@ fn squares_show_how_the_machine_shakes() {
     // An own frequency that the shaper cannot have is refused by the one that it can.
     let (code, _, error) = plotter.run(folder.path(), &["set", "227=2"]);
     assert_eq!(code, Some(4), "{error}");
-    assert!(error.contains("such a shaper works from 4."), "{error}");
+    assert!(error.contains("such a shaper works from 3."), "{error}");
 }
