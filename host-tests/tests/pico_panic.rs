@@ -92,6 +92,10 @@ fn a_panic_raises_the_pen_is_reported_at_both_ports_and_the_job_goes_on() -> Tes
         let usb = heard_by_usb(&mut line.emulator, "ALARM:101")?;
         assert!(usb.contains(&message), "{usb}");
         while !line.hear()?.starts_with("ALARM:101") {}
+        // The servo gets its next pulse within 20 ms.
+        for _ in 0..10 {
+            line.status()?;
+        }
 
         // The pen is up and the drivers are off.
         changes.extend(line.emulator.pin_changes()?);
