@@ -108,6 +108,12 @@ enum State {
     ComingToRest,
 }
 
+/// Returns the numbers of the faster motor, 0 or 1, and of the other one. The compiler sees that
+/// they are in range.
+fn roles(faster: usize) -> [usize; 2] {
+    if faster == 0 { [0, 1] } else { [1, 0] }
+}
+
 impl Shaper {
     /// A shaper at rest.
     pub(super) const fn new() -> Self {
@@ -343,16 +349,16 @@ impl Shaper {
         // The weights are half as large where both motors move both axes.
         let speeds = self.axes(speeds);
         let sizes = speeds.map_each(i64::unsigned_abs);
-        let other = 1 - self.faster;
+        let [faster, other] = roles(self.faster);
         // Where both are equally fast, their roles stay, so that the steps follow each other evenly:
         // while the other one falls behind by no more than a quarter of a step in this segment.
         let quarter = STEP.unsigned_abs() / 4;
         let lags = self.ahead[other].unsigned_abs() > 3 * quarter;
-        let excess = sizes[other].saturating_sub(sizes[self.faster]);
+        let excess = sizes[other].saturating_sub(sizes[faster]);
         if excess > 0 && (lags || excess.saturating_mul(time.into()) > quarter) {
             self.faster = other;
         }
-        let faster = self.faster;
+        let [faster, _] = roles(self.faster);
         let way = STEP / 2 - speeds[faster].signum() * self.ahead[faster];
         let way = way.max(0).cast_unsigned() << TIME_BITS;
         let next = way.checked_div(sizes[faster]).unwrap_or(u64::MAX);
@@ -374,7 +380,7 @@ impl Shaper {
         emitter: &Emitter,
         queue: &mut dyn EventQueue,
     ) -> Result<(), StepEvent> {
-        let (faster, slower) = (segment.faster, 1 - segment.faster);
+        let [faster, slower] = roles(segment.faster);
         let sizes = segment.speeds.map_each(i64::unsigned_abs);
         // In 1/256, so that the length, which is off by less than 1 %, stays the same on a line.
         let ratio = (sizes[slower] << 8).checked_div(sizes[faster]).unwrap_or(0).min(1 << 8) as u16;
@@ -394,7 +400,7 @@ impl Shaper {
     /// The step of each motor when the faster one makes its next step.
     fn steps_at(&self, segment: &Segment) -> [i32; 2] {
         let Segment { speeds, faster, next, interval, .. } = *segment;
-        let slower = 1 - faster;
+        let [faster, slower] = roles(faster);
         // No more than this time and half an interval passes, in which it moves by a step at most.
         let time = ((next + interval / 2) >> TIME_BITS).cast_signed();
         let ahead = self.ahead[slower] + speeds[slower] * time;

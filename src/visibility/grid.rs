@@ -109,10 +109,9 @@ const FACES_FOR_EACH_SHEET: usize = 2;
 const MANY_FACES: usize = 4096;
 
 impl<'a, I: Index> Grid<'a, I> {
-    /// Whether there may be scenes in which sheets are looked for. A board that draws a model in
-    /// parts looks for them, because such models have many small faces. To other boards, whose
+    /// Whether there may be scenes in which sheets are looked for: on a computer. To boards, whose
     /// scenes are small, they are no gain.
-    const MAY_HAVE_SHEETS: bool = I::BITS > 16 || cfg!(feature = "tiles");
+    const MAY_HAVE_SHEETS: bool = I::BITS > 16;
 
     /// Returns the bytes that the coarsest grid, a single cell, needs.
     pub const fn least_bytes(faces: usize) -> usize {

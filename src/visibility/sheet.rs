@@ -95,7 +95,7 @@ impl<I: Index> SceneIndex<'_, I> {
                 }
             }
         }
-        if open.count > 0 {
+        if count == 0 || open.count > 0 {
             return None;
         }
         let middle = self.coarse_projection.middle(cell.low, cell.high);
