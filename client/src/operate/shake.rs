@@ -21,7 +21,8 @@ const SIDES: [f64; 3] = [60.0, 50.0, 40.0];
 /// Draws the squares, and says how they are read.
 ///
 /// # Errors
-/// As [`Sender::ask`](crate::sender::Sender::ask) and [`Sender::plot`](crate::sender::Sender::plot).
+/// As [`Sender::ask`](crate::sender::Sender::ask) and
+/// [`Sender::plot`](crate::sender::Sender::plot).
 pub fn shake(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let _moving = MovingPlotter::new();
     let settings = converse(args, interrupt, |sender| {
