@@ -153,8 +153,12 @@ impl<'a> ChosenSides<'a> {
                     // The new side represents the edge from now on.
                     best = side;
                     next[side] = next[known];
-                    *(if before == I::NONE { head } else { &mut next[before.get()] }) =
-                        I::new(side);
+                    // The side before it is one of the sides.
+                    let link =
+                        if before == I::NONE { Some(head) } else { next.get_mut(before.get()) };
+                    if let Some(link) = link {
+                        *link = I::new(side);
+                    }
                     if chosen.contains(known) {
                         chosen.remove(known);
                         chosen.insert(best);
@@ -163,8 +167,10 @@ impl<'a> ChosenSides<'a> {
                 shared.insert(best);
                 let Some(crease) = crease else { continue };
                 let known_element = outlines.element(start_of(corners, known));
-                let at = |corner: &Corner<I>| vertices[corner.vertex().get()];
-                let (mut one, mut other) = (known_element.iter().map(at), element.iter().map(at));
+                // All vertices of elements exist.
+                let at = |corner: &Corner<I>| vertices.get(corner.vertex().get()).copied();
+                let mut one = known_element.iter().filter_map(at);
+                let mut other = element.iter().filter_map(at);
                 let end = vertices[from.get()];
                 if is_open
                     || is_bar(known_element)
