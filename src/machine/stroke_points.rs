@@ -80,7 +80,8 @@ impl Machine<'_> {
 
     /// Goes on to a target of the job that has just been appended. If a point lies there, no other
     /// target is read until the machine has rested.
-    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // It is called for each target, most of them in jobs without points.
+    // It is called for each target, most of them in jobs without points.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn pass_point(&mut self, target: Target, length: PathLength) {
         if self.points.distance > 0 {
             self.pass_next_point(target, length);
@@ -102,7 +103,8 @@ impl Machine<'_> {
 
     /// Plans the machine to its rest, if one is due, and goes on once that is noted. Returns
     /// whether the machine has to wait for that.
-    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // It is called for each slice, most of them without a rest.
+    // It is called for each slice, most of them without a rest.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn rests_in_stroke(&mut self, queue: &mut dyn EventQueue) -> bool {
         self.rest != StrokeRest::None && self.plan_rest(queue)
     }
@@ -136,7 +138,8 @@ impl Machine<'_> {
 
     /// Returns how many points have been passed if the machine rests at a point within a stroke
     /// that is not noted yet. [`Machine::point_noted`] lets it continue.
-    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // It is called in every turn of the main loop.
+    // It is called in every turn of the main loop.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub fn point_to_note(&self) -> Option<u32> {
         (self.rest == StrokeRest::Planned && self.is_stopped()).then_some(self.points.passed)
     }

@@ -135,7 +135,8 @@ fn path_point(limits: &Limits, point: PagePoint) -> PathPoint {
 }
 
 /// Computes the limit that results from the circle through three points.
-#[cfg_attr(not(feature = "lm3s6965"), inline(always))] // For the same reason as `extend`.
+// For the same reason as `extend`.
+#[cfg_attr(not(feature = "lm3s6965"), inline(always))]
 fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint) -> Circle {
     // All differences are within ±2^28, so products of two stay below 2^57.
     let (ax, ay) = (middle.x - first.x, middle.y - first.y);

@@ -60,7 +60,8 @@ impl Corner {
 ///
 /// Points lie on the grid of steps, so a corner may be mere rounding. It therefore counts as less
 /// sharp by as much as rounding can explain.
-#[cfg_attr(not(feature = "lm3s6965"), inline(always))] // Where each chord is pushed: elsewhere it would drive that out of the cache.
+// Where each chord is pushed: elsewhere it would drive that out of the cache.
+#[cfg_attr(not(feature = "lm3s6965"), inline(always))]
 pub(super) fn corner(
     limits: &Limits,
     before: Heading,
@@ -109,7 +110,8 @@ pub(super) fn corner(
 /// four times as long and more than 32 times what rounding explains. A single step beside a long
 /// line proves nothing. So a curve of single steps in which collinear ones are joined remains one
 /// curve.
-#[cfg_attr(not(feature = "lm3s6965"), inline(always))] // Like `corner`.
+// Like `corner`.
+#[cfg_attr(not(feature = "lm3s6965"), inline(always))]
 pub(super) fn bends_apart(limits: &Limits, one: PathLength, other: PathLength) -> bool {
     let (shorter, longer) = (one.min(other).to_bits(), one.max(other).to_bits());
     let rounding = limits.rounding.to_bits();
@@ -117,7 +119,8 @@ pub(super) fn bends_apart(limits: &Limits, one: PathLength, other: PathLength) -
 }
 
 /// Returns half the length of a vector whose components are within ±2^31; at most 2^30.
-#[cfg_attr(not(feature = "lm3s6965"), inline(always))] // Like `corner`.
+// Like `corner`.
+#[cfg_attr(not(feature = "lm3s6965"), inline(always))]
 fn half_length(x: i32, y: i32) -> u64 {
     let square = |part: i32| u64::from(part.unsigned_abs()) * u64::from(part.unsigned_abs());
     // With a unit of rounding, two directions can add up to 2^31, which fits 32 unsigned bits.

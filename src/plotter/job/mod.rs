@@ -221,7 +221,8 @@ impl<I: Index> Job<I> {
 
     /// Returns the strokes of `begun` if it is given, and otherwise those of the job.
     #[cfg(feature = "early-ink")]
-    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // Where steps are planned.
+    // Where steps are planned.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn strokes_of<'a>(
         &self,
         begun: Option<Begun<'a, I>>,

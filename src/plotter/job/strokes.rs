@@ -39,7 +39,8 @@ pub struct Cursor<I = u16> {
 
 impl<I> Cursor<I> {
     /// Index in the tour of the first segment of a stroke that is handed over from this one on.
-    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // Where steps are planned.
+    // Where steps are planned.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     fn stroke_start(&self, index: usize) -> usize {
         #[cfg(feature = "resume")]
         if let Some(first) = self.within
@@ -157,7 +158,8 @@ impl<'a, I: Index> Strokes<'a, I> {
 }
 
 impl<I: Index> Path for Strokes<'_, I> {
-    #[cfg_attr(not(feature = "lm3s6965"), inline(always))] // Where steps are planned, which is done for each chord.
+    // Where steps are planned, which is done for each chord.
+    #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     fn next_target(&mut self) -> Option<Target> {
         let ends = self.ends;
         if let Some(ends) = &ends
