@@ -1,7 +1,7 @@
 //! The replies to the user, written to the board as lines.
 //!
-//! Numbers of 16 bits are formatted as `u32`, because each type whose formatting a board stores takes
-//! some 160 bytes of its flash.
+//! Numbers of 16 bits are formatted as `u32`, because each type whose formatting a board stores
+//! takes some 160 bytes of its flash.
 
 use super::Board;
 use super::grbl::coordinate;
