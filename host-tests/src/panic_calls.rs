@@ -6,8 +6,10 @@
 
 use addr2line::gimli::{Dwarf, EndianSlice, LittleEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::error::Error;
+use std::path::Path;
 
 /// A call of a panic function.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
@@ -45,17 +47,19 @@ pub fn panic_calls(elf: &[u8]) -> Result<Vec<PanicCall>, Box<dyn Error>> {
         })?)?;
     let functions = functions(&file)?;
     let code = Code::new(&file)?;
+    let tails = panicking_tails(&functions, &code);
+    let callee = |target: u64| {
+        let (name, _) = functions.get(&target)?;
+        if panics(name) { Some(name) } else { tails.get(&target) }
+    };
     let mut calls = Vec::new();
     for (start, (name, end)) in &functions {
-        if panics(name) {
+        if panics(name) || tails.contains_key(start) {
             continue;
         }
         for (at, target) in code.branches(*start, *end) {
-            let Some((callee, _)) = functions.get(&target) else { continue };
-            if !panics(callee) {
-                continue;
-            }
-            let (file, line) = cause(&lines, at)?;
+            let Some(callee) = callee(target) else { continue };
+            let (file, line) = cause(&lines, at, name)?;
             calls.push(PanicCall { file, line, function: callee.clone() });
         }
     }
@@ -118,6 +122,32 @@ pub fn failed_checks(elf: &[u8]) -> Result<Vec<FailedCheck>, Box<dyn Error>> {
     Ok(checks)
 }
 
+/// Finds the instructions that several functions share and that end in a call of a panic function,
+/// with the name of that function, by their address. Where an image is made small, the compiler
+/// stores such instructions once (its machine outliner); each call of them is a call of the panic.
+fn panicking_tails(functions: &Functions, code: &Code<'_>) -> BTreeMap<u64, String> {
+    let mut tails: BTreeMap<u64, String> = BTreeMap::new();
+    // Shared instructions may call others.
+    loop {
+        let known = tails.len();
+        for (start, (name, end)) in functions {
+            if !name.starts_with("OUTLINED_FUNCTION_") {
+                continue;
+            }
+            for (_, target) in code.branches(*start, *end) {
+                let callee = functions.get(&target).map(|(name, _)| name);
+                let panic = callee.filter(|name| panics(name)).or_else(|| tails.get(&target));
+                if let Some(panic) = panic.cloned() {
+                    tails.insert(*start, panic);
+                }
+            }
+        }
+        if tails.len() == known {
+            return tails;
+        }
+    }
+}
+
 /// The name and end address of each function, by its address.
 type Functions = BTreeMap<u64, (String, u64)>;
 
@@ -142,20 +172,38 @@ fn functions(file: &object::File<'_>) -> Result<Functions, Box<dyn Error>> {
 /// The lines of a program by address.
 type Lines<'e> = addr2line::Context<EndianSlice<'e, LittleEndian>>;
 
-/// The file and line of the innermost function of the project at this address.
-fn cause(lines: &Lines<'_>, address: u64) -> Result<(String, u32), Box<dyn Error>> {
+/// The file and line of the innermost function of the project at this address, which is in the
+/// function `name`. An instruction that the compiler made of several lines has line 0, and often the
+/// file of another function. Then the file is that of the outermost module in the function's name.
+fn cause(lines: &Lines<'_>, address: u64, name: &str) -> Result<(String, u32), Box<dyn Error>> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("no project")?;
     let mut outermost = (String::new(), 0);
     let mut frames = lines.find_frames(address).skip_all_loads()?;
     while let Some(frame) = frames.next()? {
         let Some(location) = frame.location else { continue };
         let (file, line) = (location.file.unwrap_or_default(), location.line.unwrap_or(0));
-        let root = env!("CARGO_MANIFEST_DIR").trim_end_matches("host-tests");
-        if let Some(own) = file.strip_prefix(root).filter(|own| own.starts_with("src/")) {
-            return Ok((own.to_owned(), line));
+        let own = Path::new(file).strip_prefix(root).ok().filter(|own| own.starts_with("src"));
+        match (own, line) {
+            (Some(_), 0) => {
+                let inlined = frame.function.map(|name| name.demangle().map(Cow::into_owned));
+                let inlined = inlined.transpose()?.unwrap_or_default();
+                if let Some(module) = module(&inlined).or_else(|| module(name)) {
+                    let file = format!("src/{module}.rs");
+                    let is_file = root.join(&file).is_file();
+                    return Ok((if is_file { file } else { format!("src/{module}") }, 0));
+                }
+            }
+            (Some(own), line) => return Ok((own.to_string_lossy().into_owned(), line)),
+            (None, _) => {}
         }
-        outermost = (file.to_owned(), line);
+        outermost = (own.unwrap_or(Path::new(file)).to_string_lossy().into_owned(), line);
     }
     Ok(outermost)
+}
+
+/// The outermost module in the name of a function of the library.
+fn module(name: &str) -> Option<&str> {
+    name.split("penup::").nth(1)?.split("::").next()
 }
 
 /// The instructions of an image.

@@ -21,6 +21,16 @@ pub enum Axis {
     Y,
 }
 
+impl Axis {
+    /// The value of this axis, of those of x and y.
+    pub(super) fn of<T>(self, [x, y]: [T; 2]) -> T {
+        match self {
+            Self::X => x,
+            Self::Y => y,
+        }
+    }
+}
+
 /// The state of the limit switches: `true` where a switch is pressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -270,13 +280,14 @@ impl Machine<'_> {
         let pen = Tool::positions(&self.settings);
         self.runner.set_limits(self.settings.limits_at(speed, self.pins.queue()), pen);
         let properties = Kinematics::properties(&self.settings);
-        let axis = homing.axis as usize;
         let steps = |setting| {
-            let steps_per_mm = properties.steps_per_mm[axis];
+            let steps_per_mm = homing.axis.of(properties.steps_per_mm);
             self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT / 2)
         };
-        let distance =
-            homing.distance(steps(properties.homing_travel[axis]), steps(Setting::HomingPullOff));
+        let distance = homing.distance(
+            steps(homing.axis.of(properties.homing_travel)),
+            steps(Setting::HomingPullOff),
+        );
         let distance = if self.homes_low(homing.axis) { distance } else { -distance };
         let mut point = self.homing_position(self.planned_motors());
         let from = homing.pressed_at.unwrap_or(point);
@@ -336,10 +347,9 @@ impl Machine<'_> {
     fn set_homed(&mut self, axis: Axis) {
         let properties = Kinematics::properties(&self.settings);
         let mut position = self.homing_position(self.planned_motors());
-        let end =
-            if self.homes_low(axis) { None } else { Some(properties.homing_travel[axis as usize]) };
+        let end = if self.homes_low(axis) { None } else { Some(axis.of(properties.homing_travel)) };
         let homed = properties.homed_length.or(end).map_or(0, |setting| {
-            let steps_per_mm = properties.steps_per_mm[axis as usize];
+            let steps_per_mm = axis.of(properties.steps_per_mm);
             self.settings.millimetres_as_steps(setting, steps_per_mm)
         });
         match axis {

@@ -152,27 +152,21 @@ impl<'a, I: Index> Network<'a, I> {
         self.anchor.free_units()
     }
 
-    /// Returns where on the page a station lies.
-    #[cfg(feature = "early-ink")]
+    /// Returns where on the page a station lies; the anchor lies where the pen comes from.
     pub fn position(&self, station: I) -> PagePoint {
-        match self.at.get(station.get()) {
-            Some(point) => self.points[point.get()],
+        // Only the anchor is missing in `at`, and each entry of `at` is the number of a point.
+        let point = self.at.get(station.get()).and_then(|point| self.points.get(point.get()));
+        match point {
+            Some(&point) => point,
             None => self.anchor_place(),
         }
     }
 
     /// Returns where the anchor lies.
-    #[cfg(feature = "early-ink")]
     #[cold]
     #[inline(never)]
     fn anchor_place(&self) -> PagePoint {
         self.anchor.place().unwrap_or_default()
-    }
-
-    /// Returns where on the page a station lies.
-    #[cfg(not(feature = "early-ink"))]
-    pub fn position(&self, station: I) -> PagePoint {
-        self.points[self.at[station.get()].get()]
     }
 
     /// Returns the distance between two stations in 1/256 steps.

@@ -9,7 +9,7 @@ use crate::drawing::{Bounds, PageMap};
 use crate::index::Index;
 use crate::model::Corner;
 use crate::protocol::CommandError;
-use crate::stage::{Scratch, Stage, items_mut};
+use crate::stage::{OutOfScratch, Scratch, Stage, items_mut};
 use crate::view::{SightLines, distinct_edges};
 use crate::visibility::{EdgeParameter, Stretch, StretchSink};
 
@@ -52,7 +52,12 @@ pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found,
         error => CommandError::Solid(error),
     })?;
     let (shown, hidden) = (edges.shown, edges.hidden);
-    let (edge_words, line_words) = words.split_at_mut(Scratch::bytes_for::<[I; 2]>(most) / 8);
+    let edge_bytes = Scratch::bytes_for::<[I; 2]>(most);
+    // The search took at least that much.
+    let missing = OutOfScratch { needed: edge_bytes, available: size_of_val(words) };
+    let (edge_words, line_words) = words
+        .split_at_mut_checked(edge_bytes / size_of::<u64>())
+        .ok_or(CommandError::DrawingTooLarge(missing))?;
     let edges: &[[I; 2]] = items_mut(edge_words, most).unwrap_or(&mut []);
     let on_view = |ends: &[I; 2]| {
         let [p, q] = ends.map_each(|number| model.vertices().get(number.get()));

@@ -99,7 +99,9 @@ impl Settings {
     pub fn set(&mut self, setting: Setting, value: Value) -> Result<(), SettingError> {
         setting.info().check(value)?;
         let mut changed = *self;
-        changed.values[setting as usize] = value;
+        if let Some(slot) = changed.values.get_mut(setting as usize) {
+            *slot = value;
+        }
         changed.check().map_err(SettingError::Conflict)?;
         *self = changed;
         Ok(())
@@ -113,8 +115,10 @@ impl Settings {
         let known = |(number, value)| Setting::numbered(number).map(|setting| (setting, value));
         let mut restored = Self::default();
         for (setting, value) in values.clone().into_iter().filter_map(known) {
-            if setting.info().check(value).is_ok() {
-                restored.values[setting as usize] = value;
+            if setting.info().check(value).is_ok()
+                && let Some(slot) = restored.values.get_mut(setting as usize)
+            {
+                *slot = value;
             }
         }
         if restored.check().is_ok() {

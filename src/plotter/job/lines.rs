@@ -14,7 +14,10 @@ use crate::visibility::{SinkFull, Stretch, StretchSink};
 /// [`build_graph`](crate::drawing::build_graph) looks for them.
 pub(in crate::plotter) fn move_to_front(words: &mut [u64], at: usize, count: usize) {
     let line_words = Scratch::bytes_for::<PackedLine>(count) / size_of::<u64>();
-    words.copy_within(at..at + line_words, 0);
+    // All these words are there.
+    let start = at.min(words.len());
+    let end = start.saturating_add(line_words).min(words.len());
+    words.copy_within(start..end, 0);
 }
 
 /// Collects lines, packed, at the front of the memory. Lines without length are dropped.

@@ -207,11 +207,15 @@ impl FineLine {
     /// long. The result is in units of 2^-`bits` steps.
     #[inline(never)] // Inlining it at every call would cost too much flash.
     fn other_belt(&self, point: FinePoint, steps: i32, major: usize) -> i32 {
-        let change = i64::from((steps << self.bits) - point.belts[major]);
-        let change = change * i64::from(point.rates[1 - major]);
+        let major_first = |[first, second]: [i32; 2]| {
+            if major == 0 { [first, second] } else { [second, first] }
+        };
+        let [belt, other] = major_first(point.belts);
+        let [rate, other_rate] = major_first(point.rates);
+        let change = i64::from((steps << self.bits) - belt) * i64::from(other_rate);
         // The extrapolation covers a step or two, unless the belt lengths hardly change.
-        let change = change.checked_div(point.rates[major].into()).unwrap_or(0);
-        point.belts[1 - major].saturating_add(change as i32)
+        let change = change.checked_div(rate.into()).unwrap_or(0);
+        other.saturating_add(change as i32)
     }
 }
 
