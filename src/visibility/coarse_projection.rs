@@ -332,7 +332,7 @@ impl<'a> CoarseProjection<'a> {
         End { number: End::FREE, vertex, position: self.mapping.position(vertex) }
     }
 
-    /// Returns the view coordinates of a vertex, which exists, as the scene was checked.
+    /// Returns the view coordinates of a vertex.
     #[inline]
     pub fn vertex<I: Index>(&self, number: I) -> Vertex {
         self.vertices[number.get()]
