@@ -4,6 +4,7 @@
 
 use super::page::{GridPoint, Rectangle};
 use super::{LOOK, Listed, ModelSource, PLACE, Tiles};
+use crate::array::MapEach;
 use crate::geometry::Vertex;
 use crate::index::Index;
 use crate::model::{Corner, Element, Elements, PenWriter, Position};
@@ -203,7 +204,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         })?;
         let limit = <Corner<u16>>::VERTEX_NUMBER_LIMIT;
         if numbers.len() > limit {
-            return Err(OutOfScratch { needed: numbers.len(), available: limit }.into());
+            let [needed, available] = [numbers.len(), limit].map_each(Scratch::bytes_for::<Vertex>);
+            return Err(OutOfScratch { needed, available }.into());
         }
         let corners: &mut [Corner<u16>] = scratch.take(corner_count)?;
         let mut pens = PenWriter::new(scratch, changes)?;

@@ -108,10 +108,10 @@ pub(crate) fn cut<'a, I: Index>(
     heap_sort_by_key(keys, |key| *key);
     let keys = without_repeats(keys);
 
-    let too_many = OutOfScratch {
-        needed: vertices.len() + keys.len(),
-        available: <Corner<I>>::VERTEX_NUMBER_LIMIT,
-    };
+    // What cannot be numbered is refused as what does not fit, in bytes.
+    let counts = [vertices.len() + keys.len(), <Corner<I>>::VERTEX_NUMBER_LIMIT];
+    let [needed, available] = counts.map_each(Scratch::bytes_for::<Vertex>);
+    let too_many = OutOfScratch { needed, available };
     if too_many.needed > too_many.available {
         return Err(too_many);
     }
@@ -254,6 +254,27 @@ mod tests {
             }
         });
         found.map(|positions| positions.iter().map(|v| (v.x, v.y, v.z)).collect()).collect()
+    }
+
+    #[test]
+    fn more_vertices_than_numbers_are_refused_in_bytes() {
+        // Every bar is cut and adds a vertex, so the limit is passed by one.
+        let limit = <Corner>::VERTEX_NUMBER_LIMIT;
+        let bars = limit / 2 + 1;
+        let vertices: Vec<Vertex> =
+            (0..bars).map(|at| vertex(at as i32, 0, if at == 0 { 0 } else { 20 })).collect();
+        let corners: Vec<Corner> = (1..bars as u16)
+            .flat_map(|at| [Corner::new(0, true, false), Corner::new(at, true, true)])
+            .collect();
+        let mut words = std::vec![0u64; limit * 4];
+        let outcome =
+            cut(&vertices, Elements::new(&corners), 10, &mut Scratch::new(&mut words)).map(|_| ());
+        let size = size_of::<Vertex>();
+        let refused = OutOfScratch {
+            needed: ((2 * bars - 1) * size).next_multiple_of(8),
+            available: limit * size,
+        };
+        assert_eq!(outcome, Err(refused));
     }
 
     #[test]

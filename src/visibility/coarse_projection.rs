@@ -338,10 +338,11 @@ impl<'a> CoarseProjection<'a> {
         self.vertices[number.get()]
     }
 
-    /// Returns the position of a vertex on the coarse grid.
+    /// Returns the position of a vertex on the coarse grid. Every corner of a scene that is searched
+    /// is a vertex that exists ([`super::check`]).
     #[inline]
     pub fn position<I: Index>(&self, number: I) -> CoarsePoint {
-        self.positions[number.get()]
+        self.positions.get(number.get()).copied().unwrap_or_default()
     }
 
     /// Returns the line from vertex `a` to vertex `b`.

@@ -109,9 +109,9 @@ const FACES_FOR_EACH_SHEET: usize = 2;
 const MANY_FACES: usize = 4096;
 
 impl<'a, I: Index> Grid<'a, I> {
-    /// Whether there may be scenes in which sheets are looked for: on a computer. To boards, whose
-    /// scenes are small, they are no gain.
-    const MAY_HAVE_SHEETS: bool = I::BITS > 16;
+    /// Whether there may be scenes in which sheets are looked for: on a computer, and on a board
+    /// that draws large models tile by tile. The scenes of other boards are small.
+    const MAY_HAVE_SHEETS: bool = I::BITS > 16 || cfg!(feature = "tiles");
 
     /// Returns the bytes that the coarsest grid, a single cell, needs.
     pub const fn least_bytes(faces: usize) -> usize {

@@ -281,6 +281,36 @@ mod tests {
     }
 
     #[test]
+    fn what_begins_just_behind_a_sheet_is_hidden() {
+        // The depths are so near each other that the coarse depth of the edges behind is that of
+        // the sheet, though their faces do not count as part of it.
+        let mut vertices = Vec::new();
+        let mut corners = Vec::new();
+        let count = 24;
+        for (z, shift, size) in [(127, 0, 10_000), (130, 3_137, 9_700)] {
+            let first = vertices.len() as u32;
+            for at in 0..count * count {
+                let [x, y] = [at % count, at / count].map(|at| at as i32 * size + shift);
+                vertices.push(Vertex::new(x, y, z));
+            }
+            for at in (0..count * (count - 1)).filter(|at| at % count != count - 1) {
+                let at = first + at;
+                let face = [at, at + 1, at + 1 + count, at + count];
+                corners.extend((0..4).map(|n| Corner::new(face[n], false, n == 3)));
+            }
+        }
+        for projection in [Projection::Perspective, Projection::Parallel] {
+            let elements = Elements::new(&corners);
+            let unrounded = Unrounded::UNKNOWN;
+            let scene = Scene { vertices: &vertices, elements, projection, unrounded };
+            let (expected, _) = find(&scene, Options::default(), false);
+            let (found, sheets) = find(&scene, Options::default(), true);
+            assert!(sheets > 100, "{sheets}");
+            assert!(found == expected, "{} and {}", found.len(), expected.len());
+        }
+    }
+
+    #[test]
     fn sheets_change_no_stretch() {
         let mut sheets = 0;
         for seed in 0..if cfg!(miri) { 1 } else { 240 } {
