@@ -26,8 +26,9 @@ pub const END_OF_PULSES: u32 = 39;
 /// Of a piece of the brake's work.
 pub const PIECE_OF_BRAKE: u32 = 36;
 
-/// How long the board may be silent on a busy computer.
-const TIMEOUT: Duration = Duration::from_secs(60);
+/// How long the board may be silent on a busy computer. Its log makes it some hundred times slower
+/// than it is, and its answer to a line may come only when the moves before it are done.
+const TIMEOUT: Duration = Duration::from_secs(900);
 
 /// The calls of a handler: the number of calls for each number of instructions.
 pub type Calls = BTreeMap<usize, usize>;

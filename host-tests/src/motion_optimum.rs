@@ -50,6 +50,12 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
         let shorter = norm(a).min(norm(b));
         let turn = cross(a, b).abs().atan2(a.0 * b.0 + a.1 * b.1);
         let sine = (turn / 2.0).sin() - rounding / shorter;
+        // Short moves before this line may hide a corner between two longer ones.
+        let hidden = hidden_corner(points, i, rounding, limits);
+        radius[i] = hidden.map_or(radius[i], |(radius, _)| radius);
+        if hidden.is_some_and(|(_, sine)| sine > 0.342) {
+            sharp.push(i);
+        }
         // A curve ends beside a line that is much longer than its chords.
         let longer = norm(a).max(norm(b));
         if longer > 32.0 * rounding && shorter > rounding && shorter < longer / 4.0 {
@@ -59,10 +65,11 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
             continue;
         }
         let cosine = (turn / 2.0).cos();
-        radius[i] = limits.junction_deviation * cosine * (1.0 + cosine) / (sine * sine);
+        let mut arc = limits.junction_deviation * cosine * (1.0 + cosine) / (sine * sine);
         if limits.centripetal {
-            radius[i] = radius[i].min(shorter * cosine / (2.0 * sine));
+            arc = arc.min(shorter * cosine / (2.0 * sine));
         }
+        radius[i] = radius[i].min(arc);
         if sine > 0.342 {
             sharp.push(i);
         }
@@ -116,6 +123,41 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
     }
     let square = |r: f64| (limits.acceleration * r).min(limits.speed.powi(2));
     (radius.into_iter().map(square).collect(), curve.into_iter().map(square).collect())
+}
+
+/// The radius of the arc of the corner between the line behind point `at` and the last one before
+/// it that is no short move, and half the sine of its turn; `None` if no short moves are between
+/// the two, or if rounding explains the corner.
+fn hidden_corner(points: &[Point], at: usize, rounding: f64, limits: Limits) -> Option<(f64, f64)> {
+    let after = minus(points[at + 1], points[at]);
+    let mut start = at;
+    let (before, gap) = loop {
+        let before = minus(points[start], *points.get(start.checked_sub(1)?)?);
+        let gap: f64 =
+            points[start..=at].windows(2).map(|pair| norm(minus(pair[1], pair[0]))).sum();
+        if gap > 8.0 * rounding {
+            return None;
+        }
+        if norm(before) >= 4.0 * rounding {
+            break (before, gap);
+        }
+        start -= 1;
+    };
+    if gap == 0.0 || norm(after) < 4.0 * rounding {
+        return None;
+    }
+    let turn = cross(before, after).abs().atan2(before.0 * after.0 + before.1 * after.1);
+    let shorter = norm(before).min(norm(after));
+    let (sine, cosine) = ((turn / 2.0).sin() - rounding / shorter, (turn / 2.0).cos());
+    if sine <= 0.0 {
+        return None;
+    }
+    let deviation = limits.junction_deviation * cosine + gap * sine / 4.0;
+    let mut radius = deviation * (1.0 + cosine) / (sine * sine);
+    if limits.centripetal {
+        radius = radius.min((shorter + gap) * cosine / (2.0 * sine));
+    }
+    Some((radius, sine))
 }
 
 /// The radius of the circle through three points, and whether it is that of a tight bend.

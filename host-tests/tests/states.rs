@@ -256,6 +256,34 @@ fn after_sleep_a_job_that_has_stopped_does_not_know_where_the_pen_is() {
 }
 
 #[test]
+fn a_reset_in_sleep_asks_for_homing_where_homing_is_on() {
+    that_must_be_homed(|plotter| {
+        home(plotter);
+        plotter.say("$SLP");
+        plotter.run(100);
+        plotter.heard();
+        plotter.send("\x18");
+        plotter.run(100);
+        let said = plotter.heard();
+        assert!(said.contains("'$H'|'$X' to unlock") && said.ends_with("ALARM:11\n"), "{said}");
+        assert_eq!(plotter.plotter.machine().state(), State::Alarm(Alarm::NotHomed));
+        assert!(plotter.say("G0 X1").ends_with("error:9\n"));
+        home(plotter);
+        assert_eq!(plotter.plotter.machine().state(), State::Idle);
+        // `$X` is the word of somebody who knows where the pen is.
+        plotter.say("$SLP");
+        plotter.run(100);
+        plotter.say("$X");
+        assert_eq!(plotter.plotter.machine().state(), State::Idle);
+    });
+    let mut bench = Bench::small();
+    bench.say("$SLP\n");
+    bench.work(100);
+    send(&mut bench, b"\x18");
+    assert_eq!(bench.plotter.machine().state(), State::Idle);
+}
+
+#[test]
 fn a_stop_in_sleep_forgets_what_sleep_forgets() {
     for settings in ["$235=0.3", "$235=0.3\n$237=0.5", "$132=1\n$112=900\n$122=500\n$209=1"] {
         // The changes of the pins that a move back makes after sleep.

@@ -394,7 +394,7 @@ impl<'m> Machine<'m> {
         self.activity = Activity::Alarm(alarm);
     }
 
-    /// Switches the motors off. [`Machine::unlock`] ends this state.
+    /// Switches the motors off. [`Machine::wake`] and [`Machine::unlock`] end this state.
     ///
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle.
@@ -402,6 +402,21 @@ impl<'m> Machine<'m> {
         let Activity::Idle = self.activity else { return Err(self.refusal()) };
         self.activity = Activity::Sleep { drivers_on: true };
         Ok(())
+    }
+
+    /// Ends sleep, if the machine is asleep. If the settings require homing, that ends in
+    /// [`Alarm::NotHomed`], because motors without current may have been turned.
+    pub fn wake(&mut self) {
+        match self.activity {
+            Activity::Sleep { .. } if self.settings.is_on(Setting::Homing) => {
+                self.alarm(Alarm::NotHomed);
+            }
+            // It is not refused in this state.
+            Activity::Sleep { .. } => {
+                let _ = self.unlock();
+            }
+            _ => {}
+        }
     }
 
     /// Switches check mode on or off. In check mode, jobs are measured but not drawn.

@@ -60,6 +60,10 @@ impl Corner {
 ///
 /// Points lie on the grid of steps, so a corner may be mere rounding. It therefore counts as less
 /// sharp by as much as rounding can explain.
+///
+/// Between the two there may be short moves, of which two directions tell nothing: a `gap` of some
+/// steps. The arc may then be as much longer, and where they cut the corner, they deviate from it
+/// themselves: by some ¼ l tan(θ/2) where they are an arc of the length l.
 // Where each chord is pushed: elsewhere it would drive that out of the cache.
 #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
 pub(super) fn corner(
@@ -67,6 +71,7 @@ pub(super) fn corner(
     before: Heading,
     after: Heading,
     shorter: PathLength,
+    gap: PathLength,
 ) -> Corner {
     // With unit vectors u, v: |u + v| = 2 cos(θ/2), |v - u| = 2 sin(θ/2).
     let (dx, dy) = (after.x.wrapping_sub(before.x), after.y.wrapping_sub(before.y));
@@ -86,16 +91,18 @@ pub(super) fn corner(
     // Lengths are rounded to whole units, and so are the directions. A path that turns back must
     // come to rest.
     let cosine = if cosine * u64::from(shorter) <= 1 << 30 { 0 } else { cosine };
+    let gap = u64::from(gap.to_bits());
     let by_deviation = {
         // δ c (1 + c) / s² is used in place of δ c / (1 - c), because 1 - c would lose all its
-        // digits in a slight bend.
-        let scaled = (u64::from(limits.junction_deviation.to_bits()) * cosine) >> 30;
+        // digits in a slight bend. The gap adds ¼ l s / c to δ; it is below 2^20.
+        let cut = (gap * sine) >> 2;
+        let scaled = (u64::from(limits.junction_deviation.to_bits()) * cosine + cut) >> 30;
         let doubled = scaled * ((1 << 30) + cosine);
         doubled / ((sine * sine) >> 30).max(1)
     };
     let radius = if limits.centripetal {
         // The length is below 2^32, and the cosine at most 2^30.
-        by_deviation.min(u64::from(shorter) * cosine / (2 * sine))
+        by_deviation.min((u64::from(shorter) + gap) * cosine / (2 * sine))
     } else {
         by_deviation
     };
@@ -141,7 +148,7 @@ mod tests {
         for (x, y) in (1..40).flat_map(|x| (0..40).map(move |y| (x, y))) {
             let length = |times| limits.length(times * x, times * y).expect("short");
             let heading = |times| Heading::new(&limits, times * x, times * y, length(times));
-            let corner = corner(&limits, heading(-2), heading(1), length(1));
+            let corner = corner(&limits, heading(-2), heading(1), length(1), PathLength::ZERO);
             // A single step may be nothing but rounding.
             assert!(corner.limit == 0 || x.max(y) == 1, "{x} {y}: {corner:?}");
         }

@@ -8,7 +8,7 @@
 //! Each pulse leaves in the middle of its step: step n after a rest, counted from 0, leaves √((2n +
 //! 1)/a) after it.
 
-use super::TICKS_PER_SECOND;
+use super::{StepEvent, TICKS_PER_SECOND};
 
 /// The properties of the pen's motor that motion needs to know.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,13 +23,14 @@ pub struct LiftRule {
 }
 
 impl LiftRule {
-    /// The rule for `travel` steps (below 2^18), at most `rate` steps a second (at least 1), and an
+    /// The rule for `travel` steps (below 2^18), at most `rate` steps a minute (at least 1), and an
     /// `acceleration` in steps/s² (at least 20).
     pub fn new(travel: i32, rate: u32, acceleration: u32) -> Self {
+        const TICKS_PER_MINUTE: u32 = 60 * TICKS_PER_SECOND;
         let second = u64::from(TICKS_PER_SECOND);
         Self {
             travel: travel.max(1),
-            least_ticks: TICKS_PER_SECOND.div_ceil(rate.max(1)),
+            least_ticks: TICKS_PER_MINUTE.div_ceil(rate.max(1)),
             // The square is below 2^45.
             square: second * second / u64::from(acceleration.max(20)),
         }
@@ -61,9 +62,13 @@ pub(super) struct Lift {
     /// While the pins have not yet carried out events of this many ticks, the motor has not yet
     /// been driven against the stop.
     found_at: Option<u32>,
+    /// The ticks that must still pass before the next action. A slow step takes more of them than
+    /// one event can last.
+    wait: u32,
 }
 
-/// The next action of the motor: a change of direction or a step, after which `ticks` pass.
+/// The next action of the motor: a step, or a level of the direction pin, after which `ticks` pass,
+/// no more than an event can last.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct LiftStep {
     pub(super) step: bool,
@@ -100,6 +105,7 @@ impl Lift {
     /// Sets the position to the sum of the pulses so far. No pulse may wait.
     pub(super) fn set_position(&mut self, position: i32) {
         (self.position, self.from, self.to) = (position, position, position);
+        self.wait = 0;
         if self.found_at.is_some() {
             self.forget();
         }
@@ -107,6 +113,20 @@ impl Lift {
 
     /// Returns the next action on the way to `height`; `None` if the pen is there.
     pub(super) fn next(&mut self, rule: LiftRule, height: u8) -> Option<LiftStep> {
+        let mut next = if self.wait > 0 {
+            let down = self.to.wrapping_sub(self.from) > 0;
+            LiftStep { step: false, down, ticks: core::mem::take(&mut self.wait) }
+        } else {
+            self.begin_next(rule, height)?
+        };
+        // The rest of the wait goes on without a step.
+        self.wait = next.ticks.saturating_sub(StepEvent::MAX_TICKS);
+        next.ticks -= self.wait;
+        Some(next)
+    }
+
+    /// Returns the next action with its whole wait, however long that is.
+    fn begin_next(&mut self, rule: LiftRule, height: u8) -> Option<LiftStep> {
         if self.position == self.to {
             self.to = match self.top {
                 Some(top) => top.wrapping_add(rule.steps(height)),
@@ -150,7 +170,7 @@ mod tests {
 
     #[test]
     fn the_first_move_finds_the_stop_and_later_ones_the_height() {
-        let rule = LiftRule::new(800, 2000, 20_000);
+        let rule = LiftRule::new(800, 120_000, 20_000);
         let mut lift = Lift::default();
         let moves = run(&mut lift, rule, 0);
         assert_eq!(moves.iter().filter(|next| next.step).count(), 901);
@@ -168,7 +188,7 @@ mod tests {
         for (steps, rate, acceleration) in
             [(1, 500, 1000), (2, 500, 1000), (3, 500, 1000), (40, 9000, 1000), (5000, 3000, 20_000)]
         {
-            let rule = LiftRule::new(steps, rate, acceleration);
+            let rule = LiftRule::new(steps, 60 * rate, acceleration);
             let mut lift = Lift { top: Some(0), ..Lift::default() };
             let moves = run(&mut lift, rule, 127);
             let mut time = 0.0;
@@ -196,8 +216,35 @@ mod tests {
     }
 
     #[test]
+    fn a_step_that_lasts_longer_than_an_event_takes_several() {
+        // Two steps a minute, and eight times as long in the search for the stop.
+        let rule = LiftRule::new(8, 2, 20);
+        let mut lift = Lift::default();
+        for (height, steps, minutes_per_step) in [(0, 10, 2), (127, 8, 0)] {
+            let moves = run(&mut lift, rule, height);
+            assert!(moves.iter().all(|next| next.ticks <= StepEvent::MAX_TICKS));
+            assert_eq!(moves.iter().filter(|next| next.step).count(), steps);
+            let between = u64::from(minutes_per_step * 60 * TICKS_PER_SECOND).max(750_000_000);
+            let mut waits = std::vec![0];
+            for next in moves {
+                if next.step {
+                    waits.push(0);
+                }
+                *waits.last_mut().expect("a wait") += u64::from(next.ticks);
+            }
+            assert!(waits[1..steps].iter().all(|&wait| wait == between), "{waits:?}");
+        }
+        // An abort in the middle of a wait forgets it.
+        lift.next(rule, 0);
+        lift.next(rule, 0);
+        lift.set_position(-3);
+        assert_eq!(lift.next(rule, 0).map(|next| next.step), Some(false));
+        assert_eq!(lift.next(rule, 0).map(|next| next.step), Some(true));
+    }
+
+    #[test]
     fn a_move_that_was_cut_short_goes_on_from_where_the_pins_are() {
-        let rule = LiftRule::new(800, 2000, 20_000);
+        let rule = LiftRule::new(800, 120_000, 20_000);
         let mut lift = Lift::default();
         run(&mut lift, rule, 0);
         for _ in 0..301 {

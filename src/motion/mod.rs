@@ -20,7 +20,7 @@
 //!
 //! Measured on a Cortex-M3, built for size, everything between target and queue included: 39
 //! instructions for each event of a line at 100,000 moves a second, and 62 to 150 with a limit on
-//! jerk; for chords of five moves at 5,000 a second 354, and 363 to 394. The step interrupt is not
+//! jerk; for chords of five moves at 5,000 a second 364, and 373 to 404. The step interrupt is not
 //! counted in that. `cargo xtask bench --motion` counts both.
 //!
 //! The module `machine` is responsible for the limits of travel, the heights of the pen, and the

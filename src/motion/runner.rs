@@ -11,7 +11,7 @@ mod reversals;
 #[cfg(feature = "input-shaping")]
 mod shaped;
 
-use append::{Chord, LastMove};
+use append::{Chord, LastMove, LongMove};
 pub use append::{Move, PushError};
 #[cfg(feature = "pen-overlap")]
 pub use pen::PenOverlap;
@@ -114,6 +114,8 @@ pub struct Runner<'m> {
     last: Option<LastMove>,
     /// The last chord that was another one than that move.
     other_chord: Option<Chord>,
+    /// The last long move of the path that goes on.
+    long: Option<LongMove>,
     /// The stopping distance of the speed limit of the last block appended.
     last_limit: PathLength,
     run: RunLengths,
@@ -171,6 +173,7 @@ impl<'m> Runner<'m> {
             page_end: PagePoint::default(),
             last: None,
             other_chord: None,
+            long: None,
             last_limit: PathLength::ZERO,
             run: RunLengths::default(),
             in_stroke: false,

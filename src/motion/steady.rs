@@ -46,7 +46,13 @@ impl<'l> SteadySpeed<'l> {
         if length > 0 {
             let heading = Heading::new(self.limits, dx, dy, length);
             if let Some((before, length_before)) = self.last {
-                let corner = corner(self.limits, before, heading, length.min(length_before));
+                let corner = corner(
+                    self.limits,
+                    before,
+                    heading,
+                    length.min(length_before),
+                    PathLength::ZERO,
+                );
                 if corner.is_sharp {
                     return false;
                 }

@@ -600,12 +600,11 @@ impl<I: Index> Inner<'_, I> {
         self.report_counts = ReportCounts::default();
         self.machine.set_override(100);
         self.machine.set_rapid_override(100);
-        match self.machine.state() {
-            // Neither call is refused in these states.
-            State::Check => drop(self.machine.check(false)),
-            State::Sleep => drop(self.machine.unlock()),
-            _ => {}
+        if self.machine.state() == State::Check {
+            // It is not refused in this state.
+            let _ = self.machine.check(false);
         }
+        self.machine.wake();
     }
 
     /// Whether nothing moves and there is no interrupted job that could continue.

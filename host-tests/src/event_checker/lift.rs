@@ -23,7 +23,7 @@ impl LiftWatch {
         let acceleration = value(Setting::AccelerationZ) * steps;
         let rule = settings.is_on(Setting::Tool).then(|| {
             let (travel, rate) =
-                (value(Setting::TravelZ) * steps, value(Setting::MaxRateZ) * steps / 60.0);
+                (value(Setting::TravelZ) * steps, value(Setting::MaxRateZ) * steps);
             LiftRule::new(travel as i32, rate as u32, acceleration as u32)
         });
         let position = rule.map_or(0, |rule| rule.travel);

@@ -13,4 +13,5 @@ mod homing;
 mod pen;
 mod pen_overlap;
 mod shaping;
+mod slow;
 mod underrun;

@@ -250,14 +250,11 @@ fn deviation(runs: &[Run], targets: &[Target], kinematics: Kinematics) -> f64 {
 }
 
 /// Strokes of full lines with corners of all kinds and bends in chords, so that each is one run.
-/// None is shorter than 0.1 mm, because rounding to steps hides the corners of such lines from the
-/// planner.
 fn strokes(random: &mut Random) -> Vec<Target> {
     let mut strokes: Vec<Target> = Vec::new();
     let mut before = point(0, 0);
     for Target { point, ink: line } in random_job(random, 30) {
-        let by = [point.x - before.x, point.y - before.y].map(f64::from);
-        if by[0].hypot(by[1]) >= 8.0 {
+        if point != before {
             strokes.push(if line.is_some() { ink(point.x, point.y) } else { to(point.x, point.y) });
             before = point;
         }

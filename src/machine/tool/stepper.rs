@@ -17,18 +17,19 @@ const GREATEST_RATE: u32 = 10_000;
 /// [`LimitsError::TooManySteps`] if it would have to step faster than every board can.
 #[inline(never)] // Inlining it at every call would cost too much flash.
 pub(super) fn rule(settings: &Settings) -> Result<LiftRule, LimitsError> {
-    let steps_per_second = |setting, seconds| {
+    let in_steps = |setting| {
         let product = u64::from(settings.get(setting).to_bits().unsigned_abs())
             * u64::from(settings.get(Setting::StepsPerMmZ).to_bits().unsigned_abs());
         // The result is below 2^27 steps.
-        ((product >> (2 * Value::FRAC_NBITS)) / seconds) as u32
+        (product >> (2 * Value::FRAC_NBITS)) as u32
     };
-    let asked = steps_per_second(Setting::MaxRateZ, 60);
+    let per_minute = in_steps(Setting::MaxRateZ);
+    let asked = per_minute / 60;
     if asked > GREATEST_RATE {
         return Err(LimitsError::TooManySteps { asked, possible: GREATEST_RATE });
     }
     let travel = settings.millimetres_as_steps(Setting::TravelZ, Setting::StepsPerMmZ);
-    Ok(LiftRule::new(travel, asked, steps_per_second(Setting::AccelerationZ, 1)))
+    Ok(LiftRule::new(travel, per_minute, in_steps(Setting::AccelerationZ)))
 }
 
 /// The time, in milliseconds, of one move between the heights of the raised and the lowered pen.

@@ -52,6 +52,46 @@ pub(super) struct LastMove {
     pub(super) ink: Option<LineType>,
 }
 
+/// The last move that is long enough to have a direction, whatever rounding does, and the short
+/// moves behind it, which may hide a corner.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LongMove {
+    heading: Heading,
+    length: PathLength,
+    /// The total length of the short moves behind it.
+    gap: PathLength,
+}
+
+impl LongMove {
+    /// A move is long from this many times what rounding can explain on.
+    const LEAST: u32 = 4;
+    /// The short moves behind it may be this many times as long in all.
+    const MOST_GAP: u32 = 8;
+
+    /// Whether a move of this `length` is a short one.
+    fn is_short(length: PathLength, limits: &Limits) -> bool {
+        length.to_bits() < Self::LEAST * limits.rounding.to_bits()
+    }
+
+    /// Appends a short move behind it. Returns `None` if there are too many of them.
+    fn followed_by(self, length: PathLength, limits: &Limits) -> Option<Self> {
+        let gap = self.gap.saturating_add(length);
+        let is_near = gap.to_bits() <= Self::MOST_GAP * limits.rounding.to_bits();
+        is_near.then_some(Self { gap, ..self })
+    }
+
+    /// The corner between it and the `next` long move, before which there is also the corner
+    /// `after` the short moves.
+    fn corner(&self, next: &Self, after: Corner, limits: &Limits) -> Corner {
+        if self.gap == 0 {
+            return after;
+        }
+        let shorter = self.length.min(next.length);
+        let hidden = junction::corner(limits, self.heading, next.heading, shorter, self.gap);
+        Corner { limit: hidden.limit.min(after.limit), is_sharp: hidden.is_sharp || after.is_sharp }
+    }
+}
+
 impl Runner<'_> {
     /// The length of a move by (`dx`, `dy`) steps: see [`Limits::length`].
     pub fn move_length(&self, dx: i32, dy: i32) -> Option<PathLength> {
@@ -106,9 +146,23 @@ impl Runner<'_> {
             Some(_) if goes_on => Corner::NONE,
             Some(last) => {
                 let (before, shorter) = (last.chord.heading, length.min(last.length));
-                junction::corner(&self.limits, before, chord.heading, shorter)
+                junction::corner(&self.limits, before, chord.heading, shorter, PathLength::ZERO)
             }
             None => Corner::STOP,
+        };
+        if self.lookahead.is_full() {
+            return Err(PushError::Full);
+        }
+        if last.is_none() {
+            self.long = None;
+        }
+        let corner = if LongMove::is_short(length, &self.limits) {
+            if self.long.is_some() {
+                self.follow_long_move(length);
+            }
+            corner
+        } else {
+            self.replace_long_move(chord.heading, length, corner)
         };
         let bends_apart =
             self.last.is_some_and(|last| junction::bends_apart(&self.limits, last.length, length));
@@ -135,9 +189,6 @@ impl Runner<'_> {
         // The speed is checked only between blocks, so moves are joined only if nothing limits it
         // there.
         let is_free = corner.limit >= self.limits.top && limit == self.last_limit;
-        if self.lookahead.is_full() {
-            return Err(PushError::Full);
-        }
         let is_joined = is_free && self.lookahead.join(&block, goes_on, &self.limits);
         if !is_joined && self.lookahead.push(block).is_err() {
             return Err(PushError::Full);
@@ -156,6 +207,26 @@ impl Runner<'_> {
         }
         self.follow_path();
         Ok(())
+    }
+
+    /// Records a short move behind the last long one.
+    #[inline(never)] // Only behind a long move: inlined, it would fill the cache.
+    fn follow_long_move(&mut self, length: PathLength) {
+        self.long = self.long.and_then(|long| long.followed_by(length, &self.limits));
+    }
+
+    /// Records a long move, and returns the corner before it, which is `corner` if short moves
+    /// hide none.
+    #[inline(never)] // Inlined, it would fill the cache.
+    fn replace_long_move(
+        &mut self,
+        heading: Heading,
+        length: PathLength,
+        corner: Corner,
+    ) -> Corner {
+        let next = LongMove { heading, length, gap: PathLength::ZERO };
+        let before = self.long.replace(next);
+        before.map_or(corner, |before| before.corner(&next, corner, &self.limits))
     }
 
     /// Appends steps by which the motors take up their backlash, from rest to rest. The pen stays
