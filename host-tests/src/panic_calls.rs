@@ -173,8 +173,9 @@ fn functions(file: &object::File<'_>) -> Result<Functions, Box<dyn Error>> {
 type Lines<'e> = addr2line::Context<EndianSlice<'e, LittleEndian>>;
 
 /// The file and line of the innermost function of the project at this address, which is in the
-/// function `name`. An instruction that the compiler made of several lines has line 0, and often the
-/// file of another function. Then the file is that of the outermost module in the function's name.
+/// function `name`. An instruction that the compiler made of several lines has line 0, and often
+/// the file of another function. Then the file is that of the outermost module in the function's
+/// name.
 fn cause(lines: &Lines<'_>, address: u64, name: &str) -> Result<(String, u32), Box<dyn Error>> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).parent().ok_or("no project")?;
     let mut outermost = (String::new(), 0);

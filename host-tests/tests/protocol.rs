@@ -171,7 +171,8 @@ fn a_plan_is_drawn_at_true_size_or_refused_with_its_size() {
     bench.finish();
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:350.000,50.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:1/1|Ink:300/300|Left:0>\n"
+        "<Idle|MPos:350.000,50.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:1/1|\
+         Ink:300/300|Left:0>\n"
     );
     assert_eq!(bench.say("$page=210x297\n$fit=on\n$plot\n"), "ok\nok\nok\n");
     bench.finish();

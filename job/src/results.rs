@@ -183,8 +183,8 @@ mod tests {
             serde_json::to_string(&result).expect("numbers are finite"),
             "{\"segments\":[[0.0,0.5,1.0,-1.0]],\"segment_pens\":[1],\
              \"strokes\":[[[10.0,20.0],[30.0,20.25]]],\"stroke_pens\":[2],\
-             \"pen_down_mm\":20.0,\"pen_up_mm\":0.0,\"efficiency\":1.0,\"steps\":1600,\"duration_s\":12.5,\
-             \"timings_ms\":{\"view\":0.5,\"visibility\":1.5,\"order\":2.0}}"
+             \"pen_down_mm\":20.0,\"pen_up_mm\":0.0,\"efficiency\":1.0,\"steps\":1600,\
+             \"duration_s\":12.5,\"timings_ms\":{\"view\":0.5,\"visibility\":1.5,\"order\":2.0}}"
         );
     }
 

@@ -244,13 +244,13 @@ impl<'m> Lookahead<'m> {
         Ok(())
     }
 
-    /// Joins a line to the last block, if that is a line of the same ink. Nothing may limit the speed
-    /// between the two. Returns whether it was joined.
+    /// Joins a line to the last block, if that is a line of the same ink. Nothing may limit the
+    /// speed between the two. Returns whether it was joined.
     ///
-    /// A line that goes on in the same direction (`goes_on`) makes a short block longer, so that one
-    /// plan serves for both. Other lines are joined only if the blocks might otherwise not hold the
-    /// machine's stopping distance: nothing is joined while the whole path has 5/4 of that distance
-    /// or less than half of the memory is in use, nor to a block that has its share of it.
+    /// A line that goes on in the same direction (`goes_on`) makes a short block longer, so that
+    /// one plan serves for both. Other lines are joined only if the blocks might otherwise not hold
+    /// the machine's stopping distance: nothing is joined while the whole path has 5/4 of that
+    /// distance or less than half of the memory is in use, nor to a block that has its share of it.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn join(&mut self, line: &Block, goes_on: bool, limits: &Limits) -> bool {
         let needed = limits.longest_stop.to_bits().saturating_add(surely_known(limits) / 4);

@@ -350,8 +350,9 @@ impl Shaper {
         let speeds = self.axes(speeds);
         let sizes = speeds.map_each(i64::unsigned_abs);
         let [faster, other] = roles(self.faster);
-        // Where both are equally fast, their roles stay, so that the steps follow each other evenly:
-        // while the other one falls behind by no more than a quarter of a step in this segment.
+        // Where both are equally fast, their roles stay, so that the steps follow each other
+        // evenly: while the other one falls behind by no more than a quarter of a step in this
+        // segment.
         let quarter = STEP.unsigned_abs() / 4;
         let lags = self.ahead[other].unsigned_abs() > 3 * quarter;
         let excess = sizes[other].saturating_sub(sizes[faster]);

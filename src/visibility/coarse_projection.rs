@@ -338,8 +338,8 @@ impl<'a> CoarseProjection<'a> {
         self.vertices[number.get()]
     }
 
-    /// Returns the position of a vertex on the coarse grid. Every corner of a scene that is searched
-    /// is a vertex that exists ([`super::check`]).
+    /// Returns the position of a vertex on the coarse grid. Every corner of a scene that is
+    /// searched is a vertex that exists ([`super::check`]).
     #[inline]
     pub fn position<I: Index>(&self, number: I) -> CoarsePoint {
         self.positions.get(number.get()).copied().unwrap_or_default()
@@ -379,8 +379,8 @@ impl<'a> CoarseProjection<'a> {
         }
     }
 
-    /// Returns on which side of the line from vertex a to vertex b a point of the page lies: 1 left,
-    /// -1 right, 0 on the line.
+    /// Returns on which side of the line from vertex a to vertex b a point of the page lies: 1
+    /// left, -1 right, 0 on the line.
     pub fn side_of_point<I: Index>(&self, a: I, b: I, point: &PagePoint) -> i32 {
         match coarse_side(self.position(a), self.position(b), point.position) {
             0 => page_side_of(self.projection, self.vertex(a), self.vertex(b), point.exact),

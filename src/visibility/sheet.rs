@@ -8,9 +8,9 @@
 //!
 //! The nearest faces are those that begin before the farthest of them ends. Each is taken in the
 //! sense in which it runs anticlockwise on the page. If every side that may touch the cell belongs
-//! to two of them, in opposite directions, then no boundary of these faces enters the cell, so every
-//! point of it is covered by the same number of faces (a chain without boundary). That number is
-//! counted at the middle of the cell.
+//! to two of them, in opposite directions, then no boundary of these faces enters the cell, so
+//! every point of it is covered by the same number of faces (a chain without boundary). That number
+//! is counted at the middle of the cell.
 
 use super::coarse_projection::{CoarseLine, CoarsePoint, PagePoint};
 use super::edges::sides;

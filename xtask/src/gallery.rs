@@ -125,7 +125,7 @@ fn draw_figures() -> Result<()> {
     fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
     let mut page = String::from(
         "# Gallery\n\nThe figures of the papers, or their like, as penup draws them. Ink is dark, \
-         moves with the pen up are faint. `cargo xtask gallery` makes this page.\n\n\
+         moves with the pen up\nare faint. `cargo xtask gallery` makes this page.\n\n\
          ## A scene of our own\n\n\
          ![A train of gears that a crank turns](../gears.svg)\n\n",
     );

@@ -298,8 +298,8 @@ impl Setup<'_> {
         if self.answers.is_yes(&question)? {
             squares::draw(sender, &[SQUARE])?;
             say(&format!(
-                "Measure it: each side is {SQUARE} mm, and both diagonals are the same. If not, run \
-                 `penup setup` again."
+                "Measure it: each side is {SQUARE} mm, and both diagonals are the same. If not, \
+                 run `penup setup` again."
             ));
         }
         Ok(())

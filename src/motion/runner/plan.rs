@@ -2,8 +2,8 @@
 //!
 //! The *commit point* is the end of the last slice: what lies before it has gone to the queue. A
 //! hold, an abort, another speed, a bend that is found late and a path that goes on are one
-//! operation, [`Runner::replan`]: what was planned behind the commit point is discarded, and planned
-//! anew from the state of motion there.
+//! operation, [`Runner::replan`]: what was planned behind the commit point is discarded, and
+//! planned anew from the state of motion there.
 
 use super::*;
 

@@ -83,7 +83,10 @@ fn a_cruise_is_given_up_where_a_bend_appears_behind_it() {
     let (mut blocks, mut events) = ([Block::EMPTY; 64], Events::default());
     let mut runner = Runner::new(limits, PEN, &mut blocks);
     push(&mut runner, [6000, 0], Some(LineType::Full));
-    let cruises = |runner: &Runner<'_>| matches!(&runner.plan, Some(Plan::Interval(interval)) if interval.is_cruise());
+    let cruises = |runner: &Runner<'_>| match &runner.plan {
+        Some(Plan::Interval(interval)) => interval.is_cruise(),
+        _ => false,
+    };
     while !cruises(&runner) {
         assert_eq!(runner.produce(&mut events), Ok(Progress::More));
     }

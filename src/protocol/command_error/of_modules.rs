@@ -302,7 +302,8 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
         SettingError::Conflict(LimitsError::ShapingFrequency { least }) => row(
             error(151, "setting conflicts with another"),
             format_args!(
-                "such a shaper works from {}.{:02} Hz on: set $227 and $228 to that or 0, or $226=1",
+                "such a shaper works from {}.{:02} Hz on: set $227 and $228 to that or 0, or \
+                 $226=1",
                 least / 100,
                 least % 100
             ),
