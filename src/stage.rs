@@ -179,9 +179,9 @@ impl<T, K: Ord, F: Fn(&T) -> K> Heap for Keyed<'_, T, F> {
     }
 
     fn swap(&mut self, a: usize, b: usize) {
-        // A heap changes two different items of its own.
-        if let Ok([a, b]) = self.items.get_disjoint_mut([a, b]) {
-            core::mem::swap(a, b);
+        // A heap changes items of its own.
+        if a.max(b) < self.items.len() {
+            self.items.swap(a, b);
         }
     }
 }

@@ -342,7 +342,12 @@ impl<'a> CoarseProjection<'a> {
     /// searched is a vertex that exists ([`super::check`]).
     #[inline]
     pub fn position<I: Index>(&self, number: I) -> CoarsePoint {
-        self.positions.get(number.get()).copied().unwrap_or_default()
+        // On the Pico no panic is left by this; elsewhere a check of bounds takes less code.
+        if cfg!(feature = "tiles") {
+            self.positions.get(number.get()).copied().unwrap_or_default()
+        } else {
+            self.positions[number.get()]
+        }
     }
 
     /// Returns the line from vertex `a` to vertex `b`.
