@@ -38,7 +38,8 @@ fn no_call_takes_more(settings: &[&str], event: usize) -> TestResult {
     }
     for (number, most) in [(EVENT, event), (END_OF_PULSES, 51), (PIECE_OF_BRAKE, 71)] {
         let calls = counts.get(&number).ok_or("a handler was not called")?;
-        assert!(calls.values().sum::<usize>() > 700, "{number}: {calls:?}");
+        // How far the pen comes before it is stopped depends on the computer.
+        assert!(calls.values().sum::<usize>() > 300, "{number}: {calls:?}");
         let worst = calls.last_key_value().map(|(worst, _)| *worst);
         // Far less were no count.
         assert!(worst.is_some_and(|worst| (40..=most).contains(&worst)), "{number}: {calls:?}");
