@@ -112,7 +112,14 @@ impl Watched {
             let mut buffer = [0; 256];
             let count = self.0.emulator.0.receive(&mut buffer, Duration::from_secs(60))?;
             if count == 0 {
-                return Err("the power was not cut".into());
+                let (resets, clock) = (self.0.emulator.0.resets(), self.0.emulator.clock()?);
+                let [heard, said] = [&heard, &self.0.emulator.said().into_bytes()]
+                    .map(|bytes| String::from_utf8_lossy(bytes).into_owned());
+                let log = self.0.emulator.log_lines();
+                return Err(format!(
+                    "no restart in {clock:?} after {resets} resets: {heard:?}, {said}, {log:?}"
+                )
+                .into());
             }
             heard.extend_from_slice(&buffer[..count]);
         }

@@ -188,6 +188,14 @@ fn that_must_be_homed(work: impl FnOnce(&mut Powered<'_, '_>)) {
     switch_on(flash, work);
 }
 
+/// Asserts that the plotter has just asked for homing or unlocking, and moves only behind that.
+fn assert_asks_for_homing(plotter: &mut Powered<'_, '_>) {
+    let said = plotter.heard();
+    assert!(said.contains("'$H'|'$X' to unlock") && said.ends_with("ALARM:11\n"), "{said}");
+    assert_eq!(plotter.plotter.machine().state(), State::Alarm(Alarm::NotHomed));
+    assert!(plotter.say("G0 X1").ends_with("error:9\n"));
+}
+
 #[test]
 fn homing_that_is_given_up_leaves_the_alarm_in_which_it_began() {
     that_must_be_homed(|plotter| {
@@ -202,10 +210,7 @@ fn homing_that_is_given_up_leaves_the_alarm_in_which_it_began() {
             plotter.heard();
             plotter.send("\x18");
             plotter.run(1000);
-            let said = plotter.heard();
-            assert!(said.contains("'$H'|'$X' to unlock") && said.ends_with("ALARM:11\n"), "{said}");
-            assert_eq!(plotter.plotter.machine().state(), State::Alarm(Alarm::NotHomed));
-            assert!(plotter.say("G0 X1").ends_with("error:9\n"));
+            assert_asks_for_homing(plotter);
         }
         // Homing and unlocking are still possible.
         home(plotter);
@@ -264,10 +269,7 @@ fn a_reset_in_sleep_asks_for_homing_where_homing_is_on() {
         plotter.heard();
         plotter.send("\x18");
         plotter.run(100);
-        let said = plotter.heard();
-        assert!(said.contains("'$H'|'$X' to unlock") && said.ends_with("ALARM:11\n"), "{said}");
-        assert_eq!(plotter.plotter.machine().state(), State::Alarm(Alarm::NotHomed));
-        assert!(plotter.say("G0 X1").ends_with("error:9\n"));
+        assert_asks_for_homing(plotter);
         home(plotter);
         assert_eq!(plotter.plotter.machine().state(), State::Idle);
         // `$X` is the word of somebody who knows where the pen is.
