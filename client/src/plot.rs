@@ -14,7 +14,7 @@ use crate::output;
 use crate::ports;
 use crate::preview::InMemory;
 use crate::progress::{Bar, Progress};
-use crate::run::{Outputs, Source, note, read, summary, write_pictures};
+use crate::run::{FileJob, Outputs, note, read, summary, write_pictures};
 use crate::sender::{Sender, Stopped, Timeouts};
 use crate::workspace;
 use penup::index::Index;
@@ -42,7 +42,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
     if args.port.is_none() {
         output::check(&file, &outputs.files())?;
     }
-    let source = read(&file, &args.view, quiet)?;
+    let (job, source) = read(&file, &args.view, quiet)?;
     let settings = &source.settings;
     let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
@@ -52,15 +52,15 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         if link.obey_keys() && !quiet {
             note_keys();
         }
-        let plot = Plot { args, source: &source, file: &file, quiet };
-        let rejoined = plot.rejoin(&mut link, interrupt, &mut bar)?;
+        let plot = Plot { args, file: &file, quiet };
+        let rejoined = plot.rejoin(&job, &mut link, interrupt, &mut bar)?;
         let (report, passes) = match rejoined {
             // Nobody knows which pass it was.
             Some(report) => (report, 1),
             None => {
                 let mut sender = Sender::open(&mut link, Timeouts::default(), interrupt)?;
                 let drawn = operate::limits(&mut sender)
-                    .and_then(|known| plot.draw(&mut sender, &known, &mut bar));
+                    .and_then(|known| plot.draw(job, &mut sender, &known, &mut bar));
                 sender.end();
                 (drawn?, args.passes.multipass)
             }
@@ -87,10 +87,10 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         settings: Some(machine::Settings::default()),
         kept: 0,
     };
-    let plot = Plot { args, source: &source, file: &file, quiet };
+    let plot = Plot { args, file: &file, quiet };
     let drawn =
         Sender::open(board.as_mut(), Timeouts::default(), interrupt).and_then(|mut sender| {
-            let drawn = plot.draw(&mut sender, &known, &mut bar);
+            let drawn = plot.draw(job, &mut sender, &known, &mut bar);
             sender.end();
             drawn
         });
@@ -107,7 +107,6 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
 /// A drawing that is to be plotted.
 struct Plot<'p> {
     args: &'p PlotArgs,
-    source: &'p Source,
     file: &'p Path,
     quiet: bool,
 }
@@ -119,17 +118,18 @@ impl Plot<'_> {
         }
     }
 
-    /// Draws the file with a plotter that is idle, according to what is `known` of it.
+    /// Draws the file with a plotter that is idle, according to what is `known` of it. The memory
+    /// of the job is free again once this computer has taken it.
     fn draw(
         &self,
+        job: FileJob,
         sender: &mut Sender<'_>,
         known: &Known,
         progress: &mut dyn Progress,
     ) -> Result<Option<JobReport>, Error> {
         if self.args.resume {
-            return self.go_on(sender, known, progress);
+            return self.go_on(job, sender, known, progress);
         }
-        let job = &self.source.job;
         let compute = match self.args.from > 0 || self.args.reloop {
             true if self.args.compute == Compute::Board => {
                 let reason = "--from and --reloop need this computer: leave out --compute board";
@@ -138,7 +138,7 @@ impl Plot<'_> {
             true => Compute::Host,
             false => self.args.compute,
         };
-        let choice = compute::choose(known, job, compute)?;
+        let choice = compute::choose(known, &job, compute)?;
         if known.kept > 0 && choice.host.is_none() {
             self.note(&[format!(
                 "the plotter's flash keeps a model of {} vertices, which this drawing replaces",
@@ -148,7 +148,8 @@ impl Plot<'_> {
         let notes = [choice.totals].into_iter().filter(|totals| !totals.is_empty());
         self.note(&notes.chain(choice.reason).collect::<Vec<_>>());
         let passes = self.args.passes.multipass;
-        let Some(mut host) = choice.host else { return draw_by(sender, job, passes, progress) };
+        let Some(mut host) = choice.host else { return draw_by(sender, &job, passes, progress) };
+        drop(job);
         host.set_reloops(self.args.reloop);
         let form = sender.form(&known.settings.unwrap_or_default())?;
         let (streamed, report) = host.streamed(form, self.args.from)?;
@@ -169,6 +170,7 @@ impl Plot<'_> {
     /// Sends the rest of this drawing, which a loss of power or a reset has stopped.
     fn go_on(
         &self,
+        job: FileJob,
         sender: &mut Sender<'_>,
         known: &Known,
         progress: &mut dyn Progress,
@@ -180,9 +182,10 @@ impl Plot<'_> {
                  with one that the plotter has computed",
             )
         })?;
-        let Some(mut host) = compute::choose(known, &self.source.job, Compute::Host)?.host else {
+        let Some(mut host) = compute::choose(known, &job, Compute::Host)?.host else {
             return Err(refused("this computer cannot compute it"));
         };
+        drop(job);
         host.set_reloops(self.args.reloop);
         // The drawing may have begun behind its first strokes, by --from.
         let (mut whole, report) = host.streamed(Form::Strokes, 0)?;
@@ -242,6 +245,7 @@ impl Plot<'_> {
     /// something else.
     fn rejoin(
         &self,
+        job: &FileJob,
         link: &mut dyn Link,
         interrupt: &AtomicBool,
         progress: &mut dyn Progress,
@@ -252,7 +256,6 @@ impl Plot<'_> {
         };
         let busy = || Error::NotReady { state: "Run".to_owned() };
         let settings = simulated(&operate::read_settings(&mut sender)?).map_err(|_| busy())?;
-        let job = &self.source.job;
         let mut host = InMemory::<u32>::new(Room::for_job(job), settings);
         host.set_reloops(self.args.reloop);
         if !host.take(job) {

@@ -88,7 +88,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
 fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, Some(args));
     output::check(&args.file, &outputs.files())?;
-    let source = read(&args.file, &args.view, quiet)?;
+    let (job, source) = read(&args.file, &args.view, quiet)?;
     let mut machine = match &args.machine {
         Some(file) => SavedSettings::read(file)?.settings,
         None => Vec::new(),
@@ -101,12 +101,12 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
     let bar = Bar::new(quiet);
     match args.board {
         None => {
-            let plotter = InMemory::<u32>::new(Room::for_job(&source.job), machine);
-            show(plotter, &source, args, &outputs, bar, interrupt)
+            let plotter = InMemory::<u32>::new(Room::for_job(&job), machine);
+            show(plotter, &job, &source, args, &outputs, bar, interrupt)
         }
         Some(board) => {
             let plotter = InMemory::<u16>::new(Room::of_board(board), machine);
-            show(plotter, &source, args, &outputs, bar, interrupt)
+            show(plotter, &job, &source, args, &outputs, bar, interrupt)
         }
     }
 }
@@ -114,6 +114,7 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
 /// Draws the job by `plotter` and writes the pictures and reports that the arguments name.
 fn show<I: Index>(
     mut plotter: InMemory<I>,
+    job: &FileJob,
     source: &Source,
     args: &PreviewArgs,
     outputs: &Outputs,
@@ -122,11 +123,11 @@ fn show<I: Index>(
 ) -> Result<Outcome, Error> {
     let passes = args.passes.multipass;
     let (streamed, report) = if args.reloop {
-        let (streamed, report) = relooped(&mut plotter, &source.job, interrupt, &mut bar)?;
+        let (streamed, report) = relooped(&mut plotter, job, interrupt, &mut bar)?;
         draw_strokes(&mut plotter, Some(&streamed), interrupt, &mut bar)?;
         (Some(streamed), report)
     } else {
-        (None, draw(&mut plotter, &source.job, Timeouts::simulated(), interrupt, &mut bar)?)
+        (None, draw(&mut plotter, job, Timeouts::simulated(), interrupt, &mut bar)?)
     };
     let mut drawn = plotter.drawn();
     if passes > 1 {
@@ -265,7 +266,7 @@ fn encode_tape(
     let beside = args.file.with_extension("tape");
     let output = output_for(args.output.as_ref(), &args.file, beside);
     output::check(&args.file, &[&output])?;
-    let job = read(&args.file, &args.view, quiet)?.job;
+    let (job, _) = read(&args.file, &args.view, quiet)?;
     let mut plotter =
         InMemory::<u32>::new(Room::for_job(&job), penup::machine::Settings::default());
     {
@@ -297,8 +298,11 @@ fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {
     move |BadCode { row, code }| Error::Tape { file: file.display().to_string(), row, code }
 }
 
+/// A file as the job that is sent.
+pub type FileJob = Job<SourceFile>;
+
 /// Reads `file`, tells the user what is not drawn as the file says, and chooses the settings.
-pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> {
+pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Source), Error> {
     let source = files::read(file, view.arrangement())?;
     let settings = view
         .settings_for(&source)
@@ -318,7 +322,7 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<Source, Error> 
     let is_scaled_by_plotter =
         is_plan && settings.value("fit") == Some("on") && !view.arrangement().scales_to_page();
     let job = Job::new(source, &settings);
-    Ok(Source { job, settings, extent, is_plan, is_scaled_by_plotter })
+    Ok((job, Source { settings, extent, is_plan, is_scaled_by_plotter }))
 }
 
 /// The length in mm below which nothing is drawn: about a step of the usual motors.
@@ -341,10 +345,8 @@ fn too_small(settings: &Settings, [low, high]: [[f64; 2]; 2]) -> Option<String> 
     })
 }
 
-/// A file that was read, with its settings.
+/// What is known of a file that was read beside its lines.
 pub struct Source {
-    /// The job that is sent.
-    pub job: Job<SourceFile>,
     /// The settings of the drawing.
     pub settings: Settings,
     /// The least and the greatest coordinates.

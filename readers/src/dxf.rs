@@ -524,7 +524,7 @@ impl Format for Dxf {
         let mut plan = Plan::new(file.clone());
         for (line, kind, layer, points) in drawing.strokes {
             let (pen, number) = pens.get(layer).copied().unwrap_or((1, 0));
-            plan.begin(line, kind.to_owned());
+            plan.begin(line, kind);
             match points.as_slice() {
                 [dot] => plan.draw_dot(*dot, None, pen, number),
                 _ => plan.draw_on(points, None, pen, number),

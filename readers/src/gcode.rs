@@ -351,7 +351,7 @@ impl Format for GCode {
             {
                 points.extend_from_slice(&next.points[1..]);
             }
-            plan.begin(first.line as usize, origin(first.line as usize).text);
+            plan.begin(first.line as usize, &origin(first.line as usize).text);
             plan.draw(points, None, 1);
         }
         let notes: Vec<String> = interpreter

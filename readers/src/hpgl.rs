@@ -262,7 +262,7 @@ impl Format for HpGl {
         for (pen, begin, points) in reader.strokes {
             line += bytes[counted_to..begin].iter().filter(|byte| **byte == b'\n').count();
             counted_to = begin;
-            plan.begin(line, text_at(begin));
+            plan.begin(line, &text_at(begin));
             match points.split_first() {
                 Some((dot, rest)) if rest.iter().all(|point| point == dot) => {
                     plan.draw_dot(*dot, None, pen, pen);

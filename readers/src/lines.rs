@@ -1,6 +1,6 @@
 //! The lines that are sent to a plotter, and where each comes from.
 
-use std::fmt::Debug;
+use std::fmt;
 
 /// A line to send.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,7 +55,7 @@ pub fn acts_at_once(letter: char) -> bool {
 }
 
 /// A sequence of lines to send, numbered from 0 and generated on demand.
-pub trait Lines: Debug {
+pub trait Lines {
     /// The number of lines.
     fn count(&self) -> usize;
 
@@ -65,6 +65,19 @@ pub trait Lines: Debug {
     /// Iterates over all lines in order, which may be faster than calling [`Lines::line`] for each.
     fn in_order(&self) -> Box<dyn Iterator<Item = JobLine> + '_> {
         Box::new((0..self.count()).map_while(|index| self.line(index)))
+    }
+}
+
+impl fmt::Debug for dyn Lines {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        // There may be millions of them.
+        write!(formatter, "{} lines", self.count())
+    }
+}
+
+impl fmt::Debug for dyn Lines + Send {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (self as &dyn Lines).fmt(formatter)
     }
 }
 

@@ -1,12 +1,13 @@
 //! A plan while it is read and arranged: strokes in millimetres, and the areas that may be hatched.
 
+mod plan_lines;
+
 use crate::format::{Body, Contents};
-use crate::lines::{JobLine, Lines, Origin};
+use crate::lines::Lines;
 use crate::page::Page;
 use crate::region::Regions;
-use penup::protocol::LINE_LIMIT;
+use plan_lines::{Elements, PlanLines};
 use std::collections::HashMap;
-use std::fmt::Write as _;
 
 /// A point of a plan in mm: x to the right, y upward.
 pub(crate) type Point = [f64; 2];
@@ -63,8 +64,8 @@ pub(crate) struct Plan {
     pub(crate) areas: Option<Vec<Area>>,
     /// The names of the layers; empty if the pens are the layers.
     pub(crate) layers: Vec<String>,
-    /// The line of the file in which each element begins, and its text.
-    elements: Vec<(usize, String)>,
+    /// The elements of the file to which the strokes belong.
+    elements: Elements,
     /// The number of polylines without a length, which are not drawn.
     pub(crate) dots: usize,
 }
@@ -75,13 +76,13 @@ impl Plan {
     }
 
     /// Begins an element of the file, to which the strokes that follow belong.
-    pub(crate) fn begin(&mut self, line: usize, text: String) {
-        self.elements.push((line, text));
+    pub(crate) fn begin(&mut self, line: usize, text: &str) {
+        self.elements.push(line, text);
     }
 
     /// The number of the element that began last.
     pub(crate) fn element(&self) -> u32 {
-        u32::try_from(self.elements.len().saturating_sub(1)).unwrap_or(u32::MAX)
+        u32::try_from(self.elements.count().saturating_sub(1)).unwrap_or(u32::MAX)
     }
 
     /// Whether nothing is drawn.
@@ -151,12 +152,7 @@ impl Plan {
 
     /// What the user should know about any plan.
     pub(crate) fn notes(&self) -> Vec<String> {
-        let dots = match self.dots {
-            0 => None,
-            1 => Some("1 line is not drawn, because a dot has no length".to_owned()),
-            dots => Some(format!("{dots} lines are not drawn, because a dot has no length")),
-        };
-        dots.into_iter().collect()
+        left_out(self.dots, "dots have no length").into_iter().collect()
     }
 
     /// Ends the reading of the plan.
@@ -167,29 +163,20 @@ impl Plan {
 
     /// Writes the lines that are sent, and says what the user should know about their number.
     pub(crate) fn into_lines(self) -> (PlanLines, Vec<String>) {
-        let mut lines = PlanLines {
-            file: self.file,
-            text: String::new(),
-            begins: Vec::new(),
-            of_elements: Vec::new(),
-            elements: self.elements,
-        };
-        let (mut vertices, mut pen) = (Vertices::default(), None);
+        let mut writer = PlanLines::writer(self.file, self.elements);
         // The strokes are freed one by one.
-        let strokes = self.strokes.into_iter();
-        let short = strokes.filter(|it| !lines.draw(it, &mut pen, &mut vertices)).count();
-        lines.text.shrink_to_fit();
-        lines.begins.shrink_to_fit();
-        let short = match short {
-            0 => None,
-            1 => Some("1 line is not drawn, because it is too short at this scale".to_owned()),
-            _ => Some(format!(
-                "{short} lines are not drawn, because they are too short at this scale"
-            )),
-        };
-        let notes = short.into_iter().chain(super::capacity(vertices.count)).collect();
+        let short = self.strokes.into_iter().filter(|stroke| !writer.draw(stroke)).count();
+        let (lines, vertices) = writer.end();
+        let short = left_out(short, "too short at this scale");
+        let notes = short.into_iter().chain(super::capacity(vertices)).collect();
         (lines, notes)
     }
+}
+
+/// Says why so many lines are left out, if there are any.
+fn left_out(count: usize, why: &str) -> Option<String> {
+    let counted = || super::counted(count, ["line is", "lines are"]);
+    (count > 0).then(|| format!("{} not drawn: {why}", counted()))
 }
 
 /// The most pens that a plotter has.
@@ -258,7 +245,7 @@ pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
                     points.push([x, y]);
                 }
                 if let Some(origin) = line.origin {
-                    plan.begin(origin.line, origin.text);
+                    plan.begin(origin.line, &origin.text);
                 }
                 plan.draw(points, None, pen);
             }
@@ -268,117 +255,6 @@ pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
         }
     }
     if plan.is_empty() { Err("has no lines".to_owned()) } else { Ok(plan) }
-}
-
-/// The vertices so far.
-#[derive(Debug, Default)]
-struct Vertices {
-    count: usize,
-    /// Their numbers, counted from 1, by their coordinates in thousandths of a millimetre. What is
-    /// farther than two kilometres away is not found again, which takes but a vertex more.
-    numbers: HashMap<[i32; 2], u32>,
-}
-
-impl Vertices {
-    /// The number of the vertex at this position, and whether it is a new one.
-    fn number(&mut self, [x, y]: [i64; 2]) -> (usize, bool) {
-        let next = self.count + 1;
-        let number = match (x.try_into(), y.try_into(), next.try_into()) {
-            (Ok(x), Ok(y), Ok(next)) => *self.numbers.entry([x, y]).or_insert(next) as usize,
-            _ => next,
-        };
-        self.count += usize::from(number == next);
-        (number, number == next)
-    }
-}
-
-/// The lines of a plan, each with the element of the file that it comes from.
-///
-/// They lie in one text, because a drawing may have millions of them.
-#[derive(Debug)]
-pub(crate) struct PlanLines {
-    file: String,
-    /// All lines, one behind the other.
-    text: String,
-    /// Where each line begins in the text.
-    begins: Vec<usize>,
-    /// Which lines come from another element than the line before, and the number of that element.
-    of_elements: Vec<(usize, u32)>,
-    /// The line of the file in which each element begins, and its text.
-    elements: Vec<(usize, String)>,
-}
-
-impl PlanLines {
-    fn push(&mut self, line: std::fmt::Arguments<'_>, element: u32) {
-        if self.of_elements.last().is_none_or(|(_, last)| *last != element) {
-            self.of_elements.push((self.begins.len(), element));
-        }
-        self.begins.push(self.text.len());
-        // Writing to a string cannot fail.
-        let _ = self.text.write_fmt(line);
-    }
-
-    /// Adds the lines of a stroke. Returns `false` if it has no length when it is rounded to
-    /// thousandths of a millimetre.
-    fn draw(&mut self, stroke: &Stroke, pen: &mut Option<u32>, vertices: &mut Vertices) -> bool {
-        let position = |value: f64| (value * PER_MM).round() as i64;
-        let mut positions: Vec<[i64; 2]> =
-            stroke.points.iter().map(|point| point.map(position)).collect();
-        positions.dedup();
-        if positions.len() < 2 {
-            return false;
-        }
-        let element = stroke.element;
-        if *pen != Some(stroke.pen) {
-            *pen = Some(stroke.pen);
-            self.push(format_args!("usemtl pen{}", stroke.pen), element);
-        }
-        let mut vertex = |position: [i64; 2]| {
-            let (number, is_new) = vertices.number(position);
-            if is_new {
-                let [x, y] = position.map(|value| value as f64 / PER_MM);
-                self.push(format_args!("v {x} {y} 0"), element);
-            }
-            number
-        };
-        let numbers: Vec<usize> = positions.into_iter().map(&mut vertex).collect();
-        let mut line = String::from("l");
-        let mut last = None;
-        for number in numbers {
-            let before = line.len();
-            // Writing to a string cannot fail.
-            let _ = write!(line, " {number}");
-            if line.len() > LINE_LIMIT {
-                line.truncate(before);
-                self.push(format_args!("{line}"), element);
-                line = format!("l {} {number}", last.unwrap_or(number));
-            }
-            last = Some(number);
-        }
-        self.push(format_args!("{line}"), element);
-        true
-    }
-}
-
-impl Lines for PlanLines {
-    fn count(&self) -> usize {
-        self.begins.len()
-    }
-
-    fn line(&self, index: usize) -> Option<JobLine> {
-        let begin = *self.begins.get(index)?;
-        let end = self.begins.get(index + 1).copied().unwrap_or(self.text.len());
-        let sent = self.text.get(begin..end)?.to_owned();
-        let of_element = self.of_elements.partition_point(|(first, _)| *first <= index);
-        let element = self.of_elements.get(of_element.checked_sub(1)?);
-        let place = element.and_then(|(_, element)| self.elements.get(*element as usize));
-        let origin = place.map(|(line, text)| Origin {
-            file: self.file.clone(),
-            line: *line,
-            text: text.clone(),
-        });
-        Some(JobLine { sent, origin })
-    }
 }
 
 #[cfg(all(test, feature = "svg"))]

@@ -133,7 +133,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let chosen = pens::pens(&marks);
     for (shape, &(pen, layer)) in drawing.shapes.iter_mut().zip(&chosen.of_paths) {
         let (line, text) = shape.element.map_or((1, String::new()), |it| markup.position(it));
-        plan.begin(line, text);
+        plan.begin(line, &text);
         // The lines of a shape are freed as soon as the plan has them.
         for polyline in std::mem::take(&mut shape.polylines) {
             let points = polyline.positions();

@@ -41,7 +41,7 @@ impl Format for Tape {
         let step = 1.0 / Setting::StepsPerMmX.info().default.to_num::<f64>();
         let mm = |point: PagePoint| [point.x, point.y].map(|steps| f64::from(steps) * step);
         let mut plan = Plan::new(file.clone());
-        plan.begin(1, "the tape".to_owned());
+        plan.begin(1, "the tape");
         let mut at = PagePoint::default();
         let mut stroke: Vec<[f64; 2]> = Vec::new();
         for (end, pen_down) in TapeLines::new(at, instructions.into_iter()) {

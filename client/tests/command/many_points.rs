@@ -18,10 +18,9 @@ use std::time::Duration;
 /// The points of a row.
 const ROW: usize = 1000;
 
-/// The bytes that the program may take for each point of a long polyline, and for each point of a
-/// line of two, which has a stroke of its own to be ordered.
+/// The bytes that the program may take for each point, whether it belongs to a long polyline or to
+/// a line of two, which has a stroke of its own to be ordered.
 const BYTES_A_POINT: usize = 200;
-const BYTES_A_SHORT_POINT: usize = 280;
 
 /// By how many bytes the memory of the program differs from one start to the next.
 const TOLERANCE: usize = 1_000_000;
@@ -148,7 +147,7 @@ fn number(name: &str, usual: usize) -> usize {
 }
 
 /// Checks that the program takes no more than so many bytes for each point.
-fn check(elements: Elements, limit: usize) {
+fn check(elements: Elements) {
     let points = number("PENUP_POINTS", POINTS);
     // So much is taken by the program itself.
     let least = memory_for(10, elements);
@@ -158,16 +157,16 @@ fn check(elements: Elements, limit: usize) {
         "{points} points as {elements:?}: {most} bytes at most, {each:.0} for each beside {least} \
          for 10"
     );
-    assert!(most <= least + limit * points + TOLERANCE, "{each:.0} bytes a point");
+    assert!(most <= least + BYTES_A_POINT * points + TOLERANCE, "{each:.0} bytes a point");
 }
 
 #[test]
 fn a_drawing_larger_than_the_board_takes_little_memory_for_each_point() {
-    check(Elements::Polylines(number("PENUP_STROKE", STROKE)), BYTES_A_POINT);
+    check(Elements::Polylines(number("PENUP_STROKE", STROKE)));
 }
 
 #[test]
 fn short_lines_take_little_memory_for_each_point_too() {
-    check(Elements::Lines, BYTES_A_SHORT_POINT);
-    check(Elements::Paths, BYTES_A_SHORT_POINT);
+    check(Elements::Lines);
+    check(Elements::Paths);
 }

@@ -325,9 +325,9 @@ fn what_becomes_too_short_is_counted() {
         |options: &[(&str, &str)]| arranged(&svg, options).expect("a plan").notes().join("; ");
     assert_eq!(notes(&[]), "");
     let told = notes(&[("scale", "0.03")]);
-    assert!(told.contains("1 line is not drawn, because it is too short"), "{told}");
+    assert!(told.contains("1 line is not drawn: too short at this scale"), "{told}");
     let told = notes(&[("scale", "0.02")]);
-    assert!(told.contains("2 lines are not drawn, because they are too short"), "{told}");
+    assert!(told.contains("2 lines are not drawn: too short at this scale"), "{told}");
 }
 
 #[test]
@@ -402,7 +402,7 @@ fn what_is_not_drawn_is_counted() {
              unit that is not read, or a reference to nothing (the first in line 5)",
             "1 mask is not applied as a whole: what a gradient, an image, a pattern or a filter \
              hides is drawn",
-            "1 line is not drawn, because a dot has no length",
+            "1 line is not drawn: dots have no length",
         ]
     );
 }
