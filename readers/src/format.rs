@@ -16,6 +16,7 @@ pub const SIZE_LIMIT: u64 = 1 << 32;
 pub(super) enum Body {
     /// The lines that are sent.
     Lines(Box<dyn Lines + Send>),
+    #[cfg_attr(not(feature = "plans"), allow(dead_code, reason = "no format is a plan"))]
     /// A plan, of which the lines are made once it is arranged.
     Plan(Plan),
 }

@@ -5,8 +5,8 @@
 //! file they come from. [`words`] says in the terms of the command line why one is refused.
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
-//! WebAssembly, the page. A large format is a feature: `dxf`, `hpgl`, `ply`, `svg`; and
-//! `text` is that of fonts for the texts of SVG files.
+//! WebAssembly, the page. A format that the page only loads when it is needed is a feature: `dxf`,
+//! `gcode`, `hpgl`, `ply`, `svg`, `tape`; and `text` is that of fonts for the texts of SVG files.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
@@ -19,6 +19,7 @@ mod error;
 pub mod files;
 pub mod fonts;
 mod format;
+#[cfg(feature = "gcode")]
 mod gcode;
 #[cfg(feature = "hpgl")]
 mod hpgl;
@@ -33,6 +34,7 @@ mod region;
 mod stl;
 #[cfg(feature = "svg")]
 mod svg;
+#[cfg(feature = "tape")]
 mod tape;
 pub mod words;
 
@@ -55,11 +57,13 @@ static FORMATS: &[&dyn Format] = &[
     &stl::Stl,
     #[cfg(feature = "ply")]
     &ply::Ply,
+    #[cfg(feature = "gcode")]
     &gcode::GCode,
     #[cfg(feature = "hpgl")]
     &hpgl::HpGl,
     #[cfg(feature = "dxf")]
     &dxf::Dxf,
+    #[cfg(feature = "tape")]
     &tape::Tape,
 ];
 

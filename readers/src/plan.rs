@@ -1,7 +1,9 @@
 //! A plan while it is read and arranged: strokes in millimetres, and the areas that may be hatched.
 
+#[cfg(feature = "plans")]
 use crate::format::{Body, Contents};
 use crate::lines::{JobLine, Lines, Origin};
+#[cfg(feature = "plans")]
 use crate::page::Page;
 use crate::region::Regions;
 use penup::protocol::LINE_LIMIT;
@@ -150,6 +152,7 @@ impl Plan {
     }
 
     /// What the user should know about any plan.
+    #[cfg(feature = "plans")]
     pub(crate) fn notes(&self) -> Vec<String> {
         let dots = match self.dots {
             0 => None,
@@ -160,6 +163,7 @@ impl Plan {
     }
 
     /// Ends the reading of the plan.
+    #[cfg(feature = "plans")]
     pub(crate) fn contents(self, page: Option<Page>, mut notes: Vec<String>) -> Contents {
         notes.extend(self.notes());
         Contents { body: Body::Plan(self), page, bounds: None, notes }
