@@ -54,6 +54,11 @@ pub(super) trait Format: Debug + Sync {
     /// its first 64 KiB. It is asked only where the extension leaves the format open.
     fn recognises(&self, beginning: &[u8]) -> bool;
 
+    /// Whether a file of this format that begins so may hold other bytes than text.
+    fn may_be_binary(&self, _: &[u8]) -> bool {
+        false
+    }
+
     /// Whether reading takes more stack the deeper the file is nested, up to 256 MiB.
     fn nests(&self) -> bool {
         false

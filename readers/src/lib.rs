@@ -10,7 +10,8 @@
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
-//! that are read, and so is a file of 4 GiB or more.
+//! that are read, or with what it is, if that is known; and so is one that is empty, that is no text
+//! where its format is, or of 4 GiB or more.
 
 mod arrange;
 #[cfg(feature = "dxf")]
@@ -18,6 +19,7 @@ mod dxf;
 mod error;
 pub mod files;
 pub mod fonts;
+mod foreign;
 mod format;
 #[cfg(feature = "gcode")]
 mod gcode;
@@ -42,7 +44,7 @@ pub use arrange::{Arrangement, PLAN_OPTIONS, PlanOption, Turn, sine_cosine};
 pub use error::ReadError;
 pub use format::SIZE_LIMIT;
 
-use crate::lines::{JobLine, Lines, extent};
+use crate::lines::{JobLine, Lines, Origin, extent};
 use crate::page::{A4, Page};
 use crate::plan::Plan;
 use format::{Body, Contents, Format};
@@ -215,6 +217,13 @@ fn read(
     if size as u64 >= SIZE_LIMIT {
         return Err(ReadError::TooLarge { file: name });
     }
+    if size == 0 {
+        return Err(ReadError::Content { file: name, reason: "the file is empty".to_owned() });
+    }
+    if !format.may_be_binary(&bytes) && foreign::is_binary(&bytes) {
+        let origin = Origin { file: name, line: 1, text: String::new() };
+        return Err(ReadError::NotText { origin, kind: format.name() });
+    }
     Ok((size, format.read(name, bytes, arrangement)?))
 }
 
@@ -230,6 +239,9 @@ pub fn takes_deep_stack(name: &str, bytes: &[u8]) -> bool {
 /// The format is unknown.
 fn find(name: &str, bytes: &[u8]) -> Result<&'static dyn Format, ReadError> {
     let beginning = bytes.get(..BEGINNING).unwrap_or(bytes);
+    if let Some(reason) = foreign::refusal(beginning) {
+        return Err(ReadError::Content { file: name.to_owned(), reason });
+    }
     let extension = Path::new(name).extension().unwrap_or_default().to_string_lossy();
     let extension = extension.to_lowercase();
     let has_extension = |format: &&dyn Format| format.extensions().contains(&extension.as_str());
