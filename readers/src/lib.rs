@@ -6,7 +6,8 @@
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
 //! WebAssembly, the page. A format that the page only loads when it is needed is a feature: `dxf`,
-//! `gcode`, `hpgl`, `ply`, `svg`, `tape`; and `text` is that of fonts for the texts of SVG files.
+//! `gcode`, `hpgl`, `ply`, `svg`, `tape`; `svgz` is that of compressed SVG files, and `text` that of
+//! fonts for their texts.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those

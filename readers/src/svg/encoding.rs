@@ -9,8 +9,8 @@ pub(super) const GZIP: &[u8] = b"\x1F\x8B";
 /// The reason why they are no text, as a sentence.
 pub(super) fn text(mut bytes: Vec<u8>) -> Result<String, String> {
     if bytes.starts_with(GZIP) {
-        bytes = usvg::decompress_svgz(&bytes)
-            .map_err(|_| "this compressed SVG is damaged or not whole: copy it again".to_owned())?;
+        bytes = uncompressed(&bytes)
+            .ok_or("this compressed SVG is damaged or not whole: copy or download it again")?;
     }
     let utf16 = |to_number: fn([u8; 2]) -> u16| {
         let (pairs, _) = bytes.as_chunks();
@@ -24,6 +24,18 @@ pub(super) fn text(mut bytes: Vec<u8>) -> Result<String, String> {
         }
     };
     decoded.map_err(|_| "this UTF-16 text is damaged: save it as UTF-8".to_owned())
+}
+
+/// What gzip has compressed; `None` if it is damaged.
+#[cfg(feature = "svgz")]
+fn uncompressed(bytes: &[u8]) -> Option<Vec<u8>> {
+    usvg::decompress_svgz(bytes).ok()
+}
+
+/// Whoever leaves the feature out uncompresses files before they are read.
+#[cfg(not(feature = "svgz"))]
+fn uncompressed(_: &[u8]) -> Option<Vec<u8>> {
+    None
 }
 
 /// The text in bytes that are no UTF-8, if the file says that they are Latin-1 or nearly so.

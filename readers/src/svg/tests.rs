@@ -309,6 +309,9 @@ fn text_of_other_encodings_is_read() {
     let latin1 = format!("<?xml version='1.0' encoding='ISO-8859-1'?>{svg}");
     let latin1: Vec<u8> = latin1.chars().map(|letter| letter as u8).collect();
     assert_eq!(of(latin1), expected);
+    if !cfg!(feature = "svgz") {
+        return;
+    }
     // Blocks of gzip may be stored as they are.
     let length = u16::try_from(svg.len()).expect("short");
     let [low, high] = length.to_le_bytes();
