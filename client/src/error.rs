@@ -340,15 +340,13 @@ pub enum Error {
     },
     /// The file to show is larger than the page opens.
     #[error(
-        "{file} has {} MB, and the page opens files of up to {} MB, which is more than any plotter \
-         holds",
-        size >> 20, limit >> 20
+        "{file} is larger than {} MB, which the page opens at most, and which is more than any \
+         plotter holds",
+        limit >> 20
     )]
     PageFileTooLarge {
         /// The path as the user wrote it.
         file: String,
-        /// Its size in bytes.
-        size: u64,
         /// The largest size in bytes.
         limit: u64,
     },

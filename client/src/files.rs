@@ -23,18 +23,32 @@ pub fn is_standard(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT
 }
 
+/// What the file at `path` is called in messages.
+pub fn name(path: &Path) -> String {
+    if is_standard(path) { STANDARD_NAME.to_owned() } else { path.display().to_string() }
+}
+
 /// Reads all bytes of the file at `path`, or of the standard input if that is `-`.
 ///
 /// # Errors
 /// The file cannot be read.
 pub fn bytes(path: &Path) -> Result<Vec<u8>, Error> {
-    if is_standard(path) {
-        let mut bytes = Vec::new();
-        let read = io::stdin().lock().take(SIZE_LIMIT).read_to_end(&mut bytes);
-        read.map_err(|source| Error::File { file: STANDARD_NAME.to_owned(), source })?;
-        return Ok(bytes);
-    }
-    std::fs::read(path).map_err(|source| Error::File { file: path.display().to_string(), source })
+    bytes_up_to(path, SIZE_LIMIT)
+}
+
+/// Reads the first bytes, `most` of them, of the file at `path`, or of the standard input if that
+/// is `-`.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn bytes_up_to(path: &Path, most: u64) -> Result<Vec<u8>, Error> {
+    let mut bytes = Vec::new();
+    let read = match is_standard(path) {
+        true => io::stdin().lock().take(most).read_to_end(&mut bytes),
+        false => File::open(path).and_then(|file| file.take(most).read_to_end(&mut bytes)),
+    };
+    read.map_err(|source| Error::File { file: name(path), source })?;
+    Ok(bytes)
 }
 
 /// The size in bytes of the stack on which a file that may be nested is read.
@@ -48,9 +62,9 @@ const STACK: usize = 256 << 20;
 /// accepts.
 pub fn read(path: &Path, arrangement: &Arrangement) -> Result<SourceFile, Error> {
     if is_standard(path) {
-        return Ok(parse(STANDARD_NAME.to_owned(), bytes(path)?, arrangement)?);
+        return Ok(parse(name(path), bytes(path)?, arrangement)?);
     }
-    let name = path.display().to_string();
+    let name = name(path);
     let unreadable = |source| Error::File { file: name.clone(), source };
     let (mut file, about) = open(path).map_err(unreadable)?;
     let mut bytes = Vec::new();

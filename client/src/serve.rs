@@ -11,6 +11,7 @@ mod read;
 
 use crate::bridge::Bridge;
 use crate::error::Error;
+use crate::files;
 use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::io::{self, Read as _, Write as _};
@@ -86,32 +87,29 @@ impl PageServer {
         port: u16,
         bridge: Option<(String, Bridge)>,
     ) -> Result<Self, Error> {
-        let mut files = BTreeMap::new();
-        collect(folder, "", &mut files).ok();
-        if !files.contains_key("index.html") {
+        let mut contents = BTreeMap::new();
+        collect(folder, "", &mut contents).ok();
+        if !contents.contains_key("index.html") {
             return Err(Error::PageNotBuilt { folder: folder.to_owned() });
         }
         let given = match given {
             None => None,
             Some(path) => {
-                let unreadable = |source| Error::File { file: path.display().to_string(), source };
-                let size = std::fs::metadata(path).map_err(unreadable)?.len();
-                if size > LARGEST_FILE {
-                    return Err(Error::PageFileTooLarge {
-                        file: path.display().to_string(),
-                        size,
-                        limit: LARGEST_FILE,
-                    });
+                let bytes = files::bytes_up_to(path, LARGEST_FILE + 1)?;
+                if bytes.len() as u64 > LARGEST_FILE {
+                    let file = files::name(path);
+                    return Err(Error::PageFileTooLarge { file, limit: LARGEST_FILE });
                 }
-                let bytes = std::fs::read(path).map_err(unreadable)?;
-                let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-                files.insert("given".to_owned(), bytes);
+                let name = files::name(path);
+                let name = Path::new(&name).file_name().unwrap_or_default();
+                let name = name.to_string_lossy().into_owned();
+                contents.insert("given".to_owned(), bytes);
                 Some(name)
             }
         };
         let (name, bridge) = bridge.unzip();
         let plotter = serde_json::json!({ "plotter": name });
-        files.insert(format!("{PLOTTER}.json"), plotter.to_string().into_bytes());
+        contents.insert(format!("{PLOTTER}.json"), plotter.to_string().into_bytes());
         let not_served = |reason: String| Error::PageNotServed { reason };
         let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port));
         let listener = listener.map_err(|error| not_served(error.to_string()))?;
@@ -122,7 +120,7 @@ impl PageServer {
             listener,
             hosts: [format!("127.0.0.1:{port}"), format!("localhost:{port}")],
             token: random.iter().map(|byte| format!("{byte:02x}")).collect(),
-            files,
+            files: contents,
             given,
             bridge,
         })

@@ -140,7 +140,7 @@ fn a_servo_mounted_the_other_way_round_is_raised_by_faults_and_starts() -> TestR
     let mut follow = |line: &mut Line<Pico>| -> TestResult<bool> {
         for change in line.emulator.pin_changes()? {
             if change.pin == Pin::Pen {
-                is_raised = change.high;
+                is_raised = !change.high;
             }
         }
         Ok(is_raised)

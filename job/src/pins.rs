@@ -2,6 +2,7 @@
 
 use penup::board_table::Pins;
 use penup::boards::host::{Change, Stamped};
+use penup::machine::{Setting, Settings};
 use std::time::Duration;
 
 /// An output pin of the plotter.
@@ -17,7 +18,7 @@ pub enum Pin {
     DirY,
     /// The enable pin of the motor drivers: low means that the motors have current.
     Enable,
-    /// High: the pen is down.
+    /// High: the pen is down. This is so even where a servo is mounted the other way round.
     Pen,
     /// A rising edge steps the motor that lifts the pen.
     StepZ,
@@ -62,9 +63,10 @@ impl PinChange {
     }
 }
 
-impl From<&Stamped> for PinChange {
-    /// Converts a change of the board in memory, whose ticks are 40 ns long.
-    fn from(Stamped { time, change }: &Stamped) -> Self {
+impl PinChange {
+    /// Converts a change of the board in memory, whose ticks are 40 ns long, with a pen that is
+    /// raised and lowered to these `heights`.
+    pub fn of(Stamped { time, change }: &Stamped, heights: PenHeights) -> Self {
         let (pin, high) = match *change {
             Change::StepX(high) => (Pin::StepX, high),
             Change::StepY(high) => (Pin::StepY, high),
@@ -72,11 +74,57 @@ impl From<&Stamped> for PinChange {
             Change::UpY(high) => (Pin::DirY, high),
             // The drivers are on while the pin is low.
             Change::Enable(on) => (Pin::Enable, !on),
-            Change::Pen(height) => (Pin::Pen, height >= 64),
+            Change::Pen(height) => (Pin::Pen, heights.is_down(height)),
             Change::StepZ(high) => (Pin::StepZ, high),
             Change::DownZ(high) => (Pin::DirZ, high),
         };
         Self { pin, high, at: Duration::from_nanos(time * 40) }
+    }
+}
+
+impl From<&Stamped> for PinChange {
+    /// Converts a change of the board in memory whose pen has the usual heights.
+    fn from(stamped: &Stamped) -> Self {
+        Self::of(stamped, PenHeights::default())
+    }
+}
+
+/// The heights of the raised and of the lowered pen, `$210` and `$211`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct PenHeights {
+    /// The height of the raised pen, from 0 to 127.
+    pub up: u8,
+    /// The height of the lowered pen.
+    pub down: u8,
+}
+
+impl Default for PenHeights {
+    /// The heights that a board has before it is told others.
+    fn default() -> Self {
+        Self { up: 0, down: 127 }
+    }
+}
+
+impl PenHeights {
+    /// The heights that the settings of a machine say.
+    pub fn of(settings: &Settings) -> Self {
+        let [up, down] = [Setting::PenUpHeight, Setting::PenDownHeight]
+            .map(|setting| settings.get(setting).to_num::<u8>());
+        Self { up, down }
+    }
+
+    /// Whether a pen at `height` is down: nearer to the height of the lowered pen than to that of
+    /// the raised one.
+    ///
+    /// ```
+    /// use penup_job::pins::PenHeights;
+    /// let reversed = PenHeights { up: 100, down: 20 };
+    /// assert!(reversed.is_down(0) && !reversed.is_down(127));
+    /// let low = PenHeights { up: 10, down: 40 };
+    /// assert!(low.is_down(40) && !low.is_down(10));
+    /// ```
+    pub fn is_down(self, height: u8) -> bool {
+        height.abs_diff(self.down) < height.abs_diff(self.up)
     }
 }
 

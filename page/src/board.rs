@@ -9,6 +9,7 @@ use penup::machine::{EventRing, PulserState, Setting};
 use penup::plotter::{Board as _, Plotter};
 use penup_job::export;
 use penup_job::picture::Picture;
+use penup_job::pins::{PenHeights, PinChange};
 use penup_job::room::Room;
 use penup_job::sampled::SampledPath;
 use penup_job::strokes::{Stroke, strokes_of};
@@ -80,9 +81,11 @@ impl Board {
             self.board.wait();
         }
         let changes = self.board.trace().take_changes();
+        let heights = PenHeights::of(self.plotter.machine().settings());
         for change in &changes {
-            self.pen.change(change.into());
-            self.path.change(change.into());
+            let change = PinChange::of(change, heights);
+            self.pen.change(change);
+            self.path.change(change);
         }
     }
 

@@ -10,9 +10,18 @@ onmessage = async ({ data: { id, call, args } }) => {
   try {
     ready ??= init({ module_or_path: fetch("penup_page_files_bg.wasm") });
     await ready;
-    const bytes = read(args.name, args.bytes, args.options);
+    const bytes = read(args.name, await uncompressed(args.bytes), args.options);
     postMessage({ id, value: bytes }, [bytes.buffer]);
   } catch (error) {
     postMessage({ id, ...(typeof error === "string" ? { error } : { broke: String(error) }) });
   }
 };
+
+/** The bytes of a file, without the compression of gzip, which SVG files may have. */
+async function uncompressed(bytes) {
+  if (bytes[0] !== 0x1f || bytes[1] !== 0x8b) return bytes;
+  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+  // The reader says what is wrong with a file that is damaged.
+  const whole = new Response(stream).arrayBuffer();
+  return whole.then((buffer) => new Uint8Array(buffer)).catch(() => bytes);
+}

@@ -27,6 +27,9 @@ use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::Arc;
 use text::Writing;
 
+/// The beginning of a binary file.
+const BINARY: &[u8] = b"AutoCAD Binary DXF";
+
 /// The format itself.
 #[derive(Debug)]
 pub(super) struct Dxf;
@@ -458,11 +461,15 @@ impl Format for Dxf {
         }
     }
 
+    fn may_be_binary(&self, beginning: &[u8]) -> bool {
+        beginning.starts_with(BINARY)
+    }
+
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let refused = |reason: &str| {
             Err(ReadError::Content { file: file.clone(), reason: reason.to_owned() })
         };
-        if bytes.starts_with(b"AutoCAD Binary DXF") {
+        if bytes.starts_with(BINARY) {
             return refused("this is the binary form of DXF: save it as text (ASCII)");
         }
         let text = match std::str::from_utf8(&bytes) {

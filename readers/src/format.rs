@@ -16,6 +16,7 @@ pub const SIZE_LIMIT: u64 = 1 << 32;
 pub(super) enum Body {
     /// The lines that are sent.
     Lines(Box<dyn Lines + Send>),
+    #[cfg_attr(not(feature = "plans"), allow(dead_code, reason = "no format is a plan"))]
     /// A plan, of which the lines are made once it is arranged.
     Plan(Plan),
 }
@@ -52,6 +53,11 @@ pub(super) trait Format: Debug + Sync {
     /// Whether a file with this `beginning` has this format. The beginning is the whole file, or
     /// its first 64 KiB. It is asked only where the extension leaves the format open.
     fn recognises(&self, beginning: &[u8]) -> bool;
+
+    /// Whether a file of this format that begins so may hold other bytes than text.
+    fn may_be_binary(&self, _: &[u8]) -> bool {
+        false
+    }
 
     /// Whether reading takes more stack the deeper the file is nested, up to 256 MiB.
     fn nests(&self) -> bool {

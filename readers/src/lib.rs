@@ -5,12 +5,14 @@
 //! file they come from. [`words`] says in the terms of the command line why one is refused.
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
-//! WebAssembly, the page. A large format is a feature: `dxf`, `hpgl`, `ply`, `svg`; and
-//! `text` is that of fonts for the texts of SVG files.
+//! WebAssembly, the page. A format that the page only loads when it is needed is a feature: `dxf`,
+//! `gcode`, `hpgl`, `ply`, `svg`, `tape`; `svgz` is that of compressed SVG files, and `text` that of
+//! fonts for their texts.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
-//! that are read, and so is a file of 4 GiB or more.
+//! that are read, or with what it is, if that is known; and so is one that is empty, that is no text
+//! where its format is, or of 4 GiB or more.
 
 mod arrange;
 #[cfg(feature = "dxf")]
@@ -18,7 +20,9 @@ mod dxf;
 mod error;
 pub mod files;
 pub mod fonts;
+mod foreign;
 mod format;
+#[cfg(feature = "gcode")]
 mod gcode;
 #[cfg(feature = "hpgl")]
 mod hpgl;
@@ -33,6 +37,7 @@ mod region;
 mod stl;
 #[cfg(feature = "svg")]
 mod svg;
+#[cfg(feature = "tape")]
 mod tape;
 pub mod words;
 
@@ -40,7 +45,7 @@ pub use arrange::{Arrangement, PLAN_OPTIONS, PlanOption, Turn, sine_cosine};
 pub use error::ReadError;
 pub use format::SIZE_LIMIT;
 
-use crate::lines::{JobLine, Lines, extent};
+use crate::lines::{JobLine, Lines, Origin, extent};
 use crate::page::{A4, Page};
 use crate::plan::Plan;
 use format::{Body, Contents, Format};
@@ -55,11 +60,13 @@ static FORMATS: &[&dyn Format] = &[
     &stl::Stl,
     #[cfg(feature = "ply")]
     &ply::Ply,
+    #[cfg(feature = "gcode")]
     &gcode::GCode,
     #[cfg(feature = "hpgl")]
     &hpgl::HpGl,
     #[cfg(feature = "dxf")]
     &dxf::Dxf,
+    #[cfg(feature = "tape")]
     &tape::Tape,
 ];
 
@@ -211,6 +218,13 @@ fn read(
     if size as u64 >= SIZE_LIMIT {
         return Err(ReadError::TooLarge { file: name });
     }
+    if size == 0 {
+        return Err(ReadError::Content { file: name, reason: "the file is empty".to_owned() });
+    }
+    if !format.may_be_binary(&bytes) && foreign::is_binary(&bytes) {
+        let origin = Origin { file: name, line: 1, text: String::new() };
+        return Err(ReadError::NotText { origin, kind: format.name() });
+    }
     Ok((size, format.read(name, bytes, arrangement)?))
 }
 
@@ -226,6 +240,9 @@ pub fn takes_deep_stack(name: &str, bytes: &[u8]) -> bool {
 /// The format is unknown.
 fn find(name: &str, bytes: &[u8]) -> Result<&'static dyn Format, ReadError> {
     let beginning = bytes.get(..BEGINNING).unwrap_or(bytes);
+    if let Some(reason) = foreign::refusal(beginning) {
+        return Err(ReadError::Content { file: name.to_owned(), reason });
+    }
     let extension = Path::new(name).extension().unwrap_or_default().to_string_lossy();
     let extension = extension.to_lowercase();
     let has_extension = |format: &&dyn Format| format.extensions().contains(&extension.as_str());

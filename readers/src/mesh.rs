@@ -1,4 +1,5 @@
-//! The lines of OBJ that describe a mesh: faces between points, joined where they are equal.
+//! The lines of OBJ that describe a mesh: faces and edges between points, joined where they are
+//! equal.
 
 use super::error::ReadError;
 use super::format::Contents;
@@ -29,7 +30,7 @@ pub(super) enum Coordinate {
 
 impl Coordinate {
     /// The value.
-    fn value(self) -> f64 {
+    pub(super) fn value(self) -> f64 {
         match self {
             Self::Single(value) => value.into(),
             Self::Double(value) => value,
@@ -55,7 +56,7 @@ impl Coordinate {
 /// A point in space: x, y and z.
 pub(super) type Point = [Coordinate; 3];
 
-/// A mesh that grows by faces.
+/// A mesh that grows by faces and edges.
 #[derive(Debug, Default)]
 pub(super) struct Mesh {
     /// The file, as the user named it.
@@ -117,6 +118,15 @@ impl Mesh {
         }
     }
 
+    /// Adds the edge of the file with this number, counted from 1, between two vertices.
+    #[cfg(feature = "ply")]
+    pub(super) fn edge(&mut self, number: u32, ends: [u32; 2]) {
+        if ends[0] != ends[1] {
+            self.corners.extend(ends);
+            self.elements.push((self.corners.len() as u32, number));
+        }
+    }
+
     /// The corners of an element.
     fn corners(&self, index: usize) -> Option<(&[u32], u32)> {
         let (end, number) = *self.elements.get(index)?;
@@ -128,7 +138,7 @@ impl Mesh {
     /// The line of OBJ that draws an element.
     fn face_line(&self, index: usize) -> Option<(String, u32)> {
         let (corners, number) = self.corners(index)?;
-        let mut line = "f".to_owned();
+        let mut line = if corners.len() > 2 { "f" } else { "l" }.to_owned();
         for corner in corners {
             // Writing to a string cannot fail.
             let _ = write!(line, " {}", u64::from(*corner) + 1);
@@ -175,6 +185,9 @@ impl Mesh {
         let least = NEARLY_FLAT.to_radians().cos();
         for index in 0..self.elements.len() {
             let (corners, _) = self.corners(index)?;
+            if corners.len() < 3 {
+                continue;
+            }
             let normal = self.normal(corners);
             for (at, &a) in corners.iter().enumerate() {
                 let b = corners[(at + 1) % corners.len()];
@@ -247,7 +260,7 @@ impl Lines for Mesh {
         let origin = Origin {
             file: self.file.clone(),
             line: number as usize,
-            text: format!("face {number}"),
+            text: format!("{} {number}", if sent.starts_with('f') { "face" } else { "edge" }),
         };
         Some(JobLine { sent, origin: Some(origin) })
     }

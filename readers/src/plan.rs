@@ -2,8 +2,10 @@
 
 mod plan_lines;
 
+#[cfg(feature = "plans")]
 use crate::format::{Body, Contents};
 use crate::lines::Lines;
+#[cfg(feature = "plans")]
 use crate::page::Page;
 use crate::region::Regions;
 use plan_lines::{Elements, PlanLines};
@@ -19,6 +21,10 @@ const PER_MM: f64 = 1000.0;
 /// The length in mm of the line that is drawn for a dot: more than a motor step.
 #[cfg(any(feature = "dxf", feature = "hpgl", feature = "svg"))]
 const DOT: f64 = 0.02;
+
+/// The coordinate in mm from which on a plan is moved: less than the largest that plotters take.
+#[cfg(feature = "plans")]
+const FARTHEST: f64 = 1e9;
 
 /// A polyline that the pen draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -150,13 +156,36 @@ impl Plan {
         }))
     }
 
+    /// Moves a plan without areas to the origin if its coordinates are larger than any plotter
+    /// takes, as those of a map are. Returns what the user should know about it.
+    #[cfg(feature = "plans")]
+    fn brought_near(&mut self) -> Option<String> {
+        let [low, high] = self.bounds()?;
+        let is_near = |[x, y]: Point| x.abs() < FARTHEST && y.abs() < FARTHEST;
+        if is_near(low) && is_near(high) || self.areas.is_some() {
+            return None;
+        }
+        for point in self.strokes.iter_mut().flat_map(|stroke| &mut stroke.points) {
+            for axis in 0..2 {
+                point[axis] = ((point[axis] - low[axis]) * PER_MM).round() / PER_MM;
+            }
+        }
+        Some(format!(
+            "the coordinates are too large for a plotter: the drawing is moved by {} and {} mm",
+            -low[0], -low[1]
+        ))
+    }
+
     /// What the user should know about any plan.
+    #[cfg(feature = "plans")]
     pub(crate) fn notes(&self) -> Vec<String> {
         left_out(self.dots, "dots have no length").into_iter().collect()
     }
 
     /// Ends the reading of the plan.
-    pub(crate) fn contents(self, page: Option<Page>, mut notes: Vec<String>) -> Contents {
+    #[cfg(feature = "plans")]
+    pub(crate) fn contents(mut self, page: Option<Page>, mut notes: Vec<String>) -> Contents {
+        notes.extend(self.brought_near());
         notes.extend(self.notes());
         Contents { body: Body::Plan(self), page, bounds: None, notes }
     }

@@ -1,8 +1,8 @@
 //! Reads PLY files, binary and text, by the crate `ply-rs-bw`.
 //!
-//! Vertices are joined where they are equal, and faces may have any number of corners. What else
-//! the file holds, colours or normals for instance, has no meaning for a plotter. The reader
-//! refuses files without faces, corners that are no vertices, and numbers that are not finite.
+//! Vertices are joined where they are equal, and faces may have any number of corners. Edges are
+//! lines. What else the file holds, colours or normals for instance, has no meaning for a plotter;
+//! other elements are counted. The reader refuses files without faces and edges, corners that are no vertices, and numbers that are not finite.
 
 use super::arrange::Arrangement;
 use super::error::ReadError;
@@ -16,11 +16,13 @@ use std::borrow::Cow;
 #[derive(Debug)]
 pub(super) struct Ply;
 
-/// What is read of an element of the file: a vertex has coordinates, a face has corners.
+/// What is read of an element of the file: a vertex has coordinates, a face has corners, and an edge
+/// has ends.
 #[derive(Debug, Default)]
 struct Element {
     point: [Option<Coordinate>; 3],
     corners: Option<Vec<i64>>,
+    ends: [Option<i64>; 2],
 }
 
 impl PropertyAccess for Element {
@@ -35,6 +37,11 @@ impl PropertyAccess for Element {
             "z" => 2,
             "vertex_indices" | "vertex_index" => {
                 self.corners = corners(property);
+                return PropertyAccessResult::Set;
+            }
+            "vertex1" | "vertex2" => {
+                let end = usize::from(name == "vertex2");
+                self.ends[end] = coordinate(&property).map(|number| number.value() as i64);
                 return PropertyAccessResult::Set;
             }
             _ => return PropertyAccessResult::Ignored,
@@ -105,6 +112,10 @@ impl Format for Ply {
         beginning.starts_with(b"ply\n") || beginning.starts_with(b"ply\r")
     }
 
+    fn may_be_binary(&self, _: &[u8]) -> bool {
+        true
+    }
+
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let refused = |reason| ReadError::Content { file: file.clone(), reason };
         let bytes = without_empty_lines(&bytes);
@@ -126,18 +137,40 @@ impl Format for Ply {
             }
             numbers.push(mesh.vertex([x, y, z]));
         }
+        let number = |corner: &i64| numbers.get(usize::try_from(*corner).ok()?).copied();
         for (index, face) in ply.payload.get("face").into_iter().flatten().enumerate() {
             let Some(corners) = &face.corners else {
                 return Err(refused(format!("face {index} has no list of vertices")));
             };
-            let number = |corner: &i64| numbers.get(usize::try_from(*corner).ok()?).copied();
             let known: Vec<u32> = corners.iter().filter_map(number).collect();
             if known.len() < corners.len() {
                 return Err(refused(format!("face {index} has a corner that is no vertex")));
             }
             mesh.face(index as u32 + 1, &known);
         }
-        mesh.finish()
+        for (index, edge) in ply.payload.get("edge").into_iter().flatten().enumerate() {
+            let [Some(from), Some(to)] = edge.ends.map(|end| number(&end?)) else {
+                return Err(refused(format!("edge {index} has an end that is no vertex")));
+            };
+            mesh.edge(index as u32 + 1, [from, to]);
+        }
+        let others = ply.payload.iter().filter(|(name, elements)| {
+            !["vertex", "face", "edge"].contains(&name.as_str()) && !elements.is_empty()
+        });
+        let others =
+            others.map(|(name, elements)| format!("{} of {name} not read", elements.len()));
+        let others: Vec<String> = others.collect();
+        if mesh.is_empty() && !numbers.is_empty() {
+            let others: String = others.iter().map(|it| format!(", and {it}")).collect();
+            return Err(refused(format!(
+                "there are {} points and no face to draw{others}: make a mesh of faces of them \
+                 first, for example with MeshLab",
+                numbers.len()
+            )));
+        }
+        let mut contents = mesh.finish()?;
+        contents.notes.extend(others);
+        Ok(contents)
     }
 }
 
@@ -184,6 +217,29 @@ mod tests {
         );
         assert_eq!(sent("a.ply", text.as_bytes()), expected());
         assert_eq!(sent("a.ply", text.replace('\n', "\r\n").as_bytes()), expected());
+    }
+
+    #[test]
+    fn edges_are_lines_and_other_elements_are_counted() {
+        let head = "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n\
+                    property float z\n";
+        let points = "0 0 0\n1 0 0\n1 1 0\n";
+        let edges = "element edge 2\nproperty int vertex1\nproperty int vertex2\n";
+        let file = format!("{head}{edges}end_header\n{points}0 1\n2 1\n");
+        let expected = ["v 0 0 0", "v 1 0 0", "v 1 1 0", "l 1 2", "l 3 2"].map(str::to_owned);
+        assert_eq!(sent("a.ply", file.as_bytes()), Ok(expected.to_vec()));
+        let error = sent("a.ply", file.replace("2 1", "3 1").as_bytes()).expect_err("refused");
+        assert!(error.contains("edge 1 has an end that is no vertex"), "{error}");
+        let strips = "element tristrips 1\nproperty list int int vertex_indices\nend_header\n";
+        let error = sent("a.ply", format!("{head}{strips}{points}3 0 1 2\n").as_bytes());
+        let error = error.expect_err("refused");
+        assert!(
+            error.contains("there are 3 points and no face to draw, and 1 of tristrips not read"),
+            "{error}"
+        );
+        let cloud = format!("{head}end_header\n{points}");
+        let error = sent("a.ply", cloud.as_bytes()).expect_err("refused");
+        assert!(error.contains("there are 3 points and no face to draw: make a mesh"), "{error}");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Reads STL files, binary and text.
 //!
-//! A binary file is known by its length, because its head may begin with `solid` as a text does.
+//! A binary file is known by its length, because its head may begin with `solid` as a text does. No
+//! text tells so few faces where a binary file tells their number.
 //! Equal points become one vertex. All solids of a text are read. (The crate `stl_io` reads the
 //! first alone, and takes such a binary file for text.)
 //!
@@ -19,6 +20,9 @@ pub(super) struct Stl;
 /// The number of bytes before the first face of a binary file, the last four of which count the
 /// faces.
 const HEAD: usize = 84;
+
+/// The most faces that a file is believed to have which has fewer.
+const MOST_FACES: usize = 100_000_000;
 
 /// The number of bytes of a face in a binary file: the normal, three points, and two bytes more.
 const FACE: usize = 50;
@@ -39,18 +43,32 @@ impl Format for Stl {
         words.next() == Some("solid") && words.any(|word| word == "facet")
     }
 
+    fn may_be_binary(&self, _: &[u8]) -> bool {
+        true
+    }
+
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let mut mesh = Mesh::new(file.clone());
-        match binary_faces(&bytes) {
-            Some(faces) => read_binary(&file, faces, &mut mesh)?,
-            None if is_text(&bytes) => read_text(&file, &bytes, &mut mesh)?,
-            None => {
-                let reason = "this is no whole STL file: its length does not match the number of \
-                              faces that it tells";
-                return Err(ReadError::Content { file, reason: reason.to_owned() });
+        let refused = |reason| Err(ReadError::Content { file: file.clone(), reason });
+        let mut behind = 0;
+        match Binary::of(&bytes) {
+            Binary::Faces(faces, rest) => {
+                read_binary(&file, faces, &mut mesh)?;
+                behind = rest;
             }
+            _ if is_text(&bytes) => read_text(&file, &bytes, &mut mesh)?,
+            Binary::Short { has, tells } if tells <= MOST_FACES => {
+                return refused(format!(
+                    "the file ends after {has} of {tells} faces: copy or download it again"
+                ));
+            }
+            Binary::Short { .. } => return refused("this is no STL file".to_owned()),
         }
-        mesh.finish()
+        let mut contents = mesh.finish()?;
+        if behind > 0 {
+            contents.notes.push(format!("{behind} bytes behind the last face are not read"));
+        }
+        Ok(contents)
     }
 }
 
@@ -59,18 +77,33 @@ fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split('#').next().unwrap_or_default().split_ascii_whitespace()
 }
 
-/// Whether the first word of a file that is not binary is that of a text file.
+/// Whether this is text whose first word is that of an STL.
 fn is_text(bytes: &[u8]) -> bool {
-    let text = String::from_utf8_lossy(bytes);
-    text.lines().flat_map(words).next() == Some("solid")
+    let beginning = bytes.get(..4096).unwrap_or(bytes);
+    let text = String::from_utf8_lossy(beginning);
+    !beginning.contains(&0) && text.lines().flat_map(words).next() == Some("solid")
 }
 
-/// The faces of a binary file; `None` if it is none.
-fn binary_faces(bytes: &[u8]) -> Option<&[[u8; FACE]]> {
-    let (head, faces) = bytes.split_at_checked(HEAD)?;
-    let count = u32::from_le_bytes(*head.last_chunk()?) as usize;
-    let (faces, rest) = faces.as_chunks();
-    (faces.len() == count && rest.is_empty()).then_some(faces)
+/// What a file is if it is taken as a binary one.
+enum Binary<'b> {
+    /// It has all faces that it tells, and so many bytes behind them.
+    Faces(&'b [[u8; FACE]], usize),
+    /// It has fewer whole faces than it tells.
+    Short { has: usize, tells: usize },
+}
+
+impl<'b> Binary<'b> {
+    fn of(bytes: &'b [u8]) -> Self {
+        let Some((head, body)) = bytes.split_at_checked(HEAD) else {
+            return Self::Short { has: 0, tells: usize::MAX };
+        };
+        let tells = head.last_chunk().map_or(0, |count| u32::from_le_bytes(*count) as usize);
+        let (faces, _) = body.as_chunks();
+        match faces.get(..tells) {
+            Some(own) => Self::Faces(own, body.len() - tells * FACE),
+            None => Self::Short { has: faces.len(), tells },
+        }
+    }
 }
 
 fn read_binary(file: &str, faces: &[[u8; FACE]], mesh: &mut Mesh) -> Result<(), ReadError> {
@@ -184,6 +217,14 @@ mod tests {
     }
 
     #[test]
+    fn what_follows_the_faces_of_a_binary_file_is_told() {
+        let mut bytes = binary("solid a", &[[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]]);
+        assert_eq!(notes("a.stl", &bytes), [""; 0]);
+        bytes.extend([0; 7]);
+        assert_eq!(notes("a.stl", &bytes), ["7 bytes behind the last face are not read"]);
+    }
+
+    #[test]
     fn a_face_without_three_corners_is_counted() {
         let (a, b, c) = ([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
         let bytes = binary("", &[[a, b, c], [a, a, b], [a, b, a]]);
@@ -194,9 +235,12 @@ mod tests {
     #[test]
     fn damaged_files_are_refused_with_the_place() {
         let short = binary("", &[[[0.0; 3], [1.0; 3], [2.0; 3]]]);
+        let solid = binary("solid of a program", &[[[0.0; 3], [1.0; 3], [2.0; 3]]; 2]);
         for (bytes, reason) in [
-            (&short[..short.len() - 1], "a.stl: this is no whole STL file"),
-            (b"", "a.stl: this is no whole STL file"),
+            (&short[..short.len() - 1], "a.stl: the file ends after 0 of 1 faces: copy or"),
+            (&solid[..solid.len() - 60], "a.stl: the file ends after 0 of 2 faces"),
+            (&[200; 300], "a.stl: this is no STL file"),
+            (b"nothing", "a.stl: this is no STL file"),
             (&binary("", &[[[f32::NAN; 3], [1.0; 3], [2.0; 3]]]), "face 1 is no finite number"),
             (&binary("", &[]), "a.stl: there is no face to draw"),
             (b"solid\nfacet normal 0 0 1\nouter loop\nvertex 1 2\n", "a.stl:4: a vertex has three"),

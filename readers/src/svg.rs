@@ -8,7 +8,8 @@
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
 //! a dot with round or square ends is a very short line; a shape that is only filled is drawn as
-//! its outline. What has neither is not drawn. Texts are drawn as the outlines of their letters, if
+//! its outline. What has neither is not drawn, nor what would not be seen: a filled shape without an
+//! area, and a white one where no other colour lies below it. Texts are drawn as the outlines of their letters, if
 //! the caller knows fonts. Clip paths cut lines off, and are a part of the outline of what is only
 //! filled, and so do masks ([`areas`]). An image that is an SVG is drawn ([`embedded`]). Other
 //! images, filters and patterns are counted, and the user is told.
@@ -23,6 +24,7 @@ mod axidraw;
 mod clip;
 mod drawing;
 mod embedded;
+mod encoding;
 mod flatten;
 mod markup;
 mod pens;
@@ -56,7 +58,7 @@ impl Format for Svg {
     }
 
     fn extensions(&self) -> &'static [&'static str] {
-        &["svg"]
+        &["svg", "svgz"]
     }
 
     /// `usvg` takes 1024 nested elements, for each of which it calls itself several times.
@@ -70,21 +72,18 @@ impl Format for Svg {
         text.starts_with(b"<") && beginning.windows(4).any(|letters| letters == b"<svg")
     }
 
+    fn may_be_binary(&self, beginning: &[u8]) -> bool {
+        beginning.starts_with(encoding::GZIP)
+    }
+
     fn read(
         &self,
         file: String,
         bytes: Vec<u8>,
         arrangement: &Arrangement,
     ) -> Result<Contents, ReadError> {
-        if bytes.starts_with(b"\xFF\xFE") || bytes.starts_with(b"\xFE\xFF") {
-            return Err(ReadError::Utf16 { file });
-        }
         let refused = |reason: String| ReadError::Content { file: file.clone(), reason };
-        if bytes.starts_with(b"\x1F\x8B") {
-            return Err(refused("this SVG is compressed: unpack it with gunzip first".to_owned()));
-        }
-        let text = String::from_utf8(bytes);
-        let text = text.map_err(|_| refused("this is not UTF-8 text: save it as UTF-8".into()))?;
+        let text = encoding::text(bytes).map_err(refused)?;
         let text = match runs::joined(&text) {
             Some(joined) => joined,
             None => text,
@@ -94,13 +93,18 @@ impl Format for Svg {
     }
 }
 
+/// What is said of a file that is no XML, before the place.
+const NOT_WELL_FORMED: &str =
+    "this is not a well-formed SVG: save it again, for example with Inkscape";
+
 /// Reads `text`, the contents of `file`.
 ///
 /// # Errors
 /// The reason why it is not drawn, as a sentence.
 fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Contents, String> {
-    let not_xml = |error| format!("this is not a well-formed SVG: {error}");
-    let text = markup::with_ids(text, &markup::parsed(text).map_err(not_xml)?);
+    let not_xml = |error| format!("{NOT_WELL_FORMED}: {error}");
+    let text = markup::with_prefixes(text);
+    let text = markup::with_ids(&text, &markup::parsed(&text).map_err(not_xml)?);
     let document = markup::parsed(&text).map_err(not_xml)?;
     let mut options = Options::default();
     let embedded = Arc::new(Embedded::default());
@@ -114,7 +118,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         Error::ElementsLimitReached | Error::ParsingFailed(XmlError::NodesLimitReached) => {
             "the SVG has too many elements, or they are nested too deeply".to_owned()
         }
-        error => format!("this is not a well-formed SVG: {error}"),
+        error => format!("{NOT_WELL_FORMED}: {error}"),
     })?;
     let size = [tree.size().width(), tree.size().height()];
     // What single precision adds to a length in mm is rounded away.
@@ -154,6 +158,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     notes.extend(fonts.iter().flat_map(|fonts| fonts.notes(&drawing.texts)));
     notes.extend(pens::not_obeyed(&marks));
     notes.extend(not_as_it_is(&drawing));
+    notes.extend(markup.size_note(page));
     if plan.is_empty() {
         let mut reasons = vec!["there is nothing to draw in this SVG".to_owned()];
         if drawing.documentation > 0 {
@@ -187,6 +192,17 @@ fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
             drawing.backgrounds,
             ["filled shape covers", "filled shapes cover"],
             "the whole page, as a background does: its outline is not drawn",
+        ),
+        (
+            drawing.flat,
+            ["path is", "paths are"],
+            "not drawn: filled, but without an area and without a stroke",
+        ),
+        (
+            drawing.white,
+            ["shape is", "shapes are"],
+            "not drawn: filled with white alone, on white paper; a stroke or another colour shows \
+             it",
         ),
         (
             drawing.patterns,

@@ -29,6 +29,10 @@ impl Format for Tape {
         false
     }
 
+    fn may_be_binary(&self, _: &[u8]) -> bool {
+        true
+    }
+
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let refused = |reason| ReadError::Content { file: file.clone(), reason };
         let mut decoder = Decoder::new(bytes.iter().copied());

@@ -25,14 +25,59 @@ pub(crate) fn notes(name: &str, content: &[u8]) -> Vec<String> {
 }
 
 const UNKNOWN: &str = "penup reads Wavefront OBJ files, whose names end in .obj; SVG files, \
-                       whose names end in .svg; ";
+                       whose names end in .svg or .svgz; ";
 
 #[test]
 fn the_extension_decides_in_capitals_as_well() {
-    assert_eq!(read("a.obj", b""), Ok(0));
+    assert_eq!(read("a.obj", b"#"), Ok(0));
     assert_eq!(read("A.OBJ", b"# v\nv 0 0 0"), Ok(1));
-    let error = read("a.obj", b"\x89PNG\r\n\x1a\n\0\0\0").expect_err("no text");
-    assert!(error.starts_with("a.obj:1: "), "{error}");
+    let error = read("a.obj", b"#\n\0\0\0").expect_err("no text");
+    assert!(error.starts_with("a.obj:2: "), "{error}");
+}
+
+#[test]
+fn files_of_other_programs_are_named_whatever_they_are_called() {
+    let page: &[u8] = b"\n<!DOCTYPE HTML>\n<title>404</title>";
+    let contents: [(&[u8], &str); 8] = [
+        (b"%PDF-1.4\n%\xE2\xE3", "this is a PDF document, which penup does not read: open it in"),
+        (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "this is an image of pixels"),
+        (b"PK\x03\x04", "this is a ZIP archive or 3MF"),
+        (b"AC1032\0\0", "this is a DWG drawing, which penup does not read: save it as DXF"),
+        (b"ISO-10303-21;\nHEADER;", "this is a STEP model"),
+        (b"version https://git-lfs.github.com/spec/v1\n", "this is a pointer of Git LFS"),
+        (page, "this is a web page"),
+        (b"", "the file is empty"),
+    ];
+    for (content, reason) in contents {
+        for name in ["a.svg", "a.stl", "a.obj"] {
+            let error = read(name, content).expect_err("refused");
+            assert!(error.starts_with(&format!("{name}: {reason}")), "{error}");
+        }
+    }
+}
+
+/// Random bytes are not shown to the user as if they were a line.
+#[test]
+fn bytes_that_are_no_text_are_refused_as_such() {
+    let mut state = 1_u32;
+    let noise: Vec<u8> = std::iter::repeat_with(|| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 24) as u8
+    })
+    .take(5000)
+    .collect();
+    for (name, format) in [
+        ("a.obj", "Wavefront OBJ"),
+        ("a.gcode", "G-code"),
+        ("a.hpgl", "HP-GL"),
+        ("a.dxf", "DXF"),
+        ("a.svg", "SVG"),
+    ] {
+        let said = format!(
+            "{name}:1: this is no text, and {format} is: is it another file under this name?"
+        );
+        assert_eq!(read(name, &noise), Err(said));
+    }
 }
 
 #[test]
@@ -45,8 +90,7 @@ fn the_content_decides_where_the_extension_does_not() {
 
 #[test]
 fn a_file_of_no_known_format_is_refused_with_those_that_are_read() {
-    let png = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR";
-    let contents: [&[u8]; 4] = [b"", b"Dear Ada,\n", png, b"l 1 2\n"];
+    let contents: [&[u8]; 4] = [b"", b"Dear Ada,\n", b"\x1a\n\0", b"l 1 2\n"];
     for content in contents {
         for name in ["a.zip", "a"] {
             let error = read(name, content).expect_err("no known format");

@@ -18,7 +18,7 @@ use std::path::PathBuf;
 /// Options of `penup page`.
 #[derive(Debug, Args)]
 pub struct PageArgs {
-    /// The file to show [default: an example]
+    /// The file to show; - is the standard input [default: an example]
     #[arg(value_name = "FILE")]
     pub file: Option<PathBuf>,
     /// The folder of the page [default: page beside this program, or what `cargo xtask page` has

@@ -17,6 +17,7 @@
 //! a trace that cannot be parsed. Where the emulator ran, the error contains its last output.
 
 mod debugger;
+mod heights;
 mod log;
 mod pico;
 mod process;
@@ -34,6 +35,7 @@ pub use pico::{FlashOperation, InterruptTimes, Pico, PicoByUsb, UartError};
 pub use stack::Stack;
 
 use crate::table::{self, BoardRow};
+use heights::ToldHeights;
 pub use penup_job::pins::{Machine, MachineEvent, MachineEventKind, Pin, PinChange};
 use process::Process;
 use trace::{Trace, TraceError};
@@ -173,6 +175,7 @@ pub struct Emulator {
     line: TcpStream,
     /// The number of bytes that `receive` has returned.
     received: u64,
+    told: ToldHeights,
 }
 
 /// The board that QEMU emulates here.
@@ -190,7 +193,7 @@ impl Emulator {
     pub fn start(image: &Path, options: Options) -> Result<Self, EmulatorError> {
         let (process, line) = Process::start(image, options, TIMEOUT)?;
         line.set_nodelay(true)?;
-        Ok(Self { process, line, received: 0 })
+        Ok(Self { process, line, received: 0, told: ToldHeights::default() })
     }
 
     /// The deepest use of the stack since the boot; `None` unless [`Options::paints_stack`] is set.
@@ -209,6 +212,7 @@ impl Emulator {
 
 impl EmulatedBoard for Emulator {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.told.hear(bytes);
         self.line.write_all(bytes)
     }
 
@@ -231,7 +235,14 @@ impl EmulatedBoard for Emulator {
 
     fn pin_changes(&mut self) -> Result<Vec<PinChange>, EmulatorError> {
         let received = self.received;
-        self.process.with_trace(TIMEOUT, |trace| trace.sent() >= received, Trace::take_pins)
+        let is_whole = |trace: &Trace| trace.sent() >= received;
+        let mut changes = self.process.with_trace(TIMEOUT, is_whole, Trace::take_pins)?;
+        let heights = self.told.heights();
+        for change in changes.iter_mut().filter(|change| change.pin == Pin::Pen) {
+            // Solenoids know these two heights.
+            change.high = heights.is_down(if change.high { 127 } else { 0 });
+        }
+        Ok(changes)
     }
 
     fn clock(&mut self) -> Result<Duration, EmulatorError> {

@@ -458,6 +458,7 @@ impl Pico {
 
     /// Sends bytes to one of the serial lines of the board.
     fn send_to(&mut self, port: u8, bytes: &[u8]) -> io::Result<()> {
+        self.shared.lock().told.hear(bytes);
         let record = |&byte| Record { what: port, value: byte, cycle: 0 }.to_bytes();
         let records: Vec<u8> = bytes.iter().flat_map(record).collect();
         self.input.write_all(&records)?;

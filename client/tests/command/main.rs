@@ -696,6 +696,38 @@ fn the_standard_output_takes_one_file_and_nothing_else() {
 }
 
 #[test]
+fn the_page_is_given_the_standard_input() {
+    use std::io::{BufRead as _, BufReader, Read as _};
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("index.html"), "the page").expect("written");
+    let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["page", "-", "--no-browser", "--folder", "."])
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    program.stdin.take().expect("a pipe").write_all(b"v 1 2 3\n").expect("written");
+    let mut address = String::new();
+    let mut said = BufReader::new(program.stdout.take().expect("a pipe"));
+    said.read_line(&mut address).expect("a line");
+    let (host, path) = address
+        .trim()
+        .strip_prefix("http://")
+        .and_then(|address| address.split_once('/'))
+        .unwrap_or_default();
+    let (path, name) = path.split_once('#').unwrap_or_default();
+    assert_eq!(name, "given=the%20standard%20input");
+    let mut connection = std::net::TcpStream::connect(host).expect("a server");
+    write!(connection, "GET /{path}given HTTP/1.1\r\nHost: {host}\r\n\r\n").expect("asked");
+    let mut answer = String::new();
+    connection.read_to_string(&mut answer).expect("an answer");
+    program.kill().expect("killed");
+    program.wait().expect("it ends");
+    assert!(answer.ends_with("\r\n\r\nv 1 2 3\n"), "{answer}");
+}
+
+#[test]
 fn what_a_preview_says_stands_in_its_json() {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nv 60 35 0\nl 1 2\nl 2 3\n")

@@ -57,6 +57,17 @@ fn lines_and_polylines_have_true_size_in_any_unit() {
     );
 }
 
+/// A map in metres has coordinates that no plotter takes, and is small itself.
+#[test]
+fn a_map_is_moved_to_the_origin() {
+    let line = "0 LINE 8 a 10 500000 20 4600000 11 500000.1 21 4600000.05";
+    let map = dxf("6", "", line);
+    assert_eq!(strokes(&map)[0].1, [[0.0, 0.0], [100.0, 50.0]]);
+    let note = "the coordinates are too large for a plotter: the drawing is moved by -500000000 \
+                and -4600000000 mm";
+    assert_eq!(notes("a.dxf", map.as_bytes()), [note]);
+}
+
 /// Checks that the only stroke stays within half a motor step of `radius` around a centre, has so
 /// long a way, and these ends.
 fn is_arc(entity: &str, centre: [f64; 2], radius: f64, length: f64, ends: [[f64; 2]; 2]) {
@@ -177,7 +188,7 @@ fn damaged_files_are_refused_with_their_line() {
         (dxf("4", "", spline), "the knots of the spline do not fit it"),
         (dxf("4", "", "0 CIRCLE 40 1e11"), "too many points"),
         (dxf("4", "", "0 TEXT 1 a"), "nothing to draw in this DXF with 1 entity; 1 TEXT is not"),
-        (String::new(), "nothing to draw in this DXF"),
+        ("0\nEOF\n".to_owned(), "nothing to draw in this DXF"),
         ("AutoCAD Binary DXF\r\n".to_owned(), "the binary form of DXF"),
     ] {
         let error = sent("a.dxf", text.as_bytes()).expect_err(&text);

@@ -2,8 +2,9 @@
 //!
 //! In this order: the angle of a servo (`M280`, `M300`); the height Z; the power S, where the
 //! spindle is on from the first move that draws to the last; the spindle or laser (`M3`, `M4`,
-//! `M5`), which with the power 0 does not draw; or, if none of these changes between moves, G1 to
-//! G3 draw and G0 does not.
+//! `M5`), which with the power 0 does not draw, nor before the first power if the program says one;
+//! or, if none of these changes between moves, G1 to G3 draw and G0 does not. A laser that stays on
+//! over G0 does not burn there.
 //!
 //! A signal has levels at which the pen is up and others at which it is down. They are divided
 //! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may
@@ -50,8 +51,14 @@ fn is_on(it: &Move) -> bool {
     it.signals.spindle == Some(true) && it.signals.power != Some(0.0)
 }
 
+/// Of a program with G1 to G3 while the spindle is on, G0 does not draw: it is a laser, or a pen
+/// that is up then anyway.
 fn by_spindle(moves: &[Move]) -> Option<Vec<bool>> {
-    let draws: Vec<bool> = moves.iter().map(is_on).collect();
+    let has_powers = moves.iter().any(|it| it.signals.power.is_some());
+    let is_on = |it: &Move| is_on(it) && (it.signals.power.is_some() || !has_powers);
+    let feeds = moves.iter().any(|it| is_on(it) && !it.is_rapid);
+    let draws = moves.iter().map(|it| is_on(it) && !(feeds && it.is_rapid));
+    let draws: Vec<bool> = draws.collect();
     // A spindle that only runs before the first move lifts no pen.
     (draws.contains(&true) && draws.contains(&false)).then_some(draws)
 }

@@ -53,6 +53,25 @@ fn the_pen_is_found_in_every_dialect() {
     assert_eq!(strokes(&routed), expected);
 }
 
+/// LightBurn switches the laser on once, by M4 or M3, without a power, and travels by G0.
+#[test]
+fn a_laser_that_stays_on_does_not_draw_its_travels() {
+    let expected =
+        vec![vec![[10.0, 10.0], [20.0, 10.0], [20.0, 20.0]], vec![[30.0, 5.0], [40.0, 5.0]]];
+    for mode in ["M4", "M3"] {
+        for end in ["M9\nG1 S0\nM5\nG90\nG0 X0 Y0\nM2\n", "M5\n"] {
+            let program = format!(
+                "G00 G17 G40 G21 G54\nG90\n{mode}\nM8\nG0 X10Y10\nG1 X20S200F6000\nG1 Y20\n\
+                 G0 X30Y5\nG1 X40\n{end}"
+            );
+            assert_eq!(strokes(&program), expected, "{program}");
+        }
+    }
+    // A program that draws by G0, and so does not feed while the pen is down.
+    let rapids = "M5\nG0 X10 Y10\nM3\nG0 X20\nG0 Y20\nM5\nG0 X30 Y5\nM3\nG0 X40\nM5\n";
+    assert_eq!(strokes(rapids), expected);
+}
+
 /// What programs write draws their figure and nothing else, whatever lifts the pen.
 #[test]
 fn files_of_many_programs_draw_their_figure() {

@@ -7,7 +7,7 @@ use super::markup::Markup;
 use super::pens::Marks;
 use crate::arrange::clip_outline;
 use crate::region::{Region, Regions, length};
-use kurbo::{Affine, Point};
+use kurbo::{Affine, Point, Rect};
 use std::borrow::Cow;
 use std::collections::HashSet;
 use std::sync::Arc;
@@ -27,6 +27,12 @@ const MOST_POINTS: usize = 10_000_000;
 
 /// The most work at clip paths and masks: a minute of an old computer.
 const MOST_WORK: usize = 300_000_000;
+
+/// The most filled shapes among which is sought what lies below white ones.
+const MOST_COLOURED: usize = 20_000;
+
+/// The width in mm of a filled shape from which on it has an area.
+const LEAST_WIDTH: f64 = 0.001;
 
 /// A path of the drawing.
 #[derive(Debug)]
@@ -70,6 +76,12 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) cut: usize,
     /// The number of filled shapes whose outline is that of the page.
     pub(super) backgrounds: usize,
+    /// The number of paths that are only filled and have no area.
+    pub(super) flat: usize,
+    /// The number of shapes that are only filled, with white, where nothing else is filled.
+    pub(super) white: usize,
+    /// The bounds of what is filled with another colour than white.
+    coloured: Vec<Rect>,
     /// The number of paths with a pattern, which is not drawn.
     pub(super) patterns: usize,
     /// The number of images that are not drawn, in an SVG that is an image.
@@ -124,6 +136,9 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             documentation: 0,
             cut: 0,
             backgrounds: 0,
+            flat: 0,
+            white: 0,
+            coloured: Vec::new(),
             patterns: 0,
             nested_images: 0,
             masks: 0,
@@ -247,6 +262,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             self.documentation += count;
             return Ok(());
         }
+        let is_unseen = fill.is_some() && self.is_white_on_paper(path, paint, context.to_page);
         let dashes = stroke.and_then(|stroke| Some((stroke.dasharray()?, stroke.dashoffset())));
         // Dashes of a fixed length are measured on the page, and others in the file.
         let is_fixed = element.is_some_and(|element| self.markup.has_fixed_stroke(element));
@@ -278,6 +294,11 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         if stroke.is_none() {
             // A filled area has a side between the ends of an open path, too.
             polylines.iter_mut().for_each(Polyline::close);
+            polylines.retain(|it| has_area(&it.points));
+            if polylines.is_empty() {
+                self.flat += count;
+                return Ok(());
+            }
         }
         let outlines = match fill.map(|fill| fill.paint()) {
             Some(paint) if self.with_areas && !is_white(paint) => {
@@ -304,6 +325,9 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         }
         if stroke.is_none() && self.is_background(&whole, areas, &parts) {
             self.backgrounds += 1;
+            parts.clear();
+        } else if is_unseen {
+            self.white += count;
             parts.clear();
         } else {
             // Each line of a run was an element.
@@ -334,6 +358,24 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             });
         }
         Ok(())
+    }
+
+    /// Whether nothing would be seen of a path that is filled, because it is only painted white and
+    /// nothing of another colour is filled below it. What is filled is noted.
+    fn is_white_on_paper(&mut self, path: &Path, paint: &Paint, to_page: Affine) -> bool {
+        let bounds = path.bounding_box();
+        let [left, top, right, bottom] =
+            [bounds.left(), bounds.top(), bounds.right(), bounds.bottom()].map(f64::from);
+        let bounds = to_page.transform_rect_bbox(Rect::new(left, top, right, bottom));
+        if path.fill().is_some_and(|fill| !is_white(fill.paint())) {
+            self.coloured.push(bounds);
+        }
+        // Where there is too much to look at, the shape is drawn.
+        let is_below = |it: &Rect| it.overlaps(bounds);
+        is_white(paint)
+            && path.stroke().is_none_or(|stroke| stroke.opacity().get() == 0.0)
+            && self.coloured.len() <= MOST_COLOURED
+            && !self.coloured.iter().any(is_below)
     }
 
     /// Returns what clip paths leave of the lines of a path. If the path is only filled, the
@@ -390,6 +432,18 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
 /// Whether what a path fills is decided by the number of outlines around it.
 pub(super) fn is_even_odd(path: &Path) -> bool {
     path.fill().is_some_and(|fill| fill.rule() == FillRule::EvenOdd)
+}
+
+/// Whether these points do not all lie on one straight line.
+fn has_area(points: &[Point]) -> bool {
+    let Some(&first) = points.first() else { return false };
+    let farthest = |one: &&Point, other: &&Point| {
+        (**one - first).hypot2().total_cmp(&(**other - first).hypot2())
+    };
+    let Some(&end) = points.iter().max_by(farthest) else { return false };
+    let along = end - first;
+    let length = along.hypot();
+    points.iter().any(|it| along.cross(*it - first).abs() > LEAST_WIDTH * length)
 }
 
 /// Whether a fill is that of the paper, which is not hatched.

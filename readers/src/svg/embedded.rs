@@ -2,6 +2,7 @@
 //! file beside it.
 
 use super::super::counted;
+use super::encoding;
 use super::markup;
 use super::unread;
 use crate::files::Files;
@@ -60,9 +61,8 @@ impl Embedded {
     }
 
     fn tree(&self, data: &[u8], options: &Options<'_>) -> Option<Tree> {
-        // One that is compressed is no text.
-        let text = std::str::from_utf8(data).ok()?;
-        let document = markup::parsed(text).ok()?;
+        let text = encoding::text(data.to_vec()).ok()?;
+        let document = markup::parsed(&text).ok()?;
         {
             let mut found = self.found();
             found.bytes = found.bytes.saturating_add(text.len());

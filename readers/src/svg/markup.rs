@@ -7,6 +7,8 @@ use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
 use super::{runs, unread};
+use crate::page::Page;
+use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
 use std::ops::Range;
 use usvg::roxmltree::{Document, Error, Node, NodeId, ParsingOptions};
@@ -35,6 +37,9 @@ const NOT_DRAWN: [&str; 13] = [
 /// A feature of SVG 1.1 that is there. SVG 2 asks for none.
 const FEATURE: &str = "http://www.w3.org/TR/SVG11/feature#Shape";
 
+/// The most prefixes that are declared for a file.
+const MOST_PREFIXES: usize = 20;
+
 const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
 
 /// Parses the text of an SVG.
@@ -43,6 +48,27 @@ const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
 /// The text is not well-formed XML.
 pub(super) fn parsed(text: &str) -> Result<Document<'_>, Error> {
     Document::parse_with_options(text, ParsingOptions { allow_dtd: true, ..Default::default() })
+}
+
+/// A copy of `text` in which the prefixes are declared that the file uses without a declaration, as
+/// what is cut out of a web page does.
+pub(super) fn with_prefixes(text: &str) -> Cow<'_, str> {
+    let mut text = Cow::Borrowed(text);
+    for _ in 0..MOST_PREFIXES {
+        let prefix = match parsed(&text) {
+            Err(Error::UnknownNamespace(prefix, _)) => prefix,
+            _ => break,
+        };
+        let space = match prefix.as_str() {
+            "xlink" => "http://www.w3.org/1999/xlink",
+            "inkscape" => INKSCAPE,
+            other => other,
+        };
+        let Some(begin) = text.find("<svg") else { break };
+        let declaration = format!(" xmlns:{prefix}=\"{space}\"");
+        text.to_mut().insert_str(begin + "<svg".len(), &declaration);
+    }
+    text
 }
 
 /// Whether `node` is an element of SVG with one of these names.
@@ -265,6 +291,27 @@ impl<'a, 'input> Markup<'a, 'input> {
         missing.say(&mut said, ["element is", "elements are"], what);
         said.extend(unread::sentences(self.document));
         said
+    }
+
+    /// Says how large a unit is taken to be, if the file does not say the size of its `page`.
+    pub(super) fn size_note(&self, page: Page) -> Option<String> {
+        let root = self.document.root_element();
+        let is_said = |name| root.attribute(name).is_some_and(|size| !size.ends_with('%'));
+        if is_said("width") || is_said("height") {
+            return None;
+        }
+        let Page { width, height } = page;
+        let mut note = format!(
+            "the SVG does not say its size: 96 units are taken as an inch, and its page is {width} \
+             x {height} mm"
+        );
+        if self.document.input_text().contains("Adobe Illustrator") {
+            let [width, height] = [width, height].map(|size| (size * 400.0).round() / 300.0);
+            note += &format!(
+                "; Adobe Illustrator takes 72: its size by --scale 1.3333 --page {width}x{height}"
+            );
+        }
+        Some(note)
     }
 
     /// Whether a stroke is asked for by the element, or by those that contain it.

@@ -97,7 +97,9 @@ fn follows(svg: &str, curve: impl Fn(f64) -> [f64; 2]) -> usize {
 
 #[test]
 fn lines_have_their_place_with_y_upward() {
-    let svg = in_mm("<path d='M10 20 H30 V50' stroke='red' fill='none'/><line x2='5' y2='5'/>");
+    let svg = in_mm(
+        "<path d='M10 20 H30 V50' stroke='red' fill='none'/><line x2='5' y2='5' stroke='blue'/>",
+    );
     assert_eq!(
         drawn(&svg),
         [
@@ -117,11 +119,14 @@ fn units_and_the_view_box_give_true_size() {
         ("viewBox='0 0 96 96'", [25.4, 25.4], 25.4 / 96.0),
         ("width='50mm' viewBox='0 0 100 200'", [50.0, 100.0], 0.5),
     ] {
-        let svg =
-            format!("<svg xmlns='http://www.w3.org/2000/svg' {size}><path d='M0 0L20 10'/></svg>");
+        let svg = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' {size} stroke='red'><path d='M0 0L20 10'/></svg>"
+        );
         let contents = read(&svg).expect("an SVG");
         let Page { width, height } = contents.page().expect("a page");
         assert_eq!([width, height], page, "{size}");
+        let is_told = contents.notes().iter().any(|it| it.contains("does not say its size"));
+        assert_eq!(is_told, size == "viewBox='0 0 96 96'", "{size}: {:?}", contents.notes());
         let sent = polylines(&contents);
         let expected = [[0.0, height], [20.0 * scale, height - 10.0 * scale]];
         for (position, expected) in sent[0].1.iter().zip(expected) {
@@ -129,9 +134,17 @@ fn units_and_the_view_box_give_true_size() {
             assert!((position[1] - expected[1]).abs() < 6e-4, "{size}: {position:?}");
         }
     }
+    // Adobe Illustrator writes points, and leaves the size out.
+    let svg = "<!-- Generator: Adobe Illustrator 24.0.1 --><svg \
+               xmlns='http://www.w3.org/2000/svg' viewBox='0 0 720 360'><circle r='9'/></svg>";
+    let contents = read(svg).expect("an SVG");
+    let note = "the SVG does not say its size: 96 units are taken as an inch, and its page is \
+                190.5 x 95.25 mm; Adobe Illustrator takes 72: its size by --scale 1.3333 --page \
+                254x127";
+    assert!(contents.notes().contains(&note.to_owned()), "{:?}", contents.notes());
     // The picture keeps its proportions in the middle of the page.
     let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='100mm' height='50mm' \
-               viewBox='-10 -10 20 20'><path d='M-10 -10L10 10'/></svg>";
+               viewBox='-10 -10 20 20'><path d='M-10 -10L10 10' stroke='black'/></svg>";
     assert_eq!(positions(svg), [[[25.0, 50.0], [75.0, 0.0]]]);
 }
 
@@ -181,7 +194,7 @@ fn many_short_lines_become_few() {
     for step in 1..=4000 {
         let _ = write!(data, "L{} {}", 10.0 + f64::from(step) / 50.0, 50.0 + 1e-3);
     }
-    let sent = positions(&in_mm(&format!("<path d='{data}'/>")));
+    let sent = positions(&in_mm(&format!("<path d='{data}' fill='none' stroke='red'/>")));
     assert_eq!(sent.len(), 1);
     assert!(sent[0].len() < 4, "{sent:?}");
     // A line that turns back keeps its end.
@@ -194,8 +207,8 @@ fn transforms_are_nested_and_references_are_followed() {
     let svg = in_mm(
         "<g transform='translate(50 50)'><g transform='rotate(90)'><g transform='scale(2 3)'>\
          <path d='M0 0H10V10' fill='none' stroke='red'/></g></g></g>\
-         <defs><path id='a' d='M0 0H10'/></defs><use xlink:href='#a' x='5' y='6'/>\
-         <symbol id='s' viewBox='0 0 10 10'><path d='M0 0L10 10'/></symbol>\
+         <defs><path id='a' d='M0 0H10' stroke='black'/></defs><use xlink:href='#a' x='5' y='6'/>\
+         <symbol id='s' viewBox='0 0 10 10'><path d='M0 0L10 10' stroke='black'/></symbol>\
          <use href='#s' x='10' y='10' width='20' height='20'/>",
     );
     assert_eq!(
@@ -210,12 +223,14 @@ fn transforms_are_nested_and_references_are_followed() {
 
 #[test]
 fn what_is_outside_of_the_page_or_of_a_clip_path_is_cut_off() {
-    let contents = read(&in_mm("<path d='M-10 50H110'/><path d='M200 0h9'/>")).expect("an SVG");
+    let contents =
+        read(&in_mm("<path d='M-10 50H110' stroke='black'/><path d='M200 0h9' stroke='black'/>"))
+            .expect("an SVG");
     assert_eq!(polylines(&contents)[0].1, [[0.0, 50.0], [100.0, 50.0]]);
     assert_eq!(contents.notes(), ["2 paths reach beyond the page of the SVG: the rest is cut off"]);
     let clipped = in_mm(
         "<clipPath id='c'><rect x='20' y='20' width='10' height='10'/></clipPath>\
-         <g clip-path='url(#c)'><path d='M0 25H100'/></g>",
+         <g clip-path='url(#c)'><path d='M0 25H100' stroke='black'/></g>",
     );
     let contents = read(&clipped).expect("an SVG");
     assert_eq!(polylines(&contents)[0].1, [[20.0, 75.0], [30.0, 75.0]]);
@@ -231,8 +246,8 @@ fn strokes_are_dashed_and_shapes_without_a_stroke_have_outlines() {
     );
     let shapes = "<rect x='10' y='10' width='5' height='5'/>\
                   <path d='M0 0H9' fill='none'/><path d='M0 0H9' style='display:none'/>\
-                  <g visibility='hidden'><path d='M0 0H9'/></g>\
-                  <g opacity='0'><path d='M0 0H9'/></g>";
+                  <g visibility='hidden'><path d='M0 0H9' stroke='black'/></g>\
+                  <g opacity='0'><path d='M0 0H9' stroke='black'/></g>";
     let contents = read(&in_mm(shapes)).expect("an SVG");
     assert_eq!(
         polylines(&contents)[0].1,
@@ -240,6 +255,87 @@ fn strokes_are_dashed_and_shapes_without_a_stroke_have_outlines() {
     );
     assert_eq!(polylines(&contents).len(), 1);
     assert!(contents.notes().is_empty(), "{:?}", contents.notes());
+}
+
+/// A program may write lines as shapes that are filled, of which nothing is seen, and white shapes
+/// as the ground of a diagram.
+#[test]
+fn what_would_not_be_seen_is_not_drawn_and_is_told() {
+    let rest = "<rect x='1' y='2' width='3' height='4' stroke='red'/>";
+    let told = |more: &str| {
+        let contents = read(&in_mm(&format!("{more}{rest}"))).expect("an SVG");
+        (polylines(&contents).len() - 1, contents.notes().join("; "))
+    };
+    let flat = "filled, but without an area and without a stroke";
+    for (more, number) in [
+        ("<line x1='5' y1='5' x2='50' y2='9'/><polyline points='9,9 50,9 20,9'/>", 2),
+        ("<path fill='blue' d='M10 20H30Z M5 5L9 9'/>", 1),
+        ("<rect x='5' y='5' width='20' height='0.0001'/>", 1),
+    ] {
+        let (drawn, notes) = told(more);
+        assert_eq!(drawn, 0, "{more}");
+        assert!(notes.starts_with(&format!("{number} path")) && notes.contains(flat), "{notes}");
+    }
+    // A thin shape is seen, and so is each part of a path that has an area.
+    assert_eq!(told("<rect x='5' y='5' width='20' height='0.01'/>"), (1, String::new()));
+    assert_eq!(told("<path d='M5 5H9 M10 10H15V15'/>"), (1, String::new()));
+    let white = "<rect x='20' y='20' width='30' height='20' fill='#fff'/>";
+    let (drawn, notes) = told(white);
+    assert_eq!(drawn, 0);
+    assert!(notes.starts_with("1 shape is not drawn: filled with white alone"), "{notes}");
+    // It is seen on another colour, and with a stroke; what only lies above it changes nothing.
+    let black = "<circle cx='40' cy='40' r='15'/>";
+    assert_eq!(told(&format!("{black}{white}")), (2, String::new()));
+    assert_eq!(told(&white.replace("/>", " stroke='red'/>")), (1, String::new()));
+    assert_eq!(told(&format!("{white}{black}")).0, 1);
+}
+
+/// Text as programs of other systems save it, and compressed.
+#[test]
+fn text_of_other_encodings_is_read() {
+    let svg = in_mm("<g id='Räume'><path d='M10 20H30' stroke='red'/></g>");
+    let of = |bytes: Vec<u8>| {
+        let file = SourceFile::new("a.svg".to_owned(), bytes).map_err(|error| error.to_string());
+        file.map(|file| polylines(&file))
+    };
+    let expected = of(svg.clone().into_bytes());
+    assert!(expected.is_ok());
+    let utf16 = |to_bytes: fn(u16) -> [u8; 2]| {
+        let text = format!("\u{FEFF}<?xml version='1.0' encoding='UTF-16'?>{svg}");
+        text.encode_utf16().flat_map(to_bytes).collect::<Vec<u8>>()
+    };
+    assert_eq!(of(utf16(u16::to_le_bytes)), expected);
+    assert_eq!(of(utf16(u16::to_be_bytes)), expected);
+    let latin1 = format!("<?xml version='1.0' encoding='ISO-8859-1'?>{svg}");
+    let latin1: Vec<u8> = latin1.chars().map(|letter| letter as u8).collect();
+    assert_eq!(of(latin1), expected);
+    if !cfg!(feature = "svgz") {
+        return;
+    }
+    // Blocks of gzip may be stored as they are.
+    let length = u16::try_from(svg.len()).expect("short");
+    let [low, high] = length.to_le_bytes();
+    let mut gzip = b"\x1F\x8B\x08\0\0\0\0\0\0\xFF".to_vec();
+    gzip.extend([1, low, high, !low, !high]);
+    gzip.extend(svg.as_bytes());
+    let checksum = svg.bytes().fold(!0_u32, |sum, byte| {
+        let step = |sum: u32, _| (sum >> 1) ^ if sum & 1 == 1 { 0xEDB8_8320 } else { 0 };
+        (0..8).fold(sum ^ u32::from(byte), step)
+    });
+    gzip.extend((!checksum).to_le_bytes());
+    gzip.extend(u32::from(length).to_le_bytes());
+    assert_eq!(of(gzip.clone()), expected);
+    gzip.truncate(200);
+    assert!(of(gzip).expect_err("damaged").contains("this compressed SVG is damaged"));
+}
+
+/// What is cut out of a web page lacks the declarations of its prefixes.
+#[test]
+fn prefixes_need_no_declaration() {
+    let svg = "<svg width='10mm' height='10mm' viewBox='0 0 10 10'><defs><path id='a' d='M1 1H9' \
+               stroke='red'/></defs><use xlink:href='#a'/><g inkscape:groupmode='layer' \
+               inkscape:label='3' other:b='c'><path d='M2 5H9' stroke='red'/></g></svg>";
+    assert_eq!(used_pens(svg), ["pen1", "pen3"]);
 }
 
 #[test]
@@ -271,7 +367,7 @@ fn layers_choose_pens_or_else_colours_do() {
     let two = [layer("2 red", red), layer("outline", blue), layer("pen5", red)].concat();
     assert_eq!(used_pens(&in_mm(&two)), ["pen2", "pen1", "pen5"]);
     // A layer within a layer belongs to the outer one, and a reference to where it stands.
-    let shared = "<defs><path id='p' d='M0 9H9'/></defs>";
+    let shared = "<defs><path id='p' d='M0 9H9' stroke='black'/></defs>";
     let nested = layer("1", &layer("4", red)) + &layer("3", "<g><use href='#p'/></g>") + shared;
     assert_eq!(used_pens(&in_mm(&nested)), ["pen1", "pen3"]);
     // One layer says nothing where there are colours.
@@ -287,7 +383,9 @@ fn layers_choose_pens_or_else_colours_do() {
 #[test]
 fn the_codes_of_axidraw_are_obeyed_or_named() {
     let layer = |label: &str, y: u32| {
-        format!("<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9'/></g>")
+        format!(
+            "<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9' stroke='black'/></g>"
+        )
     };
     let notes = "<g inkscape:groupmode='layer' inkscape:label='% notes'><text>a</text></g>";
     let svg = in_mm(&[layer("2", 1), layer("! 2 +S50+D100 red", 2), layer("%3", 3)].concat());
@@ -320,7 +418,7 @@ fn arranged(svg: &str, options: &[(&str, &str)]) -> Result<SourceFile, String> {
 
 #[test]
 fn what_becomes_too_short_is_counted() {
-    let svg = in_mm("<path d='M10 10h.01M10 20h.02M10 30h50'/>");
+    let svg = in_mm("<path d='M10 10h.01M10 20h.02M10 30h50' stroke='black'/>");
     let notes =
         |options: &[(&str, &str)]| arranged(&svg, options).expect("a plan").notes().join("; ");
     assert_eq!(notes(&[]), "");
@@ -333,7 +431,9 @@ fn what_becomes_too_short_is_counted() {
 #[test]
 fn layers_are_chosen_by_label_number_or_colour() {
     let layer = |label: &str, y: u32| {
-        format!("<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9'/></g>")
+        format!(
+            "<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9' stroke='black'/></g>"
+        )
     };
     let svg = in_mm(&[layer("Sky", 1), layer("4 house", 2), layer("Tree", 3)].concat());
     let heights = |svg: &str, options: &[(&str, &str)]| -> Vec<f64> {
@@ -383,12 +483,12 @@ fn filled_shapes_are_hatched_within_the_page_and_holes_stay_free() {
 #[test]
 fn what_is_not_drawn_is_counted() {
     let svg = in_mm(
-        "<path d='M0 0H9'/>\n<text>a</text>\n<text>b</text>\
+        "<path d='M0 0H9' stroke='black'/>\n<text>a</text>\n<text>b</text>\
          <image href='a.png' width='9' height='9'/>\
-         \n<path d='M0 0H5 L x'/>\n<rect width='-1' height='5'/><use href='#none'/>\
+         \n<path d='M0 0H5 L x' stroke='red'/>\n<rect width='-1' height='5'/><use href='#none'/>\
          <mask id='m' maskUnits='userSpaceOnUse' width='9' height='9'>\
          <image href='b.png' y='5' width='9' height='9'/></mask>\
-         <path mask='url(#m)' d='M0 9H9'/><path d='M5 5h0' stroke='red'/>",
+         <path mask='url(#m)' d='M0 9H9' stroke='red'/><path d='M5 5h0' stroke='red'/>",
     );
     assert_eq!(
         read(&svg).expect("an SVG").notes(),
@@ -409,7 +509,7 @@ fn what_is_not_drawn_is_counted() {
 
 #[test]
 fn each_line_cites_its_element() {
-    let svg = in_mm("\n<g>\n<path\n d='M0 0H9'/></g>");
+    let svg = in_mm("\n<g>\n<path\n d='M0 0H9' stroke='red'/></g>");
     let contents = read(&svg).expect("an SVG");
     let origins: BTreeSet<(usize, String)> = (contents.in_order().filter_map(|line| line.origin))
         .map(|origin| (origin.line, origin.text))
@@ -442,7 +542,7 @@ fn every_line_is_one_that_a_plotter_takes() {
 fn a_large_drawing_says_how_many_points_it_has() {
     let line = |number: i32| format!("M{} {}h.01", number % 90, number / 90);
     let data: String = (0..2500).map(line).collect();
-    let contents = read(&in_mm(&format!("<path d='{data}'/>"))).expect("an SVG");
+    let contents = read(&in_mm(&format!("<path d='{data}' stroke='red'/>"))).expect("an SVG");
     let notes = contents.notes();
     let [note] = notes else { panic!("{notes:?}") };
     assert!(note.starts_with("the drawing has 5000 points, and lm3s6965 takes 1000"), "{note}");
@@ -451,7 +551,11 @@ fn a_large_drawing_says_how_many_points_it_has() {
 #[test]
 fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
     let deep = |depth: usize| {
-        in_mm(&format!("{}<path d='M0 0H9'/>{}", "<g>".repeat(depth), "</g>".repeat(depth)))
+        in_mm(&format!(
+            "{}<path d='M0 0H9' stroke='black'/>{}",
+            "<g>".repeat(depth),
+            "</g>".repeat(depth)
+        ))
     };
     // As deep as `usvg` goes, a file needs more stack than a test has.
     let deepest = deep(900);
@@ -462,9 +566,11 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
     let huge = "<svg xmlns='http://www.w3.org/2000/svg' width='1e38' height='1e38'>\
                 <path d='M0 0H1e30V9'/></svg>";
     for (svg, reason) in [
-        (String::new(), "this is not a well-formed SVG"),
+        (String::new(), "the file is empty"),
         ("<svg".to_owned(), "this is not a well-formed SVG"),
-        ("<html/>".to_owned(), "this is not a well-formed SVG"),
+        ("<html/>".to_owned(), "this is a web page"),
+        ("<htm/>".to_owned(), "this is not a well-formed SVG"),
+        (in_mm("<path d='M0 0H9'/>"), "1 path is not drawn: filled, but without an area"),
         (in_mm(""), "there is nothing to draw in this SVG"),
         (in_mm("<text>a</text>"), "nothing to draw in this SVG; 1 text is not drawn"),
         (in_mm("<path fill='none' d='M0 0H9'/>"), "1 path has neither a stroke nor a fill"),
@@ -483,7 +589,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
         let _ = read(&svg);
     }
     let error = SourceFile::new("a.svg".to_owned(), vec![0x1F, 0x8B, 8]).expect_err("compressed");
-    assert!(error.to_string().contains("gunzip"), "{error}");
+    assert!(error.to_string().contains("damaged or not whole"), "{error}");
     let error = SourceFile::new("a.svg".to_owned(), b"<svg>\xFF".to_vec()).expect_err("no text");
     assert!(error.to_string().contains("UTF-8"), "{error}");
 }

@@ -11,6 +11,7 @@ use super::record::{
 use super::servo::Servo;
 use crate::emulator::EmulatorError;
 use crate::emulator::PinChange;
+use crate::emulator::heights::ToldHeights;
 use crate::emulator::running::{Shared, quitting_with_parent};
 use crate::table::{BoardRow, Pins};
 use object::{Object, ObjectSymbol};
@@ -78,6 +79,7 @@ pub(super) struct State {
     pub(super) usb: VecDeque<u8>,
     pub(super) timed: Vec<(u8, u64)>,
     pub(super) pins: Vec<PinChange>,
+    pub(super) told: ToldHeights,
     pub(super) cycles: u64,
     /// The number of unused bytes of the stack, the answer to the last query.
     pub(super) unused_stack: Option<u64>,
@@ -242,7 +244,10 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                 RETURNED => state.timed.push((record.value, record.cycle)),
                 UNUSED_STACK => state.unused_stack = Some(record.cycle),
                 USB => state.usb.push_back(record.value),
-                PIN => state.pins.extend(servo.pin_change(&record)),
+                PIN => {
+                    let change = servo.pin_change(&record, state.told.heights());
+                    state.pins.extend(change);
+                }
                 LOG => logged.push(record.value),
                 RESET => {
                     state.shows_drive = false;

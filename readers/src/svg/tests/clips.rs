@@ -76,7 +76,7 @@ fn a_background_is_not_drawn_as_a_frame() {
     }
     for other in [
         "<rect width='100' height='100' fill='none' stroke='red'/>",
-        "<rect width='99' height='100' fill='#fff'/>",
+        "<rect width='99' height='100' fill='#eee'/>",
         "<path d='M0 0H100V100Z'/>",
     ] {
         assert_eq!(polylines(&drawn(other)).len(), 2, "{other}");

@@ -10,14 +10,14 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
     for (more, said) in [
         ("<rect width='9' height='9' style='clip-path:circle(2px)'/>", "property clip-path of CSS"),
         ("<path d='M1 1H9' stroke='red' style='rotate:20deg'/>", "property rotate of CSS"),
-        ("<path d='M1 1H9' transform='rotate(1turn)'/>", "property transform of CSS"),
+        ("<path d='M1 1H9' stroke='red' transform='rotate(1turn)'/>", "property transform of CSS"),
         ("<circle r='5' cx='9' cy='9' style='r:9px'/>", "property r of CSS"),
         (
             "<style>@media print{path{d:none}}</style>",
             "1 element or style sheet has the rule @media",
         ),
         ("<style>path:not(.b){fill:red}</style>", "a selector :not of CSS"),
-        ("<path d='M1 1H9' style='stroke:var(--a)'/>", "a variable of CSS"),
+        ("<path d='M1 1H9V5' style='stroke:var(--a)'/>", "a variable of CSS"),
         ("<script>a()</script>", "1 script is not run (line 1)"),
         ("<set attributeName='x'/>", "1 animation is not obeyed"),
         (
@@ -74,11 +74,11 @@ fn a_browser_text_in_html_is_replaced_by_what_the_file_has_for_others() {
         format!(
             "<switch><foreignObject {features} width='9' height='9'><p \
              xmlns='http://www.w3.org/1999/xhtml'>{text}</p></foreignObject>\
-             <g><desc>Lamp</desc><path d='M0 9H9'/></g></switch>"
+             <g><desc>Lamp</desc><path d='M0 9H9' stroke='black'/></g></switch>"
         )
     };
     // What is drawn where there is no HTML is drawn, but not that there is none.
-    let warning = format!("<switch><g {FEATURES}/><path d='M0 50H9'/></switch>");
+    let warning = format!("<switch><g {FEATURES}/><path d='M0 50H9' stroke='black'/></switch>");
     for features in ["", FEATURES] {
         let read = |text| read(&in_mm(&[html(text, features), warning.clone()].concat()));
         let same = read("La mp").expect("an SVG");
@@ -87,7 +87,7 @@ fn a_browser_text_in_html_is_replaced_by_what_the_file_has_for_others() {
         let longer = read("Lamp plugged in?").expect("an SVG");
         assert!(longer.notes()[0].starts_with("1 text in HTML is drawn as another text"));
     }
-    let alone = "<foreignObject><p>a</p></foreignObject><path d='M0 9H9'/>";
+    let alone = "<foreignObject><p>a</p></foreignObject><path d='M0 9H9' stroke='black'/>";
     let notes = read(&in_mm(alone)).expect("an SVG");
     assert_eq!(notes.notes(), ["1 foreignObject is not drawn: it is not SVG (line 1)"]);
 }

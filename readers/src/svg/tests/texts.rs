@@ -151,7 +151,9 @@ fn letters_that_no_font_has_are_named() {
 
 #[test]
 fn a_computer_without_fonts_draws_no_text_and_says_so() {
-    let svg = in_mm("<path d='M0 0H9'/><text>a</text><text> </text><defs><text>b</text></defs>");
+    let svg = in_mm(
+        "<path d='M0 0H9' stroke='black'/><text>a</text><text> </text><defs><text>b</text></defs>",
+    );
     assert_eq!(
         read_in(Database::new, &svg).expect("an SVG").notes(),
         ["1 text is not drawn, because no font for it is found: convert text to paths (line 1)"]
@@ -162,7 +164,7 @@ fn a_computer_without_fonts_draws_no_text_and_says_so() {
 fn layers_and_colours_choose_the_pens_of_texts() {
     let svg = in_mm(
         "<g id='2'><text x='9' y='9' font-family='Squares'>a</text></g>\
-         <g id='1'><path d='M0 0H9'/></g><g id='%3'><text x='9' y='50'>a</text></g>",
+         <g id='1'><path d='M0 0H9' stroke='black'/></g><g id='%3'><text x='9' y='50'>a</text></g>",
     );
     let contents = read_in(squares, &svg).expect("an SVG");
     let pens: Vec<String> = polylines(&contents).into_iter().map(|(pen, _)| pen).collect();
