@@ -237,7 +237,7 @@ fn what_cannot_be_fitted_is_refused() {
     );
     assert_eq!(fit_text("v 0 0 0\n", 0.1), Err(FitError::NoPolyline));
     for tolerance in [0.0, -1.0, 1e-300, 1e308, f64::NAN, f64::INFINITY] {
-        assert_eq!(fit_text("", tolerance), Err(FitError::Tolerance));
+        assert_eq!(fit_text("v 0 0 0\nv 1 1 0\nl 1 2\n", tolerance), Err(FitError::Tolerance));
     }
 }
 
