@@ -5,7 +5,7 @@
 //! count of instructions is not a time, but it is the same on every computer.
 
 use penup_client::emulator::image_path;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::error::Error;
 use std::io::{self, BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
@@ -29,6 +29,9 @@ pub const PIECE_OF_BRAKE: u32 = 36;
 /// How long the board may be silent on a busy computer. Its log makes it some hundred times slower
 /// than it is, and its answer to a line may come only when the moves before it are done.
 const TIMEOUT: Duration = Duration::from_secs(900);
+
+/// The bytes that the board can receive ahead of its main loop.
+const RECEIVE_QUEUE: usize = 255;
 
 /// The calls of a handler: the number of calls for each number of instructions.
 pub type Calls = BTreeMap<usize, usize>;
@@ -143,6 +146,25 @@ impl Counted {
     pub fn ask(&mut self, line: &str) -> TestResult {
         self.send(format!("{line}\n").as_bytes())?;
         self.hear_until("ok")
+    }
+
+    /// Sends lines, so many ahead of their answers as the board has room for, and waits for the
+    /// `ok` of each.
+    ///
+    /// # Errors
+    /// The board does not answer.
+    pub fn stream(&mut self, lines: impl IntoIterator<Item = String>) -> TestResult {
+        let mut unanswered = VecDeque::new();
+        for line in lines {
+            let line = line + "\n";
+            while unanswered.iter().sum::<usize>() + line.len() > RECEIVE_QUEUE {
+                self.hear_until("ok")?;
+                unanswered.pop_front();
+            }
+            self.send(line.as_bytes())?;
+            unanswered.push_back(line.len());
+        }
+        unanswered.into_iter().try_for_each(|_| self.hear_until("ok"))
     }
 
     /// Sends a real-time command and waits for a line that begins with `begin`.

@@ -62,6 +62,18 @@ impl Backlash {
     }
 }
 
+/// How backlash is taken up before a move of the motors.
+#[derive(Debug)]
+struct TakeUp {
+    /// The steps that take it up.
+    steps: [i32; 2],
+    /// What is known of it behind them.
+    behind: Backlash,
+    /// The steps of the move itself.
+    #[cfg(feature = "spread-backlash")]
+    delta: [i32; 2],
+}
+
 impl Machine<'_> {
     /// Returns the backlash of each motor: the steps that it loses when it reverses.
     pub(super) fn backlash_steps(&self) -> [i32; 2] {
@@ -77,34 +89,57 @@ impl Machine<'_> {
     /// See [`PushError`]. On an error nothing is appended.
     pub(super) fn push_motors(
         &mut self,
-        segment: &Move,
+        segment: &Move<'_>,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<bool, PushError> {
-        let (motors, end) = (segment.motors, self.motors_end());
-        let delta = [motors.x - end.x, motors.y - end.y];
-        let mut backlash = self.backlash;
-        // Fast path: most machines are set to have no backlash, and the state of both motors is
-        // known.
-        let has_none = backlash.ahead == [Some(0); 2]
-            && !self.settings.is_on(Setting::BacklashX)
-            && !self.settings.is_on(Setting::BacklashY);
-        let [x, y] = if has_none { [0; 2] } else { backlash.take_up(self.backlash_steps(), delta) };
         #[cfg(feature = "spread-backlash")]
-        let (before, from) = (self.backlash.ahead, self.runner.motor_steps_end());
-        if (x, y) == (0, 0) {
+        let from = self.runner.motor_steps_end();
+        let take_up = if self.has_no_backlash() { None } else { Some(self.take_up(segment)) };
+        if let Some(TakeUp { steps: [x, y], .. }) = take_up
+            && (x, y) != (0, 0)
+        {
+            self.runner.push_backlash(PagePoint { x, y }, ink)?;
+        } else {
             #[cfg(feature = "spread-backlash")]
             let segment = &self.with_shift(*segment);
             self.runner.push(segment, ink, limit)?;
-        } else {
-            self.runner.push_backlash(PagePoint { x, y }, ink)?;
         }
-        self.backlash = backlash;
+        let Some(take_up) = take_up else { return Ok(true) };
+        #[cfg(feature = "spread-backlash")]
+        let before = self.backlash.ahead;
+        self.backlash = take_up.behind;
         #[cfg(feature = "spread-backlash")]
         if self.spreads_backlash() {
-            self.learn_backlash(before, from, delta);
+            self.learn_backlash(before, from, take_up.delta);
         }
-        Ok((x, y) == (0, 0))
+        Ok(take_up.steps == [0; 2])
+    }
+
+    /// Whether no motor has backlash, and this is known to last. Most machines are set so.
+    #[inline(always)] // It is asked for each chord.
+    fn has_no_backlash(&self) -> bool {
+        let has_none = matches!(self.backlash.ahead, [Some(0), Some(0)])
+            && !self.settings.is_on(Setting::BacklashX)
+            && !self.settings.is_on(Setting::BacklashY);
+        #[cfg(feature = "spread-backlash")]
+        let has_none = has_none && !self.spreads_backlash();
+        has_none
+    }
+
+    /// How backlash is taken up before a move of the motors.
+    #[inline(never)] // Machines without backlash do not come here: it would only fill the cache.
+    fn take_up(&self, segment: &Move<'_>) -> TakeUp {
+        let (motors, end) = (segment.motors, self.motors_end());
+        let delta = [motors.x - end.x, motors.y - end.y];
+        let mut behind = self.backlash;
+        let steps = behind.take_up(self.backlash_steps(), delta);
+        TakeUp {
+            steps,
+            behind,
+            #[cfg(feature = "spread-backlash")]
+            delta,
+        }
     }
 
     /// Discards the moves that are planned but not yet made. The pen is at `page`.

@@ -312,16 +312,10 @@ impl Machine<'_> {
     /// See [`PushError`]. On an error nothing is appended.
     fn push_motor(&mut self, motors: PagePoint) -> Result<(), PushError> {
         let (end, page) = (self.motors_end(), self.runner.page_end());
-        let displacement = (motors.x - end.x, motors.y - end.y);
-        let page = PagePoint { x: page.x + displacement.0, y: page.y + displacement.1 };
-        let length = self
-            .runner
-            .limits()
-            .length(displacement.0, displacement.1)
-            .ok_or(PushError::TooLong)?;
-        let (offsets, is_gap) = ([0; 2], false);
-        let belt =
-            Move { motors, offsets, page, displacement, whole_length: length, length, is_gap };
+        let (dx, dy) = (motors.x - end.x, motors.y - end.y);
+        let page = PagePoint { x: page.x + dx, y: page.y + dy };
+        let chord = self.runner.chord(dx, dy).ok_or(PushError::TooLong)?;
+        let belt = Move::whole(motors, page, &chord);
         // The first call may only take up the backlash; then the move itself follows.
         if !self.push_motors(&belt, None, PathLength::MAX)? {
             self.push_motors(&belt, None, PathLength::MAX)?;

@@ -1,19 +1,17 @@
 //! Cuts a move into segments that are straight for the motors too, and appends them to the plan.
 
-use super::{Machine, SegmentEnd, Target};
+use super::{CutPositions, Machine, SegmentEnd, Target};
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{Move, PathLength, PushError};
+use crate::motion::{Chord, Move, PathLength, PushError};
 use crate::step::Pattern;
 
 /// The remaining part of a move that is being cut into segments.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Segmenter {
-    /// The point of the page at which the move starts.
-    pub(super) from: PagePoint,
     /// The point of the page at which the move ends.
     pub(super) to: PagePoint,
-    /// The length of the whole move, of which segments are parts.
-    pub(super) length: PathLength,
+    /// The whole move, of which segments are parts.
+    pub(super) chord: Chord,
     /// The length of what has been appended already.
     pub(super) position: PathLength,
     /// The last cut that has been passed, in steps; 0 at the beginning.
@@ -27,6 +25,12 @@ pub(super) struct Segmenter {
 }
 
 impl Segmenter {
+    /// The point of the page at which the move starts.
+    pub(super) fn from(&self) -> PagePoint {
+        let (dx, dy) = self.chord.displacement();
+        PagePoint { x: self.to.x - dx, y: self.to.y - dy }
+    }
+
     /// Where the last segment ends, on the page.
     pub(super) fn end(&self) -> PagePoint {
         self.to
@@ -52,75 +56,82 @@ impl Machine<'_> {
         }
         let from = self.runner.page_end();
         let (dx, dy) = (to.x - from.x, to.y - from.y);
-        let length = self.runner.move_length(dx, dy).ok_or(PushError::TooLong)?;
+        // Not by `?`, for which the chord would be copied once more.
+        let Some(chord) = self.runner.chord(dx, dy) else { return Err(PushError::TooLong) };
         let position = PathLength::ZERO;
-        self.segmenter = Some(Segmenter { from, to, length, position, cut: 0, dot: 0, ink, limit });
-        self.push_segments();
-        Ok(length)
+        let mut segmenter = Segmenter { to, chord, position, cut: 0, dot: 0, ink, limit };
+        // Most moves are one segment, which is not kept.
+        if !self.push_segment(&mut segmenter) {
+            self.segmenter = Some(segmenter);
+            self.push_segments();
+        }
+        Ok(segmenter.chord.length())
     }
 
     /// Plans as many of the remaining segments of the move as there is room for.
     pub(super) fn push_segments(&mut self) {
-        while let Some(segmenter) = self.segmenter
+        while let Some(mut segmenter) = self.segmenter
             && !self.runner.is_full()
         {
-            #[cfg(feature = "spread-backlash")]
-            if self.push_spread_backlash(&segmenter) {
-                continue;
-            }
-            let Segmenter { from, to, length, position, mut cut, dot, mut ink, limit } = segmenter;
-            let mut next_dot = dot;
-            let displacement = (to.x - from.x, to.y - from.y);
-            let kinematics = self.settings.kinematics();
-            let (mut end, mut is_gap) = (length.to_bits(), false);
-            if let Some(cuts) = kinematics.cuts(from, to) {
-                let next = cuts.next(cut);
-                // Dots and gaps are cut here, because each segment is shorter than the pattern of a
-                // whole line.
-                let pattern = match ink.replace(LineType::Full) {
-                    Some(line_type) if line_type != LineType::Full => {
-                        let dot_length = self.settings.dot_length();
-                        Pattern::of(line_type, length.to_bits(), dot_length.to_bits())
-                    }
-                    unchanged => {
-                        ink = unchanged;
-                        Pattern::full(length.to_bits())
-                    }
-                };
-                let dot_end = pattern.end_of(dot);
-                is_gap = !Pattern::inked(dot);
-                let cut_end = cuts.position(next, length.to_bits());
-                end = dot_end.min(cut_end);
-                next_dot += u32::from(end == dot_end);
-                if end == cut_end {
-                    cut = next;
-                }
-            }
-            let end = PathLength::from_bits(end);
-            let positions = [position.to_bits(), end.to_bits()];
-            let begin = self.motors_end();
-            let SegmentEnd { motors, page, offsets } =
-                kinematics.segment_end([from, to], positions, length.to_bits(), begin);
-            let segment = Move {
-                motors,
-                offsets,
-                page,
-                displacement,
-                whole_length: length,
-                length: end - position,
-                is_gap,
-            };
-            // There is room, and the segment is no longer than the move, whose length was accepted.
-            let pushed = self.push_motors(&segment, ink, limit);
-            debug_assert!(pushed.is_ok());
-            if pushed != Ok(false) {
-                match &mut self.segmenter {
-                    Some(rest) if end < length => {
-                        (rest.position, rest.cut, rest.dot) = (end, cut, next_dot);
-                    }
-                    rest => *rest = None,
-                }
-            }
+            let is_complete = self.push_segment(&mut segmenter);
+            self.segmenter = (!is_complete).then_some(segmenter);
         }
+    }
+
+    /// Plans the next segment of a move, for which there must be room. Returns whether the move is
+    /// complete.
+    #[inline(never)] // As `push`.
+    fn push_segment(&mut self, segmenter: &mut Segmenter) -> bool {
+        #[cfg(feature = "spread-backlash")]
+        if let Some(is_complete) = self.push_spread_backlash(segmenter) {
+            return is_complete;
+        }
+        let Segmenter { to, ref chord, position, mut cut, mut dot, mut ink, limit } = *segmenter;
+        // There is room, and no segment is longer than the move, whose length was accepted. So
+        // below, nothing that is pushed is refused.
+        let kinematics = self.settings.kinematics();
+        let Some(anchors) = kinematics.belts() else {
+            let whole = Move::whole(kinematics.motors(to), to, chord);
+            let rest = Move { length: chord.length().saturating_sub(position), ..whole };
+            let pushed = self.push_motors(&rest, ink, limit);
+            debug_assert!(pushed.is_ok());
+            return pushed != Ok(false);
+        };
+        let (from, length) = (segmenter.from(), chord.length());
+        let cuts = CutPositions::new(anchors, from, to);
+        let next = cuts.next(cut);
+        // Dots and gaps are cut here, because each segment is shorter than the pattern of a whole
+        // line.
+        let pattern = match ink.replace(LineType::Full) {
+            Some(line_type) if line_type != LineType::Full => {
+                let dot_length = self.settings.dot_length();
+                Pattern::of(line_type, length.to_bits(), dot_length.to_bits())
+            }
+            unchanged => {
+                ink = unchanged;
+                Pattern::full(length.to_bits())
+            }
+        };
+        let dot_end = pattern.end_of(dot);
+        let is_gap = !Pattern::inked(dot);
+        let cut_end = cuts.position(next, length.to_bits());
+        let end = dot_end.min(cut_end);
+        dot += u32::from(end == dot_end);
+        if end == cut_end {
+            cut = next;
+        }
+        let end = PathLength::from_bits(end);
+        let positions = [position.to_bits(), end.to_bits()];
+        let begin = self.motors_end();
+        let SegmentEnd { motors, page, offsets } =
+            anchors.segment_end([from, to], positions, length.to_bits(), begin);
+        let segment = Move { motors, offsets, page, chord, length: end - position, is_gap };
+        let pushed = self.push_motors(&segment, ink, limit);
+        debug_assert!(pushed.is_ok());
+        if pushed == Ok(false) {
+            return false;
+        }
+        (segmenter.position, segmenter.cut, segmenter.dot) = (end, cut, dot);
+        end >= length
     }
 }

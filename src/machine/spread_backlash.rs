@@ -219,26 +219,28 @@ impl Machine<'_> {
     }
 
     /// Returns a move whose motors end as much further as the backlash that was taken up requires.
-    pub(super) fn with_shift(&self, segment: Move) -> Move {
+    pub(super) fn with_shift<'c>(&self, segment: Move<'c>) -> Move<'c> {
         let [x, y] = self.spread_backlash.shift;
         let PagePoint { x: to_x, y: to_y } = segment.motors;
         Move { motors: PagePoint { x: to_x.wrapping_add(x), y: to_y.wrapping_add(y) }, ..segment }
     }
 
     /// Appends the next part of a line on which backlash is taken up, or what is left of it where a
-    /// line has ended. There must be room. Returns whether anything was appended.
+    /// line has ended. There must be room. Returns whether the move is complete; `None` if nothing
+    /// was appended.
     #[inline]
-    pub(super) fn push_spread_backlash(&mut self, segmenter: &Segmenter) -> bool {
-        self.spreads_backlash() && self.push_spread(segmenter)
+    pub(super) fn push_spread_backlash(&mut self, segmenter: &mut Segmenter) -> Option<bool> {
+        if self.spreads_backlash() { self.push_spread(segmenter) } else { None }
     }
 
     /// Does the work of [`Self::push_spread_backlash`] if backlash is taken up while the pen draws.
     #[inline(never)] // Only with this setting: inlined, it would fill the cache.
-    fn push_spread(&mut self, segmenter: &Segmenter) -> bool {
+    fn push_spread(&mut self, segmenter: &mut Segmenter) -> Option<bool> {
         if !self.runner.is_in_line() || segmenter.ink != Some(LineType::Full) {
-            return self.push_backlash_due();
+            return self.push_backlash_due().then_some(false);
         }
-        let Segmenter { from, to, length, position, limit, .. } = *segmenter;
+        let Segmenter { to, chord, position, limit, .. } = *segmenter;
+        let (from, length) = (segmenter.from(), chord.length());
         let (kinematics, backlash, end) =
             (self.settings.kinematics(), self.backlash_steps(), self.motors_end());
         let target = kinematics.motors(to);
@@ -276,7 +278,7 @@ impl Machine<'_> {
             },
         );
         if due == [0; 2] && !reverses {
-            return false;
+            return None;
         }
         if reverses || spread.left == 0 {
             spread.left = spread.distance;
@@ -302,14 +304,13 @@ impl Machine<'_> {
         let motors = kinematics.motors(page);
         let by = [motors.x - end.x, motors.y - end.y].zip_with(share, i32::wrapping_add);
         if !self.push_with_backlash(by, page, piece, reverses, limit) {
-            return false;
+            return None;
         }
         spread.left = spread.left.saturating_sub(piece);
         spread.due = due.zip_with(share, i32::wrapping_sub);
         self.count_backlash(spread, share);
-        let position = position + piece;
-        self.segmenter = (position < length).then_some(Segmenter { position, ..*segmenter });
-        true
+        segmenter.position = position + piece;
+        Some(segmenter.position >= length)
     }
 
     /// Appends the steps that are left to take up where a line has ended. They draw the part by
@@ -343,14 +344,12 @@ impl Machine<'_> {
         // converted like a position.
         let [x, y] = by;
         let offset = self.settings.kinematics().page(PagePoint { x, y });
-        let Some(length) = self.runner.limits().length(offset.x, offset.y) else { return false };
+        let Some(chord) = self.runner.chord(offset.x, offset.y) else { return false };
         let end = self.runner.end();
         let motors = PagePoint { x: end.x.wrapping_add(x), y: end.y.wrapping_add(y) };
-        let (offsets, displacement, is_gap) = ([0; 2], (offset.x, offset.y), false);
-        let piece =
-            Move { motors, offsets, page, displacement, whole_length: length, length, is_gap };
-        self.runner
-            .set_backlash_take_up(BacklashTakeUp { reverses, extra: length.saturating_sub(drawn) });
+        let piece = Move::whole(motors, page, &chord);
+        let extra = chord.length().saturating_sub(drawn);
+        self.runner.set_backlash_take_up(BacklashTakeUp { reverses, extra });
         let pushed = self.runner.push(&piece, Some(LineType::Full), limit).is_ok();
         self.runner.set_backlash_take_up(BacklashTakeUp::default());
         pushed

@@ -178,6 +178,10 @@ fn circle(limits: &Limits, first: PathPoint, middle: PathPoint, last: PathPoint)
     let across = 2 * twice_area.cast_signed();
     let (a, b, c) = (a.isqrt(), b.isqrt(), c.isqrt());
     let height = twice_area.checked_div(c).unwrap_or(0);
+    // The same question as at first, now of the length itself.
+    if height <= rounding {
+        return Circle::default();
+    }
     let is_low = height < TIGHT_HEIGHT * rounding;
     if !is_low && across > 2 * along {
         // The path turns by more than 63°, so points nearer to each other determine the curve.

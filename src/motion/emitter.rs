@@ -69,21 +69,21 @@ impl Emitter {
     ) -> Result<u32, StepEvent> {
         time = whole_ticks(time);
         if self.reverses(levels) {
-            self.directions = (self.directions & !levels.axes) | levels.directions;
+            self.directions = (self.directions & !levels.axes()) | levels.directions();
             let at = time.wrapping_sub(self.setup);
             let at = self.put(self.holding(), at, queue)?;
             time = later(time, at.wrapping_add(self.setup));
             // The pending event pulses nothing, so no pause is due after it.
             self.hand_over(time, queue)?;
-            self.pending = Some((StepEvent::levels(self.level_bits() | levels.pulses, 0), time));
+            self.pending = Some((StepEvent::levels(self.level_bits() | levels.pulses(), 0), time));
             return Ok(time);
         }
-        self.put(StepEvent::levels(self.level_bits() | levels.pulses, 0), time, queue)
+        self.put(StepEvent::levels(self.level_bits() | levels.pulses(), 0), time, queue)
     }
 
     /// Whether the move needs other levels at the direction pins.
     pub(super) fn reverses(&self, levels: MoveLevels) -> bool {
-        (self.directions ^ levels.directions) & levels.axes != 0
+        (self.directions ^ levels.0) & levels.axes() != 0
     }
 
     /// Makes some moves of `line` at the times of `train` after `start`, or later if the pins need
@@ -102,7 +102,7 @@ impl Emitter {
         };
         let level_bits = self.level_bits();
         let event_of =
-            |levels: MoveLevels| StepEvent::levels(level_bits | levels.pulses, 0).to_bits();
+            |levels: MoveLevels| StepEvent::levels(level_bits | levels.pulses(), 0).to_bits();
         // All times are counted from here, which is a whole tick.
         let due = whole_ticks(train.due(start, 0));
         let late = later(due, since.wrapping_add(self.least_interval)).wrapping_sub(due);
@@ -330,23 +330,20 @@ pub(super) struct LineLevels {
     pub(super) diagonal: MoveLevels,
 }
 
-/// The levels of the pins for a move.
+/// The levels of the pins for a move: a pulse for each axis that steps, the level of its direction
+/// pin where it counts down, and [`StepEvent::AT_REST`] where the move takes up backlash.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct MoveLevels {
-    /// The bits of the axes that step, and of whether they take up backlash.
-    pulses: u8,
-    /// The direction pins of these axes.
-    axes: u8,
-    /// The direction pins of those axes that count down.
-    directions: u8,
-}
+pub(super) struct MoveLevels(u8);
 
 impl MoveLevels {
+    const PULSES: u8 = StepEvent::STEP_X | StepEvent::STEP_Y;
+    const DIRECTIONS: u8 = StepEvent::DOWN_X | StepEvent::DOWN_Y;
+
     /// The levels for a move in `direction`.
     pub(super) fn of(direction: Direction) -> Self {
         /// The levels for all directions, indexed by their numbers.
         const ALL: [MoveLevels; 9] = {
-            let mut all = [MoveLevels { pulses: 0, axes: 0, directions: 0 }; 9];
+            let mut all = [MoveLevels(0); 9];
             let mut index = 0;
             while index < Direction::ALL.len() {
                 let direction = Direction::ALL[index];
@@ -360,26 +357,37 @@ impl MoveLevels {
 
     const fn for_direction(direction: Direction) -> Self {
         let (dx, dy) = direction.delta();
-        let mut levels = Self { pulses: 0, axes: 0, directions: 0 };
-        if dx != 0 {
-            levels.pulses |= StepEvent::STEP_X;
-            levels.axes |= StepEvent::DOWN_X;
-        }
-        if dy != 0 {
-            levels.pulses |= StepEvent::STEP_Y;
-            levels.axes |= StepEvent::DOWN_Y;
-        }
-        if dx < 0 {
-            levels.directions |= StepEvent::DOWN_X;
-        }
-        if dy < 0 {
-            levels.directions |= StepEvent::DOWN_Y;
-        }
-        levels
+        let x = match dx {
+            0 => 0,
+            1 => StepEvent::STEP_X,
+            _ => StepEvent::STEP_X | StepEvent::DOWN_X,
+        };
+        let y = match dy {
+            0 => 0,
+            1 => StepEvent::STEP_Y,
+            _ => StepEvent::STEP_Y | StepEvent::DOWN_Y,
+        };
+        Self(x | y)
     }
 
     /// The levels for the same move if it takes up backlash.
     pub(super) const fn for_backlash(self) -> Self {
-        Self { pulses: self.pulses | StepEvent::AT_REST, ..self }
+        Self(self.0 | StepEvent::AT_REST)
+    }
+
+    /// The levels without those of the direction pins.
+    const fn pulses(self) -> u8 {
+        self.0 & !Self::DIRECTIONS
+    }
+
+    /// The levels of the direction pins.
+    const fn directions(self) -> u8 {
+        self.0 & Self::DIRECTIONS
+    }
+
+    /// The direction pins of the axes that step.
+    const fn axes(self) -> u8 {
+        // The direction pins are in the order of the pulses.
+        (self.0 & Self::PULSES) * (StepEvent::DOWN_X / StepEvent::STEP_X)
     }
 }

@@ -114,6 +114,17 @@ pub struct Limits {
     /// The greatest distance by which rounding three points to steps moves one of them off the line
     /// through the others.
     pub(super) rounding: PathLength,
+    /// 9·24 ρ in units of 2^-18 mm, where ρ is the greatest distance by which rounding moves a
+    /// point off its chord.
+    ///
+    /// A bend of radius R is known with an error of 1/24 once ρ is no more than 1/24 of the height
+    /// of its middle over a chord. That takes a circle through three points that are √(2·24·ρR)
+    /// apart, which is valid for its middle half, and so up to 3/2 of that distance before its end.
+    /// So at a distance D before the end of the known path, R/2 is at least D²/(9·24·ρ).
+    pub(super) surely_known: u32,
+    /// The length of a known path that holds the longest stop, and lets bends be known before, with
+    /// a quarter to spare.
+    pub(super) enough_path: PathLength,
     pub(super) pulse_ticks: u32,
     pub(super) setup_ticks: u32,
     /// The shapers of both axes; `None` if motion is not shaped.
@@ -126,7 +137,7 @@ impl Default for Limits {
     fn default() -> Self {
         let step_length = SliceSpeed::from_bits(u32::MAX / 80);
         let speed = SliceSpeed::from_bits(7_036_874);
-        Self {
+        let mut limits = Self {
             step_length: [step_length; 2],
             least_move: step_length,
             draw_speed: speed,
@@ -138,11 +149,15 @@ impl Default for Limits {
             junction_deviation: PathLength::from_bits(1 << 12),
             centripetal: true,
             rounding: rounding([step_length; 2]),
+            surely_known: 0,
+            enough_path: PathLength::ZERO,
             pulse_ticks: 50,
             setup_ticks: 25,
             #[cfg(feature = "input-shaping")]
             shaping: None,
-        }
+        };
+        limits.find_needed_path();
+        limits
     }
 }
 
@@ -203,6 +218,8 @@ impl Limits {
             },
             centripetal: settings.centripetal,
             rounding: rounding(step_length),
+            surely_known: 0,
+            enough_path: PathLength::ZERO,
             pulse_ticks: settings.pulse_ticks.max(1),
             setup_ticks: settings.direction_setup_ticks,
             #[cfg(feature = "input-shaping")]
@@ -219,8 +236,16 @@ impl Limits {
             let distance = jerk.braking_distance(state, 0) >> 14;
             PathLength::from_bits(u32::try_from(distance).unwrap_or(u32::MAX))
         });
+        limits.find_needed_path();
         limits.check_step_rate()?;
         Ok(limits)
+    }
+
+    /// Derives how much of the path must be known from the other limits.
+    fn find_needed_path(&mut self) {
+        self.surely_known = self.rounding.to_bits().saturating_mul(9 * 24);
+        let needed = self.longest_stop.to_bits().saturating_add(self.surely_known / 4);
+        self.enough_path = PathLength::from_bits(needed.saturating_add(needed / 4));
     }
 
     /// The same limits for motion that is shaped.

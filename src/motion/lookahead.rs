@@ -4,17 +4,6 @@
 use super::{Limits, PathLength};
 use crate::drawing::LineType;
 
-/// Returns 9·24 ρ in units of 2^-18 mm, where ρ is the greatest distance by which rounding moves a
-/// point off its chord.
-///
-/// A bend of radius R is known with an error of 1/24 once ρ is no more than 1/24 of the height of
-/// its middle over a chord. That takes a circle through three points that are √(2·24·ρR) apart,
-/// which is valid for its middle half, and so up to 3/2 of that distance before its end. So at a
-/// distance D before the end of the known path, R/2 is at least D²/(9·24·ρ).
-fn surely_known(limits: &Limits) -> u32 {
-    limits.rounding.to_bits().saturating_mul(9 * 24)
-}
-
 /// A straight move that waits, or up to six short ones that are planned as one. It takes 48 bytes,
 /// or 52 with the feature `spread-backlash`.
 ///
@@ -249,12 +238,12 @@ impl<'m> Lookahead<'m> {
     ///
     /// A line that goes on in the same direction (`goes_on`) makes a short block longer, so that
     /// one plan serves for both. Other lines are joined only if the blocks might otherwise not hold
-    /// the machine's stopping distance: nothing is joined while the whole path has 5/4 of that
-    /// distance or less than half of the memory is in use, nor to a block that has its share of it.
+    /// the machine's stopping distance: nothing is joined while the whole path is
+    /// [long enough](Limits::enough_path) or less than half of the memory is in use, nor to a block
+    /// that has its share of it.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn join(&mut self, line: &Block, goes_on: bool, limits: &Limits) -> bool {
-        let needed = limits.longest_stop.to_bits().saturating_add(surely_known(limits) / 4);
-        let enough = needed.saturating_add(needed / 4);
+        let enough = limits.enough_path.to_bits();
         let is_needed = !self.is_short() && self.length < u64::from(enough);
         let share = if is_needed { enough / self.blocks.len().max(1) as u32 } else { 0 };
         (goes_on || is_needed) && self.join_to_last(line, share, limits)
@@ -389,14 +378,14 @@ impl<'m> Lookahead<'m> {
     /// bends that later points may reveal.
     ///
     /// At a distance D before the end, a bend that only later points reveal is so wide that the
-    /// stopping distance may be D² over [`surely_known`]. From further away the machine can brake
+    /// stopping distance may be D² over [`Limits::surely_known`]. From further away the machine can brake
     /// to that.
     pub(super) fn stopping_distance_at(&self, to_end: u64, limits: &Limits) -> u64 {
         if !limits.centripetal || self.is_empty() {
             return to_end;
         }
         let open = u32::try_from(to_end).unwrap_or(u32::MAX).min(self.open.to_bits());
-        let known = surely_known(limits);
+        let known = limits.surely_known;
         if open >= known.div_ceil(2) {
             to_end - u64::from(known / 4)
         } else {
@@ -677,7 +666,7 @@ mod tests {
         let mut memory = [Block::EMPTY; 4];
         let mut ring = Lookahead::new(&mut memory);
         ring.push(block(1 << 30, u32::MAX)).expect("room");
-        let known = u64::from(surely_known(&limits));
+        let known = u64::from(limits.surely_known);
         let mut before = 0;
         for to_end in 0..known {
             let allowed = ring.stopping_distance_at(to_end, &limits);

@@ -55,7 +55,7 @@ pub use profile::Profile;
 pub use runner::PenOverlap;
 #[cfg(feature = "spread-backlash")]
 pub use runner::{BacklashTakeUp, Reversal};
-pub use runner::{Move, PenPositions, Progress, PushError, RunLengths, Runner};
+pub use runner::{Chord, Move, PenPositions, Progress, PushError, RunLengths, Runner};
 #[cfg(feature = "input-shaping")]
 pub use shaping::{Resonance, ShaperKind, Shaping};
 pub use steady::SteadySpeed;

@@ -11,8 +11,8 @@ mod reversals;
 #[cfg(feature = "input-shaping")]
 mod shaped;
 
-use append::{Chord, LastMove, LongMove};
-pub use append::{Move, PushError};
+pub use append::{Chord, Move, PushError};
+use append::{LastMove, LongMove};
 #[cfg(feature = "pen-overlap")]
 pub use pen::PenOverlap;
 use pen::PenTiming;

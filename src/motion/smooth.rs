@@ -343,7 +343,9 @@ impl Interval {
         if slices > 0 && (is_even || self.rest.distance == 0) {
             let before = self.speed;
             self.done += slices;
-            self.speed = self.speed_after(self.done);
+            if !is_even {
+                self.speed = self.speed_after(self.done);
+            }
             let stays_at_rest = before == 0 && self.speed == 0 && self.growth <= 0;
             if !stays_at_rest {
                 let slices = u32::from(slices);

@@ -260,10 +260,8 @@ fn a_travel_that_becomes_faster_does_not_stand_on_the_way() {
     let mut runner = Runner::new(limits.expect("valid"), pen, &mut blocks);
     for (x, ink) in [(1000, true), (1600, false), (3000, true)] {
         let (motors, from) = (PagePoint { x, y: 0 }, runner.end());
-        let length = runner.limits().length(x - from.x, 0).expect("short");
-        let displacement = (x - from.x, 0);
-        let (offsets, page, whole_length, is_gap) = ([0; 2], motors, length, false);
-        let piece = Move { motors, offsets, page, displacement, whole_length, length, is_gap };
+        let chord = runner.chord(x - from.x, 0).expect("short");
+        let piece = Move::whole(motors, motors, &chord);
         runner.push(&piece, ink.then_some(LineType::Full), PathLength::MAX).expect("room");
     }
     let mut events = Recorder(Vec::new());

@@ -135,34 +135,12 @@ impl Kinematics {
         }
     }
 
-    /// Where a line on the page is cut into segments; `None` if the line is also straight for the
-    /// motors.
-    pub fn cuts(self, from: PagePoint, to: PagePoint) -> Option<CutPositions> {
+    /// The anchors of the belts, where lines on the page must be cut into segments that are straight
+    /// for the motors too. `None` if the motors make straight lines of all.
+    pub(super) fn belts(self) -> Option<Anchors> {
         match self {
             Self::Cartesian | Self::CoreXy => None,
-            Self::Polargraph(anchors) => Some(CutPositions::new(anchors, from, to)),
-        }
-    }
-
-    /// The end of the segment of the line between two points of the page. The segment reaches from
-    /// one to the other of two `positions` along the line, in units in which the whole line is
-    /// `length` long. `begin` is the position of the motors at the end of the previous segment,
-    /// where this segment begins.
-    ///
-    /// Everything is computed from the lesser end of the line, so a line drawn backward has the
-    /// same points.
-    pub fn segment_end(
-        self,
-        ends: [PagePoint; 2],
-        positions: [u32; 2],
-        length: u32,
-        begin: PagePoint,
-    ) -> SegmentEnd {
-        match self {
-            Self::Cartesian | Self::CoreXy => {
-                SegmentEnd { motors: self.motors(ends[1]), page: ends[1], offsets: [0; 2] }
-            }
-            Self::Polargraph(anchors) => anchors.segment_end(ends, positions, length, begin),
+            Self::Polargraph(anchors) => Some(anchors),
         }
     }
 }

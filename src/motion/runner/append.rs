@@ -4,7 +4,7 @@ use super::*;
 
 /// A straight move of the pen, or a segment of one.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Move {
+pub struct Move<'c> {
     /// The positions of the motors at its end.
     pub motors: PagePoint,
     /// How far its ends lie beside the points that the motors can reach: see
@@ -12,14 +12,19 @@ pub struct Move {
     pub offsets: [i16; 2],
     /// The position of the pen at its end.
     pub page: PagePoint,
-    /// The displacement of the whole move on the page, in steps.
-    pub displacement: (i32, i32),
-    /// The length of the whole move.
-    pub whole_length: PathLength,
+    /// The whole move on the page.
+    pub chord: &'c Chord,
     /// The length of this segment of it.
     pub length: PathLength,
     /// Whether this is a gap within an inked line, for which the pen is raised.
     pub is_gap: bool,
+}
+
+impl<'c> Move<'c> {
+    /// A whole move to a position of the motors and of the pen.
+    pub fn whole(motors: PagePoint, page: PagePoint, chord: &'c Chord) -> Self {
+        Self { motors, offsets: [0; 2], page, chord, length: chord.length, is_gap: false }
+    }
 }
 
 /// The reasons why a block was not appended.
@@ -33,13 +38,26 @@ pub enum PushError {
 }
 
 /// A displacement on the page with its length and its direction, which cost a square root and a
-/// division. Rounding to steps leaves few different chords in a curve, so they are kept.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Chord {
+/// division: [`Runner::chord`] returns it. Rounding to steps leaves few different chords in a
+/// curve, so they are kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Chord {
     /// The displacement, in steps.
     displacement: (i32, i32),
     length: PathLength,
     heading: Heading,
+}
+
+impl Chord {
+    /// The displacement on the page, in steps.
+    pub const fn displacement(&self) -> (i32, i32) {
+        self.displacement
+    }
+
+    /// The length on the page.
+    pub const fn length(&self) -> PathLength {
+        self.length
+    }
 }
 
 /// What the next move must know of the one before it.
@@ -93,17 +111,22 @@ impl LongMove {
 }
 
 impl Runner<'_> {
-    /// The length of a move by (`dx`, `dy`) steps: see [`Limits::length`].
-    pub fn move_length(&self, dx: i32, dy: i32) -> Option<PathLength> {
-        let known = self.known_chord((dx, dy));
-        known.map_or_else(|| self.limits.length(dx, dy), |chord| Some(chord.length))
-    }
-
-    /// The chord with this displacement, if it was among the last moves.
-    fn known_chord(&self, displacement: (i32, i32)) -> Option<Chord> {
-        let last = self.last.as_ref().map(|last| &last.chord);
-        let is_it = |chord: &&Chord| chord.displacement == displacement;
-        last.filter(is_it).or(self.other_chord.as_ref().filter(is_it)).copied()
+    /// A move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.
+    pub fn chord(&self, dx: i32, dy: i32) -> Option<Chord> {
+        let displacement = (dx, dy);
+        if let Some(last) = &self.last
+            && last.chord.displacement == displacement
+        {
+            return Some(last.chord);
+        }
+        if let Some(chord) = &self.other_chord
+            && chord.displacement == displacement
+        {
+            return Some(*chord);
+        }
+        let length = self.limits.length(dx, dy)?;
+        let heading = Heading::new(&self.limits, dx, dy, length);
+        Some(Chord { displacement, length, heading })
     }
 
     /// Appends a move whose speed is limited by a stopping distance ([`Limits::feed`]). Lengths,
@@ -113,33 +136,27 @@ impl Runner<'_> {
     /// See [`PushError`]; nothing is appended then.
     pub fn push(
         &mut self,
-        piece: &Move,
+        piece: &Move<'_>,
         ink: Option<LineType>,
         limit: PathLength,
     ) -> Result<(), PushError> {
-        let Move { motors, offsets, page, mut displacement, mut whole_length, mut length, is_gap } =
-            *piece;
+        let Move { motors, offsets, page, mut chord, mut length, is_gap } = *piece;
+        let own;
         let (dx, dy) = (motors.x - self.end.x, motors.y - self.end.y);
         if dx == 0 && dy == 0 {
             // The pen may be only near this point, because the motors move in whole steps.
             self.page_end = page;
             return Ok(());
         }
-        if displacement == (0, 0) || length == 0 {
+        if chord.displacement == (0, 0) || length == 0 {
             // The move is shorter than a step on the page, so its direction is that of the motors.
-            displacement = (dx.signum(), dy.signum());
-            whole_length =
-                self.limits.length(displacement.0, displacement.1).ok_or(PushError::TooLong)?;
-            length = whole_length;
+            own = self.chord(dx.signum(), dy.signum()).ok_or(PushError::TooLong)?;
+            (chord, length) = (&own, own.length);
         }
         let inked = ink.filter(|_| !is_gap);
-        let chord = self.known_chord(displacement).unwrap_or_else(|| {
-            let heading = Heading::new(&self.limits, displacement.0, displacement.1, whole_length);
-            Chord { displacement, length: whole_length, heading }
-        });
         let last = self.last.filter(|last| passes(last.ink, inked));
         let goes_on = last.is_some_and(|last| {
-            let [(x, y), (dx, dy)] = [last.chord.displacement, displacement];
+            let [(x, y), (dx, dy)] = [last.chord.displacement, chord.displacement];
             is_in_line([x, y], [dx, dy])
         });
         let corner = match last {
@@ -199,11 +216,16 @@ impl Runner<'_> {
         }
         self.end = motors;
         self.page_end = page;
-        let before = self.last.replace(LastMove { chord, length, ink: inked });
-        if let Some(before) = before
-            && before.chord.displacement != displacement
-        {
-            self.other_chord = Some(before.chord);
+        match &mut self.last {
+            Some(last) if last.chord.displacement == chord.displacement => {
+                (last.length, last.ink) = (length, inked);
+            }
+            last => {
+                if let Some(last) = last {
+                    self.other_chord = Some(last.chord);
+                }
+                *last = Some(LastMove { chord: *chord, length, ink: inked });
+            }
         }
         self.follow_path();
         Ok(())

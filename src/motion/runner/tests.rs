@@ -20,11 +20,8 @@ pub(super) const PEN: PenPositions = PenPositions {
 /// Appends a straight move.
 pub(super) fn push(runner: &mut Runner<'_>, [x, y]: [i32; 2], ink: Option<LineType>) {
     let (motors, from) = (PagePoint { x, y }, runner.end());
-    let displacement = (x - from.x, y - from.y);
-    let length = runner.limits().length(displacement.0, displacement.1).expect("short");
-    let (offsets, whole_length, is_gap) = ([0; 2], length, false);
-    let piece = Move { motors, offsets, page: motors, displacement, whole_length, length, is_gap };
-    runner.push(&piece, ink, PathLength::MAX).expect("room");
+    let chord = runner.chord(x - from.x, y - from.y).expect("short");
+    runner.push(&Move::whole(motors, motors, &chord), ink, PathLength::MAX).expect("room");
 }
 
 /// Runs all that is known, and returns the ticks of all events so far.

@@ -92,8 +92,14 @@ impl Anchors {
         PagePoint { x: left.x + x as i32, y: left.y - rounded_root(down) }
     }
 
-    /// The end of a segment of a line: see [`Kinematics::segment_end`](super::Kinematics).
-    pub(super) fn segment_end(
+    /// The end of the segment of the line between two points of the page. The segment reaches from
+    /// one to the other of two `positions` along the line, in units in which the whole line is
+    /// `length` long. `begin` is the position of the motors at the end of the previous segment,
+    /// where this segment begins.
+    ///
+    /// Everything is computed from the lesser end of the line, so a line drawn backward has the
+    /// same points.
+    pub(in crate::machine) fn segment_end(
         self,
         ends: [PagePoint; 2],
         positions: [u32; 2],
