@@ -6,6 +6,7 @@
 //! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
 //! reader refuses arcs that do not exist, and numbers that it cannot read.
 
+mod moves;
 mod signals;
 
 use super::arrange::Arrangement;
@@ -13,6 +14,7 @@ use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::Plan;
 use crate::lines::Origin;
+use moves::{Moves, Signals};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -25,33 +27,6 @@ const CHORD_ERROR: f64 = 0.005;
 
 /// The most points of a program. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
-
-/// The values of the signals that may lift the pen during a move.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Signals {
-    servo: Option<f64>,
-    height: Option<f64>,
-    /// Whether the height has grown when it changed last: 1.0, or -1.0 if it has not.
-    growth: Option<f64>,
-    /// Whether the spindle is on; `None` if the program has not said.
-    spindle: Option<bool>,
-    power: Option<f64>,
-}
-
-/// A move of the program in mm.
-#[derive(Debug)]
-struct Move {
-    line: u32,
-    is_rapid: bool,
-    signals: Signals,
-    points: Vec<[f64; 2]>,
-}
-
-impl Move {
-    fn length(&self) -> f64 {
-        self.points.windows(2).map(|ends| distance(ends[0], ends[1])).sum()
-    }
-}
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
@@ -67,13 +42,11 @@ struct Interpreter {
     has_absolute_centres: bool,
     /// The length of the unit in mm.
     unit: f64,
-    at: [f64; 2],
     /// The origin that G92 has set, which is added to coordinates.
     origin: [f64; 3],
     height: f64,
     signals: Signals,
-    moves: Vec<Move>,
-    points: usize,
+    moves: Moves,
     /// Whether a height was given as such, and not as a distance.
     has_absolute_heights: bool,
     /// The words that were not obeyed, with their count and the first line.
@@ -90,12 +63,10 @@ impl Interpreter {
             is_relative: false,
             has_absolute_centres: false,
             unit: 1.0,
-            at: [0.0; 2],
             origin: [0.0; 3],
             height: 0.0,
             signals: Signals::default(),
-            moves: Vec::new(),
-            points: 0,
+            moves: Moves::from([0.0; 2]),
             has_absolute_heights: false,
             unknown: BTreeMap::new(),
         }
@@ -151,7 +122,7 @@ impl Interpreter {
         }
         if sets_position {
             for (axis, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
-                let now = if axis < 2 { self.at[axis] } else { self.height };
+                let now = if axis < 2 { self.moves.at()[axis] } else { self.height };
                 if let Some(value) = value(letter) {
                     self.origin[axis] = now - value * self.unit;
                 }
@@ -184,24 +155,21 @@ impl Interpreter {
             }
             self.signals.height = Some(self.height);
         }
-        let to = [target('X', 0, self.at[0]), target('Y', 1, self.at[1])];
+        let at = self.moves.at();
+        let to = [target('X', 0, at[0]), target('Y', 1, at[1])];
         let is_arc = self.motion >= 2 && ['I', 'J', 'R'].into_iter().any(|it| value(it).is_some());
         if value('X').is_none() && value('Y').is_none() && !is_arc {
             return Ok(());
         }
-        let mut points = vec![self.at];
+        let mut points = Vec::new();
         if self.motion >= 2 {
             self.arc(to, value, &mut points)?;
         }
         points.push(to);
-        self.points += points.len();
-        if self.points > MOST_POINTS {
+        if self.moves.point_count() + points.len() > MOST_POINTS {
             return Err("the program has too many points: leave a part of it out".to_owned());
         }
-        self.at = to;
-        let line = u32::try_from(number).unwrap_or(u32::MAX);
-        let is_rapid = self.motion == 0;
-        self.moves.push(Move { line, is_rapid, signals: self.signals, points });
+        self.moves.push(number, self.motion == 0, self.signals, &points);
         Ok(())
     }
 
@@ -212,7 +180,7 @@ impl Interpreter {
         value: &impl Fn(char) -> Option<f64>,
         points: &mut Vec<[f64; 2]>,
     ) -> Result<(), RefusalText> {
-        let from = self.at;
+        let from = self.moves.at();
         let clockwise = self.motion == 2;
         let centre = if let Some(radius) = value('R') {
             let radius = radius * self.unit;
@@ -247,7 +215,7 @@ impl Interpreter {
         };
         let most = 2.0 * (1.0 - CHORD_ERROR / radius.max(2.0 * CHORD_ERROR)).acos();
         let chords = (turn / most).ceil().max(1.0);
-        if self.points as f64 + chords > MOST_POINTS as f64 {
+        if self.moves.point_count() as f64 + chords > MOST_POINTS as f64 {
             return Err("the arc is too large".to_owned());
         }
         let sign = if clockwise { -1.0 } else { 1.0 };
@@ -320,38 +288,39 @@ impl Format for GCode {
         let is_read = |(index, line): (usize, &&str)| interpreter.line(line, index).is_ok();
         lines.iter().enumerate().all(is_read)
             && interpreter.unknown.keys().all(|word| word.starts_with(['G', 'M']))
-            && !interpreter.moves.is_empty()
+            && interpreter.moves.len() > 0
     }
 
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let text = String::from_utf8_lossy(&bytes);
         let mut interpreter = Interpreter::new();
-        let lines: Vec<&str> = text.lines().collect();
-        let origin = |number: usize| Origin {
+        let origin = |index: usize, line: &str| Origin {
             file: file.clone(),
-            line: number,
-            text: lines[number - 1].chars().take(Origin::MOST_SHOWN + 1).collect(),
+            line: index + 1,
+            text: line.chars().take(Origin::MOST_SHOWN + 1).collect(),
         };
-        for (index, line) in lines.iter().enumerate() {
+        for (index, line) in text.lines().enumerate() {
             if line.contains('\0') {
-                return Err(ReadError::NotText { origin: origin(index + 1), kind: "G-code" });
+                return Err(ReadError::NotText { origin: origin(index, line), kind: "G-code" });
             }
             match interpreter.line(line, index + 1) {
                 Ok(true) => {}
                 Ok(false) => break,
-                Err(reason) => return Err(ReadError::Line { origin: origin(index + 1), reason }),
+                Err(reason) => return Err(ReadError::Line { origin: origin(index, line), reason }),
             }
         }
         let mut plan = Plan::new(file.clone());
         let drawn = signals::inked(&interpreter.moves, interpreter.has_absolute_heights);
         let mut pairs = interpreter.moves.iter().zip(drawn).filter(|(_, draws)| *draws).peekable();
+        let mut lines = (1..).zip(text.lines());
         while let Some((first, _)) = pairs.next() {
-            let mut points = first.points.clone();
+            let mut points = first.points.to_vec();
             while let Some((next, _)) = pairs.next_if(|(it, _)| points.last() == it.points.first())
             {
                 points.extend_from_slice(&next.points[1..]);
             }
-            plan.begin(first.line as usize, &origin(first.line as usize).text);
+            let line = lines.find(|(number, _)| *number == first.line);
+            plan.begin(first.line as usize, line.map_or("", |(_, text)| text));
             plan.draw(points, None, 1);
         }
         let notes: Vec<String> = interpreter

@@ -30,15 +30,23 @@ const TOLERANCE: usize = 1_000_000;
 const POINTS: usize = 20_000;
 const STROKE: usize = ROW;
 
-/// The elements of an SVG file that hold its points.
+/// What holds the points in the file.
 #[derive(Debug, Clone, Copy)]
 enum Elements {
-    /// Polylines of so many points.
+    /// Polylines of so many points, in SVG.
     Polylines(usize),
-    /// `line` elements.
+    /// `line` elements of SVG.
     Lines,
-    /// `path` elements of one straight line.
+    /// `path` elements of SVG, each of one straight line.
     Paths,
+    /// `l` elements of OBJ of two points.
+    Obj,
+    /// Strokes of HP-GL of two points.
+    HpGl,
+    /// Moves of G-code, of which every other one draws.
+    GCode,
+    /// `LINE` entities of DXF.
+    Dxf,
 }
 
 impl Elements {
@@ -46,11 +54,37 @@ impl Elements {
     fn points(self) -> usize {
         match self {
             Self::Polylines(points) => points,
-            Self::Lines | Self::Paths => 2,
+            _ => 2,
         }
     }
 
-    /// The element that draws these points.
+    /// The name of the file.
+    fn file(self) -> &'static str {
+        match self {
+            Self::Polylines(_) | Self::Lines | Self::Paths => "points.svg",
+            Self::Obj => "points.obj",
+            Self::HpGl => "points.hpgl",
+            Self::GCode => "points.gcode",
+            Self::Dxf => "points.dxf",
+        }
+    }
+
+    /// What stands before the elements and behind them.
+    fn frame(self) -> [&'static str; 2] {
+        match self {
+            Self::Polylines(_) | Self::Lines | Self::Paths => [
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"400mm\" height=\"400mm\" \
+                 viewBox=\"0 0 400 400\">\n",
+                "</svg>\n",
+            ],
+            Self::Obj => ["", ""],
+            Self::HpGl => ["IN;SP1;\n", "PU;SP0;\n"],
+            Self::GCode => ["G21\nG90\nM5\n", "M5\nM2\n"],
+            Self::Dxf => ["0\nSECTION\n2\nENTITIES\n", "0\nENDSEC\n0\nEOF\n"],
+        }
+    }
+
+    /// Writes the element that draws these points.
     fn write(self, points: &[[f64; 2]], text: &mut String) {
         // Writing to a string cannot fail.
         let _ = match (self, points) {
@@ -63,6 +97,20 @@ impl Elements {
                 text,
                 "<path fill=\"none\" stroke=\"black\" d=\"M{x1:.1},{y1:.1}L{x2:.1},{y2:.1}\"/>"
             ),
+            (Self::Obj, [[x1, y1], [x2, y2]]) => {
+                writeln!(text, "v {x1:.1} {y1:.1} 0\nv {x2:.1} {y2:.1} 0\nl -2 -1")
+            }
+            (Self::HpGl, [from, to]) => {
+                // 40 units are a millimetre.
+                let [[x1, y1], [x2, y2]] = [from, to].map(|point| point.map(|mm| 40.0 * mm));
+                writeln!(text, "PU{x1:.0},{y1:.0};PD{x2:.0},{y2:.0};")
+            }
+            (Self::GCode, [[x1, y1], [x2, y2]]) => {
+                writeln!(text, "G0 X{x1:.1} Y{y1:.1}\nM3\nG1 X{x2:.1} Y{y2:.1} F2000\nM5")
+            }
+            (Self::Dxf, [[x1, y1], [x2, y2]]) => {
+                writeln!(text, "0\nLINE\n8\n0\n10\n{x1:.1}\n20\n{y1:.1}\n11\n{x2:.1}\n21\n{y2:.1}")
+            }
             _ => {
                 let points = points.iter().map(|[x, y]| format!("{x:.1},{y:.1} "));
                 let points: String = points.collect();
@@ -72,12 +120,10 @@ impl Elements {
     }
 }
 
-/// An SVG file of so many points in rows, in these elements.
-fn svg(points: usize, elements: Elements) -> String {
-    let mut text = String::from(
-        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"400mm\" height=\"400mm\" \
-         viewBox=\"0 0 400 400\">\n",
-    );
+/// A file of so many points in rows, in these elements.
+fn file(points: usize, elements: Elements) -> String {
+    let [before, after] = elements.frame();
+    let mut text = before.to_owned();
     let place = |number: usize| {
         let (row, column) = (number / ROW, number % ROW);
         let x = 20.0 + 0.2 * column as f64;
@@ -88,7 +134,7 @@ fn svg(points: usize, elements: Elements) -> String {
         let places: Vec<[f64; 2]> = of_element.map(place).collect();
         elements.write(&places, &mut text);
     }
-    text + "</svg>\n"
+    text + after
 }
 
 /// The greatest resident memory of a process so far, in bytes; `None` if it has ended.
@@ -101,15 +147,16 @@ fn peak(process: &str) -> Option<usize> {
 /// Lets the program draw so many points. Returns its greatest resident memory in bytes.
 fn memory_for(points: usize, elements: Elements) -> usize {
     let folder = tempfile::tempdir().expect("a folder");
-    let [file, said] = ["points.svg", "said.txt"].map(|name| folder.path().join(name));
-    fs::write(&file, svg(points, elements)).expect("written");
+    let name = elements.file();
+    let [path, said] = [name, "said.txt"].map(|name| folder.path().join(name));
+    fs::write(&path, file(points, elements)).expect("written");
     let (mut wire, terminal) = TTYPort::pair().expect("a pseudo-terminal");
     wire.set_timeout(Duration::from_millis(1)).expect("set");
     let device = terminal.name().expect("a name");
     // Only one may hold it: the program.
     drop(terminal);
     let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
-        .args(["plot", "points.svg", "--compute", "host", "--page", "400x400", "--effort", "0"])
+        .args(["plot", name, "--compute", "host", "--page", "400x400", "--effort", "0"])
         .args(["--port", &device])
         .current_dir(folder.path())
         .stderr(fs::File::create(&said).expect("a file"))
@@ -169,4 +216,11 @@ fn a_drawing_larger_than_the_board_takes_little_memory_for_each_point() {
 fn short_lines_take_little_memory_for_each_point_too() {
     check(Elements::Lines);
     check(Elements::Paths);
+}
+
+#[test]
+fn other_formats_take_little_memory_for_each_point_too() {
+    for elements in [Elements::Obj, Elements::HpGl, Elements::GCode, Elements::Dxf] {
+        check(elements);
+    }
 }

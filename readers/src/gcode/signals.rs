@@ -12,7 +12,7 @@
 //! the higher Z is up then, and for a servo the level of the first move. Where Z is only moved by
 //! distances that do not cancel out, whether it has grown or fallen last says where the pen is.
 
-use super::{Move, Signals};
+use super::moves::{Move, Moves, Signals};
 
 /// Levels that differ by less are the same.
 const SAME: f64 = 1e-6;
@@ -26,7 +26,7 @@ struct Division {
 
 /// Decides for each move whether it draws. `has_absolute_heights` says whether a Z was given as a
 /// height.
-pub(super) fn inked(moves: &[Move], has_absolute_heights: bool) -> Vec<bool> {
+pub(super) fn inked(moves: &Moves, has_absolute_heights: bool) -> Vec<bool> {
     let servo = || by_level(moves, |signals| signals.servo, None);
     let height = || by_level(moves, |signals| signals.height, Some(true));
     let growth = || by_level(moves, |signals| signals.growth, Some(true));
@@ -39,7 +39,7 @@ pub(super) fn inked(moves: &[Move], has_absolute_heights: bool) -> Vec<bool> {
 }
 
 /// Whether the moves are at more than two heights.
-fn drift(moves: &[Move]) -> bool {
+fn drift(moves: &Moves) -> bool {
     let mut heights: Vec<f64> = moves.iter().filter_map(|it| it.signals.height).collect();
     heights.sort_by(f64::total_cmp);
     heights.dedup_by(|one, other| (*one - *other).abs() < SAME);
@@ -53,39 +53,39 @@ fn is_on(it: &Move) -> bool {
 
 /// Of a program with G1 to G3 while the spindle is on, G0 does not draw: it is a laser, or a pen
 /// that is up then anyway.
-fn by_spindle(moves: &[Move]) -> Option<Vec<bool>> {
+fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
     let has_powers = moves.iter().any(|it| it.signals.power.is_some());
     let is_on = |it: &Move| is_on(it) && (it.signals.power.is_some() || !has_powers);
-    let feeds = moves.iter().any(|it| is_on(it) && !it.is_rapid);
-    let draws = moves.iter().map(|it| is_on(it) && !(feeds && it.is_rapid));
+    let feeds = moves.iter().any(|it| is_on(&it) && !it.is_rapid);
+    let draws = moves.iter().map(|it| is_on(&it) && !(feeds && it.is_rapid));
     let draws: Vec<bool> = draws.collect();
     // A spindle that only runs before the first move lifts no pen.
     (draws.contains(&true) && draws.contains(&false)).then_some(draws)
 }
 
 /// By the power of a spindle that is not switched off between moves, as servos are set.
-fn by_power(moves: &[Move]) -> Option<Vec<bool>> {
-    let first = moves.iter().position(is_on)?;
-    let last = moves.iter().rposition(is_on)?;
-    let between = moves.get(first..=last)?;
-    if !between.iter().all(is_on) {
+fn by_power(moves: &Moves) -> Option<Vec<bool>> {
+    let first = moves.iter().position(|it| is_on(&it))?;
+    let last = moves.iter().rposition(|it| is_on(&it))?;
+    let mut between = moves.iter().take(last + 1).skip(first);
+    if !between.clone().all(|it| is_on(&it)) {
         return None;
     }
     let power = |signals: &Signals| signals.power.filter(|_| signals.spindle == Some(true));
     let draws = by_level(moves, power, None)?;
     // A laser does not burn during G0, whatever its power.
     let is_laser =
-        between.iter().zip(draws.get(first..=last)?).any(|(it, draws)| it.is_rapid && *draws);
+        between.by_ref().zip(draws.get(first..=last)?).any(|(it, draws)| it.is_rapid && *draws);
     (!is_laser).then_some(draws)
 }
 
 /// Decides by the levels of a signal; `None` if it does not change.
 fn by_level(
-    moves: &[Move],
+    moves: &Moves,
     level: impl Fn(&Signals) -> Option<f64>,
     high_is_up: Option<bool>,
 ) -> Option<Vec<bool>> {
-    let levels: Vec<Option<f64>> = moves.iter().map(|it| level(&it.signals)).collect();
+    let levels: Vec<Option<f64>> = moves.iter().map(|it| level(it.signals)).collect();
     let first = levels.iter().copied().flatten().next()?;
     let has_rapid = moves.iter().zip(&levels).any(|(it, level)| it.is_rapid && level.is_some());
     let division = match has_rapid {
@@ -102,7 +102,7 @@ fn by_level(
 
 /// The division with the longest way by G0 at the levels that are up, and by G1 to G3 at the
 /// others.
-fn by_rapids(moves: &[Move], levels: &[Option<f64>]) -> Option<Division> {
+fn by_rapids(moves: &Moves, levels: &[Option<f64>]) -> Option<Division> {
     let mut lengths: Vec<(f64, [f64; 2])> = Vec::new();
     for (it, level) in moves.iter().zip(levels) {
         let length = if it.is_rapid { [it.length(), 0.0] } else { [0.0, it.length()] };

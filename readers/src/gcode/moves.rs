@@ -1,0 +1,103 @@
+//! The moves of a program, of which there may be millions: each takes 16 bytes, and 16 more for
+//! each point to which it goes.
+
+use super::distance;
+
+/// The number of settings of the signals that a new one is compared with. A pen goes up and down
+/// again and again.
+const COMPARED: usize = 8;
+
+/// The values of the signals that may lift the pen during a move.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Signals {
+    pub servo: Option<f64>,
+    pub height: Option<f64>,
+    /// Whether the height has grown when it changed last: 1.0, or -1.0 if it has not.
+    pub growth: Option<f64>,
+    /// Whether the spindle is on; `None` if the program has not said.
+    pub spindle: Option<bool>,
+    pub power: Option<f64>,
+}
+
+/// A move of the program in mm.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Move<'m> {
+    pub line: u32,
+    pub is_rapid: bool,
+    pub signals: &'m Signals,
+    /// Where it begins, and the points to which it goes, two at least.
+    pub points: &'m [[f64; 2]],
+}
+
+impl Move<'_> {
+    pub fn length(&self) -> f64 {
+        self.points.windows(2).map(|ends| distance(ends[0], ends[1])).sum()
+    }
+}
+
+/// A move as it is kept.
+#[derive(Debug)]
+struct Kept {
+    line: u32,
+    is_rapid: bool,
+    /// The number of its signals.
+    signals: u32,
+    /// The number of its last point.
+    end: u32,
+}
+
+/// The moves of a program. Each begins where the one before has ended.
+#[derive(Debug)]
+pub(super) struct Moves {
+    /// Where the first move begins, and the points to which the moves go.
+    points: Vec<[f64; 2]>,
+    each: Vec<Kept>,
+    /// The signals that the moves have.
+    signals: Vec<Signals>,
+}
+
+impl Moves {
+    /// No moves, from this point.
+    pub fn from(point: [f64; 2]) -> Self {
+        Self { points: vec![point], each: Vec::new(), signals: Vec::new() }
+    }
+
+    /// Where the last move has ended.
+    pub fn at(&self) -> [f64; 2] {
+        self.points.last().copied().unwrap_or_default()
+    }
+
+    /// The number of points to which the moves go.
+    pub fn point_count(&self) -> usize {
+        self.points.len() - 1
+    }
+
+    /// Adds a move to these points, one at least.
+    pub fn push(&mut self, line: usize, is_rapid: bool, signals: Signals, to: &[[f64; 2]]) {
+        let short = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
+        self.points.extend_from_slice(to);
+        let last = self.signals.len().saturating_sub(COMPARED);
+        let same = self.signals.iter().skip(last).position(|it| *it == signals);
+        let number = same.map_or(self.signals.len(), |position| last + position);
+        if same.is_none() {
+            self.signals.push(signals);
+        }
+        let (signals, end) = (short(number), short(self.point_count()));
+        self.each.push(Kept { line: short(line), is_rapid, signals, end });
+    }
+
+    /// The number of moves.
+    pub fn len(&self) -> usize {
+        self.each.len()
+    }
+
+    /// The moves in order.
+    pub fn iter(&self) -> impl DoubleEndedIterator<Item = Move<'_>> + ExactSizeIterator + Clone {
+        (0..self.each.len()).map(|index| {
+            let begin = index.checked_sub(1).map_or(0, |before| self.each[before].end as usize);
+            let Kept { line, is_rapid, signals, end } = self.each[index];
+            let signals = &self.signals[signals as usize];
+            Move { line, is_rapid, signals, points: &self.points[begin..=end as usize] }
+        })
+    }
+}
