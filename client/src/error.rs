@@ -163,6 +163,21 @@ pub enum Error {
         /// The error that the library reports.
         refusal: CommandError,
     },
+    /// In a preview, the memory of a board does not hold a model, which it draws all the same.
+    #[error(
+        "{source}\nThe memory of {board} does not hold this model, but `penup plot` draws it: it sends \
+         the strokes{}. A preview without --board shows them.",
+        if *keeps { ", or with --compute board the model, which the board keeps in its flash" }
+        else { "" }
+    )]
+    BeyondMemory {
+        /// The refusal of the board.
+        source: Box<Self>,
+        /// The board's name.
+        board: String,
+        /// Whether it keeps larger models in its flash.
+        keeps: bool,
+    },
     /// The emulator ended, or closed its connection, in the middle of the work.
     #[error(
         "the emulator of the {board} board broke: it {how}\n\
@@ -408,6 +423,7 @@ impl Error {
             | Self::Locked { .. }
             | Self::WithoutNumbers
             | Self::NotSet { .. }
+            | Self::BeyondMemory { .. }
             | Self::Refused { .. } => REFUSED,
             Self::Silent { line: Some(_), .. }
             | Self::LostLine { .. }

@@ -106,10 +106,21 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
         }
         Some(board) => {
             let plotter = InMemory::<u16>::new(Room::of_board(board), machine);
-            show(plotter, &job, &source, args, &outputs, bar, interrupt)
+            let shown = show(plotter, &job, &source, args, &outputs, bar, interrupt);
+            shown.map_err(|error| match error {
+                Error::Refused { number, .. } if FULL.contains(&number) => Error::BeyondMemory {
+                    source: Box::new(error),
+                    board: board.name.to_owned(),
+                    keeps: board.model_flash > 0 && !source.is_plan,
+                },
+                error => error,
+            })
         }
     }
 }
+
+/// The errors of a plotter whose memory does not hold all vertices, or all corners, of a model.
+const FULL: [u16; 2] = [113, 114];
 
 /// Draws the job by `plotter` and writes the pictures and reports that the arguments name.
 fn show<I: Index>(

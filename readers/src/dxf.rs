@@ -6,6 +6,7 @@
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
 //! refuses the binary form, and a file that does not consist of pairs of a code and a value.
 
+mod binary;
 mod curves;
 mod dashes;
 mod document;
@@ -28,7 +29,7 @@ use std::sync::Arc;
 use text::Writing;
 
 /// The beginning of a binary file.
-const BINARY: &[u8] = b"AutoCAD Binary DXF";
+const BINARY: &[u8] = b"AutoCAD Binary DXF\r\n\x1A\0";
 
 /// The format itself.
 #[derive(Debug)]
@@ -58,6 +59,10 @@ const UNITS: [(i64, f64); 11] = [
     (14, 100.0),
 ];
 
+/// What is said of the entities of the space that is not drawn.
+const PAPER: &str = "entities in paper space";
+const MODEL: &str = "entities in model space";
+
 /// The strokes of a drawing, and what of it is not drawn.
 struct Drawing<'d, 'a> {
     document: &'d Document<'a>,
@@ -66,6 +71,8 @@ struct Drawing<'d, 'a> {
     /// The number of entities of a kind that are not drawn, and the line of the first.
     skipped: BTreeMap<String, (usize, usize)>,
     points: usize,
+    /// Whether paper space is drawn, and not model space.
+    is_of_paper: bool,
     /// The length of a unit of the file in mm.
     unit: f64,
     /// The number of lines with too many dashes.
@@ -118,8 +125,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
             let is_hidden_text = entity.kind == "ATTRIB" && entity.flags()? & 1 != 0;
             if self.document.is_hidden(layer) {
                 self.skip("entities on layers that are off or frozen", entity.line);
-            } else if entity.number(67, 0.0)? != 0.0 {
-                self.skip("entities in paper space", entity.line);
+            } else if (entity.number(67, 0.0)? != 0.0) != self.is_of_paper && placement.depth == 0 {
+                self.skip(if self.is_of_paper { MODEL } else { PAPER }, entity.line);
             } else if entity.number(60, 0.0)? != 0.0 || is_hidden_text {
                 self.skip("invisible entities", entity.line);
             } else {
@@ -469,9 +476,13 @@ impl Format for Dxf {
         let refused = |reason: &str| {
             Err(ReadError::Content { file: file.clone(), reason: reason.to_owned() })
         };
-        if bytes.starts_with(BINARY) {
-            return refused("this is the binary form of DXF: save it as text (ASCII)");
-        }
+        let bytes = match bytes.strip_prefix(BINARY) {
+            None => bytes,
+            Some(pairs) => match binary::as_text(pairs) {
+                Some(text) => text,
+                None => return refused("this binary DXF is damaged or not whole: save it again"),
+            },
+        };
         let text = match std::str::from_utf8(&bytes) {
             Ok(text) => text.trim_start_matches('\u{FEFF}').to_owned(),
             // Files from before 2007 use the character set of a country. Only names contain letters
@@ -501,6 +512,7 @@ impl Format for Dxf {
             strokes: Vec::new(),
             skipped: BTreeMap::new(),
             points: 0,
+            is_of_paper: false,
             unit,
             undashed: 0,
             texts: 0,
@@ -511,6 +523,11 @@ impl Format for Dxf {
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
         let placement = Placement { to_page, layer: "0", line_type: "", depth: 0 };
         drawing.all(&document.entities, placement).map_err(in_line)?;
+        if drawing.strokes.is_empty() && drawing.skipped.contains_key(PAPER) {
+            drawing.is_of_paper = true;
+            drawing.skipped.clear();
+            drawing.all(&document.entities, placement).map_err(in_line)?;
+        }
         let mut layers: Vec<&str> = Vec::new();
         for (_, _, layer, _) in &drawing.strokes {
             if !layers.contains(layer) {
@@ -570,6 +587,9 @@ impl Format for Dxf {
             if number > 0 {
                 notes.push(format!("{} {what}", counted(number, nouns)));
             }
+        }
+        if drawing.is_of_paper {
+            notes.push("paper space is drawn, because there is nothing in model space".to_owned());
         }
         if document.unit.unwrap_or(0) == 0 {
             notes.push("the file does not say its unit: it is taken as mm".to_owned());

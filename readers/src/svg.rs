@@ -9,7 +9,7 @@
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
 //! a dot with round or square ends is a very short line; a shape that is only filled is drawn as
 //! its outline. What has neither is not drawn, nor what would not be seen: a filled shape without an
-//! area, and a white one where no other colour lies below it. Texts are drawn as the outlines of their letters, if
+//! area, and a white one where no other colour lies below it and not all is white. Texts are drawn as the outlines of their letters, if
 //! the caller knows fonts. Clip paths cut lines off, and are a part of the outline of what is only
 //! filled, and so do masks ([`areas`]). An image that is an SVG is drawn ([`embedded`]). Other
 //! images, filters and patterns are counted, and the user is told.
@@ -43,6 +43,7 @@ use crate::region::length;
 use drawing::{Drawing, PIXEL};
 use embedded::Embedded;
 use markup::Markup;
+use std::fmt::Display;
 use std::sync::Arc;
 use text::TextFonts;
 use usvg::roxmltree::Error as XmlError;
@@ -93,19 +94,19 @@ impl Format for Svg {
     }
 }
 
-/// What is said of a file that is no XML, before the place.
-const NOT_WELL_FORMED: &str =
-    "this is not a well-formed SVG: save it again, for example with Inkscape";
+/// What is said of a file that is no XML.
+fn not_well_formed(error: impl Display) -> String {
+    format!("this is not a well-formed SVG ({error}): save it again, for example with Inkscape")
+}
 
 /// Reads `text`, the contents of `file`.
 ///
 /// # Errors
 /// The reason why it is not drawn, as a sentence.
 fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Contents, String> {
-    let not_xml = |error| format!("{NOT_WELL_FORMED}: {error}");
     let text = markup::with_prefixes(text);
-    let text = markup::with_ids(&text, &markup::parsed(&text).map_err(not_xml)?);
-    let document = markup::parsed(&text).map_err(not_xml)?;
+    let text = markup::with_ids(&text, &markup::parsed(&text).map_err(not_well_formed)?);
+    let document = markup::parsed(&text).map_err(not_well_formed)?;
     let mut options = Options::default();
     let embedded = Arc::new(Embedded::default());
     embedded.serve(&mut options, arrangement.files.clone());
@@ -118,7 +119,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         Error::ElementsLimitReached | Error::ParsingFailed(XmlError::NodesLimitReached) => {
             "the SVG has too many elements, or they are nested too deeply".to_owned()
         }
-        error => format!("{NOT_WELL_FORMED}: {error}"),
+        error => not_well_formed(error),
     })?;
     let size = [tree.size().width(), tree.size().height()];
     // What single precision adds to a length in mm is rounded away.

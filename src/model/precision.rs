@@ -41,7 +41,8 @@ impl Rounding {
         let decimals = u32::from(self.decimals);
         let half = match 10u64.checked_pow(decimals) {
             _ if decimals < FEWEST_ROUNDED => 0,
-            Some(power) => ((1 << fraction_bits) / (2 * power).max(1)) as u32 + 1, // at most 2^30
+            // At most 2^30. Twice 10^19 is no number of 64 bits.
+            Some(power) => ((1 << fraction_bits) / power / 2) as u32 + 1,
             None => 1,
         };
         let written = (half + unit).max(self.edited);
@@ -119,6 +120,7 @@ mod tests {
     use super::super::*;
     use super::*;
     use crate::stage::Scratch;
+    use std::format;
 
     fn decimals(texts: [&str; 3]) -> [Decimal; 3] {
         texts.map(|text| Decimal::parse(text).unwrap())
@@ -141,6 +143,21 @@ mod tests {
 
     fn is_about(found: f64, expected: f64) -> bool {
         (found - expected).abs() < 1e-7
+    }
+
+    /// Single precision near zero has so many, as what CAD programs leave of a zero.
+    #[test]
+    fn numbers_may_have_any_number_of_decimals() {
+        for decimals in 1..60 {
+            let zeros = "0".repeat(decimals - 1);
+            let small = format!("0.{zeros}5");
+            with_vertices(&[["1", "2", &small]], |model| {
+                let unit = (model.fraction_bits() as f64).exp2().recip();
+                let half = if decimals < 3 { 0.0 } else { 0.5 / 10f64.powi(decimals as i32) };
+                let found = written(model);
+                assert!(found >= half && found <= half + 2.0 * unit, "{decimals}: {found}");
+            });
+        }
     }
 
     #[test]

@@ -143,6 +143,22 @@ fn only_a_board_limits_a_preview() {
     let (code, _, refused) = penup(folder.path(), &[&preview[..], &["--board", "pico"]].concat());
     assert_eq!(code, Some(4));
     assert!(refused.contains("4096"), "{refused}");
+    let strokes = "The memory of pico does not hold this model, but `penup plot` draws it: it sends \
+                   the strokes. A preview without --board shows them.\n";
+    assert!(refused.ends_with(strokes), "{refused}");
+    // A solid may go to the flash of a board that has room for it.
+    let solid =
+        (0..4097).map(|number| format!("v {} {} {}\n", number % 64, number / 64, number % 7));
+    let faces = (1..4000).map(|number| format!("f {number} {} {}\n", number + 1, number + 65));
+    let solid: String = solid.chain(faces).collect();
+    fs::write(folder.path().join("solid.obj"), solid).expect("written");
+    let preview = ["preview", "solid.obj", "--svg", "solid.svg", "--board"];
+    let kept = ", or with --compute board the model, which the board keeps in its flash.";
+    for (board, is_kept) in [("pico", true), ("lm3s6965", false)] {
+        let (code, _, refused) = penup(folder.path(), &[&preview[..], &[board]].concat());
+        assert_eq!((code, refused.contains(kept)), (Some(4), is_kept), "{refused}");
+        assert!(refused.contains("A preview without --board shows them."), "{refused}");
+    }
 }
 
 /// What the options of plans do is drawn: the plotter itself measures the ink.

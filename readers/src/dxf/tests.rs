@@ -57,6 +57,42 @@ fn lines_and_polylines_have_true_size_in_any_unit() {
     );
 }
 
+/// Codes of two bytes are those of release 13 on, and of one byte those before.
+#[test]
+fn the_binary_form_is_that_of_the_text() {
+    let text = dxf("4", "", "0 LINE 8 walls 62 3 10 1.5 20 2 11 -3 21 4.25 210 0 230 1");
+    for is_wide in [true, false] {
+        let mut binary = b"AutoCAD Binary DXF\r\n\x1A\0".to_vec();
+        let lines: Vec<&str> = text.lines().collect();
+        for pair in lines.chunks(2) {
+            let code: i16 = pair[0].parse().expect("a code");
+            let bytes = code.to_le_bytes();
+            binary.extend(&bytes[..if is_wide { 2 } else { 1 }]);
+            match code {
+                10..60 | 210..240 => {
+                    binary.extend(pair[1].parse::<f64>().expect("a number").to_le_bytes());
+                }
+                60..80 => binary.extend(pair[1].parse::<i16>().expect("whole").to_le_bytes()),
+                _ => binary.extend(format!("{}\0", pair[1]).bytes()),
+            }
+        }
+        assert_eq!(sent("a.dxf", &binary), sent("a.dxf", text.as_bytes()), "{is_wide}");
+        for end in 0..binary.len() {
+            let _ = sent("a.dxf", &binary[..end]);
+        }
+    }
+}
+
+#[test]
+fn paper_space_is_drawn_where_model_space_is_empty() {
+    let paper = "0 LINE 67 1 8 a 10 1 20 2 11 3 21 4 0 LINE 60 1 11 5";
+    let text = dxf("4", "", paper);
+    assert_eq!(strokes(&text)[0].1, [[1.0, 2.0], [3.0, 4.0]]);
+    let said = notes("a.dxf", text.as_bytes());
+    assert!(said[0].starts_with("1 entity in model space is not drawn"), "{said:?}");
+    assert_eq!(said[1], "paper space is drawn, because there is nothing in model space");
+}
+
 /// A map in metres has coordinates that no plotter takes, and is small itself.
 #[test]
 fn a_map_is_moved_to_the_origin() {
@@ -189,7 +225,7 @@ fn damaged_files_are_refused_with_their_line() {
         (dxf("4", "", "0 CIRCLE 40 1e11"), "too many points"),
         (dxf("4", "", "0 TEXT 1 a"), "nothing to draw in this DXF with 1 entity; 1 TEXT is not"),
         ("0\nEOF\n".to_owned(), "nothing to draw in this DXF"),
-        ("AutoCAD Binary DXF\r\n".to_owned(), "the binary form of DXF"),
+        ("AutoCAD Binary DXF\r\n\x1A\0\0\0SEC".to_owned(), "this binary DXF is damaged"),
     ] {
         let error = sent("a.dxf", text.as_bytes()).expect_err(&text);
         assert!(error.contains(reason), "{error}");

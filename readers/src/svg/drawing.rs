@@ -37,6 +37,8 @@ const LEAST_WIDTH: f64 = 0.001;
 /// A path of the drawing.
 #[derive(Debug)]
 pub(super) struct Shape {
+    /// The number of elements if nothing of them is seen on white paper, and else 0.
+    unseen: usize,
     /// The element that the path comes from, if that is known.
     pub(super) element: Option<NodeId>,
     /// The properties that may choose the pen of the path.
@@ -155,7 +157,17 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             is_nested: false,
         };
         drawing.group(tree.root(), &context)?;
+        drawing.leave_white_out();
         Ok(drawing)
+    }
+
+    /// Leaves out what is white on white paper, unless all is white, as on a dark ground.
+    fn leave_white_out(&mut self) {
+        let is_other = |shape: &Shape| shape.unseen == 0 && shape.marks.colour != Some([255; 3]);
+        if self.shapes.iter().any(is_other) {
+            self.white = self.shapes.iter().map(|shape| shape.unseen).sum();
+            self.shapes.retain(|shape| shape.unseen == 0);
+        }
     }
 
     fn group(&mut self, group: &'tree Group, outside: &Context) -> Result<(), TooManyPoints> {
@@ -326,9 +338,6 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         if stroke.is_none() && self.is_background(&whole, areas, &parts) {
             self.backgrounds += 1;
             parts.clear();
-        } else if is_unseen {
-            self.white += count;
-            parts.clear();
         } else {
             // Each line of a run was an element.
             self.cut += count.min(cut);
@@ -348,7 +357,9 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         if !parts.is_empty() || !outlines.is_empty() {
             let within = context.areas.clone();
             let has_dots = stroke.is_some_and(|stroke| stroke.linecap() != LineCap::Butt);
+            let unseen = if is_unseen { count } else { 0 };
             self.shapes.push(Shape {
+                unseen,
                 element,
                 marks,
                 polylines: parts,

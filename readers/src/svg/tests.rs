@@ -288,6 +288,9 @@ fn what_would_not_be_seen_is_not_drawn_and_is_told() {
     assert_eq!(told(&format!("{black}{white}")), (2, String::new()));
     assert_eq!(told(&white.replace("/>", " stroke='red'/>")), (1, String::new()));
     assert_eq!(told(&format!("{white}{black}")).0, 1);
+    // A drawing for a dark ground is all white.
+    let dark = format!("{white}<path d='M1 1H9' stroke='white'/>");
+    assert_eq!(positions(&in_mm(&dark)).len(), 2);
 }
 
 /// Text as programs of other systems save it, and compressed.
