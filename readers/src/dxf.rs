@@ -1,10 +1,10 @@
-//! Reads the text form of DXF as plans: lines, polylines with bulges, arcs, circles, ellipses and
+//! Reads DXF, as text or binary, as plans: lines, polylines with bulges, arcs, circles, ellipses and
 //! splines, points, level faces, dimensions and texts, also in blocks, as they are seen from above,
 //! with the dashes of their line types.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
-//! refuses the binary form, and a file that does not consist of pairs of a code and a value.
+//! refuses a file that does not consist of pairs of a code and a value.
 
 mod binary;
 mod curves;
@@ -422,7 +422,7 @@ fn outline(entity: &Entity<'_>) -> Result<Option<Vec<Vec<Point>>>, LineError> {
 /// The corners of a polyline of the new form, each with the bulge of the side that follows.
 fn light(entity: &Entity<'_>) -> Result<Vec<(Point, f64)>, LineError> {
     let mut corners: Vec<(Point, f64)> = Vec::new();
-    for pair in &entity.pairs {
+    for pair in entity.pairs {
         match (pair.code, corners.last_mut()) {
             (10, _) => corners.push(([number(*pair)?, 0.0], 0.0)),
             (20, Some((point, _))) => point[1] = number(*pair)?,
@@ -483,12 +483,12 @@ impl Format for Dxf {
                 None => return refused("this binary DXF is damaged or not whole: save it again"),
             },
         };
-        let text = match std::str::from_utf8(&bytes) {
-            Ok(text) => text.trim_start_matches('\u{FEFF}').to_owned(),
+        let text = String::from_utf8(bytes).unwrap_or_else(|error| {
             // Files from before 2007 use the character set of a country. Only names contain letters
             // that differ.
-            Err(_) => bytes.iter().map(|byte| char::from(*byte)).collect(),
-        };
+            error.into_bytes().into_iter().map(char::from).collect()
+        });
+        let text = text.trim_start_matches('\u{FEFF}');
         let in_line = |(number, reason): LineError| {
             let line = text.lines().nth(number - 1).unwrap_or_default();
             let shown = line.chars().take(Origin::MOST_SHOWN + 1).collect();
@@ -498,7 +498,7 @@ impl Format for Dxf {
             }
             ReadError::Line { origin, reason }
         };
-        let pairs = pairs(&text).map_err(in_line)?;
+        let pairs = pairs(text).map_err(in_line)?;
         let document = document(&pairs).map_err(in_line)?;
         let unit = match document.unit {
             None | Some(0) => 1.0,

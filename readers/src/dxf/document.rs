@@ -4,22 +4,32 @@ use super::curves::Affine;
 use crate::plan::Point;
 use std::collections::{HashMap, HashSet};
 
-/// A code and its value, and the line of the file in which the value stands.
+/// A code and its value, and the line of the file in which the value stands. A file may have many
+/// millions of them.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Pair<'a> {
     pub(super) code: i32,
-    pub(super) value: &'a str,
+    line: u32,
     /// The value with the spaces around it, which count in texts.
     pub(super) raw: &'a str,
-    pub(super) line: usize,
+}
+
+impl<'a> Pair<'a> {
+    pub(super) fn value(&self) -> &'a str {
+        self.raw.trim()
+    }
+
+    fn line(&self) -> usize {
+        self.line as usize
+    }
 }
 
 /// An entity of a drawing, such as a line.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub(super) struct Entity<'a> {
     pub(super) kind: &'a str,
     pub(super) line: usize,
-    pub(super) pairs: Vec<Pair<'a>>,
+    pub(super) pairs: &'a [Pair<'a>],
 }
 
 /// The reason why a file is refused: the number of the line, and a message.
@@ -27,7 +37,7 @@ pub(super) type LineError = (usize, String);
 
 impl<'a> Entity<'a> {
     pub(super) fn text(&self, code: i32) -> Option<&'a str> {
-        self.pairs.iter().find(|pair| pair.code == code).map(|pair| pair.value)
+        self.pairs.iter().find(|pair| pair.code == code).map(Pair::value)
     }
 
     /// The text with this code, with the spaces around it.
@@ -71,9 +81,9 @@ impl<'a> Entity<'a> {
 }
 
 pub(super) fn number(pair: Pair<'_>) -> Result<f64, LineError> {
-    match pair.value.trim().parse::<f64>() {
+    match pair.value().parse::<f64>() {
         Ok(value) if value.is_finite() && value.abs() < 1e12 => Ok(value),
-        _ => Err((pair.line, "this is no number that can be drawn".to_owned())),
+        _ => Err((pair.line(), "this is no number that can be drawn".to_owned())),
     }
 }
 
@@ -151,49 +161,50 @@ pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, LineError> {
         let Some((index, value)) = lines.next() else {
             return Err((index + 1, "the file ends after a code: is it complete?".to_owned()));
         };
-        let value_at = Pair { code, value: value.trim(), raw: value, line: index + 1 };
-        pairs.push(value_at);
+        // A file of less than 4 GiB has no more lines.
+        let line = u32::try_from(index + 1).unwrap_or(u32::MAX);
+        let pair = Pair { code, line, raw: value };
+        pairs.push(pair);
         // Whatever follows does not belong to the drawing.
-        if (code, value_at.value) == (0, "EOF") {
+        if (code, pair.value()) == (0, "EOF") {
             break;
         }
     }
     Ok(pairs)
 }
 
-/// Divides pairs into entities, each of which begins with code 0.
-pub(super) fn entities<'a>(pairs: &[Pair<'a>]) -> Vec<Entity<'a>> {
-    let mut entities: Vec<Entity<'a>> = Vec::new();
-    for pair in pairs {
-        if pair.code == 0 {
-            entities.push(Entity { kind: pair.value, line: pair.line, pairs: Vec::new() });
-        } else if let Some(entity) = entities.last_mut() {
-            entity.pairs.push(*pair);
+/// Divides pairs into entities, each of which begins with code 0. What stands before the first is
+/// left out.
+pub(super) fn entities<'a>(pairs: &'a [Pair<'a>]) -> impl Iterator<Item = Entity<'a>> {
+    let groups = pairs.chunk_by(|_, next| next.code != 0);
+    groups.filter_map(|group| match group {
+        [begin, pairs @ ..] if begin.code == 0 => {
+            Some(Entity { kind: begin.value(), line: begin.line(), pairs })
         }
-    }
-    entities
+        _ => None,
+    })
 }
 
-pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, LineError> {
+pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineError> {
     let mut document = Document { type_scale: 1.0, ..Document::default() };
     let starts: Vec<usize> = (0..pairs.len())
-        .filter(|&at| pairs[at].code == 0 && pairs[at].value == "SECTION")
+        .filter(|&at| pairs[at].code == 0 && pairs[at].value() == "SECTION")
         .collect();
     for (index, &start) in starts.iter().enumerate() {
         let end = starts.get(index + 1).copied().unwrap_or(pairs.len());
         let section = &pairs[start..end];
-        match section.get(1).map(|pair| pair.value) {
+        match section.get(1).map(Pair::value) {
             Some("HEADER") => {
-                let mut after = section.iter().skip_while(|pair| pair.value != "$INSUNITS");
+                let mut after = section.iter().skip_while(|pair| pair.value() != "$INSUNITS");
                 let unit = after.nth(1).filter(|pair| pair.code == 70);
                 document.unit = unit.map(|pair| number_of(*pair)).transpose()?;
-                let mut after = section.iter().skip_while(|pair| pair.value != "$LTSCALE");
+                let mut after = section.iter().skip_while(|pair| pair.value() != "$LTSCALE");
                 if let Some(scale) = after.nth(1).filter(|pair| pair.code == 40) {
                     document.type_scale = number(*scale)?;
                 }
             }
             Some("TABLES") => {
-                for entry in &entities(section) {
+                for entry in entities(section) {
                     let Some(name) = entry.text(2).map(str::to_uppercase) else { continue };
                     match entry.kind {
                         "LAYER" => {
@@ -232,11 +243,11 @@ pub(super) fn document<'a>(pairs: &[Pair<'a>]) -> Result<Document<'a>, LineError
             }
             Some("ENTITIES") => {
                 let is_own = |it: &Entity<'_>| !matches!(it.kind, "SECTION" | "ENDSEC" | "EOF");
-                document.entities = entities(section).into_iter().filter(is_own).collect();
+                document.entities = entities(section).filter(is_own).collect();
             }
             Some("OBJECTS") => {
                 // Each object belongs to one block that is inserted.
-                let objects = entities(section);
+                let objects: Vec<Entity<'_>> = entities(section).collect();
                 for object in objects.iter().filter(|object| object.kind == "SPATIAL_FILTER") {
                     if object.number(71, 1.0)? == 0.0 {
                         continue;
@@ -272,7 +283,7 @@ fn clip<'a>(
     let insertion = owner(filter).and_then(owner_of).and_then(owner_of);
     let Some(insertion) = insertion else { return Ok(None) };
     let is_inverse = objects.iter().any(|object| {
-        let is_mark = |pair: &Pair<'_>| pair.value == "ACAD_INVERTEDCLIP_ROUNDTRIP";
+        let is_mark = |pair: &Pair<'_>| pair.value() == "ACAD_INVERTEDCLIP_ROUNDTRIP";
         object.pairs.iter().any(is_mark)
             && owner(object).and_then(owner_of).is_some_and(|of| filter.text(5) == Some(of))
     });
