@@ -151,8 +151,8 @@ enum Task {
     /// Does the same with a mesh of 10,000 faces (some 6 minutes).
     Mesh,
     /// Sends a drawing of many points to a simulated board with the Pico's memory, as long
-    /// polylines and as lines of two points, and checks how much memory the client takes for each
-    /// (some minutes).
+    /// polylines and as lines of two points in each format, and checks how much memory the client
+    /// takes for each point (an hour).
     Points {
         /// How many points.
         #[arg(default_value_t = 1_000_000)]

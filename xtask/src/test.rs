@@ -90,12 +90,13 @@ pub fn random_solids(count: u32) -> Result<()> {
 }
 
 /// Lets the client send a drawing of `count` points, `stroke` in each polyline, to a simulated
-/// board, and the same as lines and as paths of two points each, and checks its memory;
+/// board, and the same as lines of two points in each format, and checks its memory;
 /// `everything` sends 20,000.
 pub fn many_points(count: u32, stroke: u32) -> Result<()> {
     step(
         workspace("test")
-            .args(["--package", "penup-client", "--test", "command", "many_points::"])
+            .args(["--release", "--package", "penup-client"])
+            .args(["--test", "command", "many_points::"])
             .args(["--", "--nocapture", "--test-threads", "1"])
             .env("PENUP_POINTS", count.to_string())
             .env("PENUP_STROKE", stroke.to_string()),
