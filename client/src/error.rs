@@ -165,8 +165,8 @@ pub enum Error {
     },
     /// In a preview, the memory of a board does not hold a model, which it draws all the same.
     #[error(
-        "{source}\nThe memory of {board} does not hold this model, but `penup plot` draws it: it sends \
-         the strokes{}. A preview without --board shows them.",
+        "{source}\nThe memory of {board} does not hold this model, but `penup plot` draws it: it \
+         sends the strokes{}. A preview without --board shows them.",
         if *keeps { ", or with --compute board the model, which the board keeps in its flash" }
         else { "" }
     )]

@@ -326,6 +326,7 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Sourc
             note(file, settings.moves_plan(bounds).as_slice());
             note(file, settings.fits_turned(bounds).as_slice());
             note(file, too_small(&settings, bounds).as_slice());
+            note(file, fits_own_page(&settings, &source).as_slice());
         }
         note(file, &idle_options(&settings, source.bounds().is_some()));
     }
@@ -352,6 +353,19 @@ fn too_small(settings: &Settings, [low, high]: [[f64; 2]; 2]) -> Option<String> 
              --fit scales it to the page",
             digits(width),
             digits(height)
+        )
+    })
+}
+
+/// Says which page a plan is scaled to, if it is that of the file: a user may think of a sheet.
+fn fits_own_page(settings: &Settings, source: &SourceFile) -> Option<String> {
+    let Page { width, height } = source.page()?;
+    let sheet = source.sheet();
+    let is_own = [sheet.width, sheet.height] == [width, height];
+    (is_own && settings.value("fit") == Some("on")).then(|| {
+        format!(
+            "--fit scales to the page of the file, which is {width} x {height} mm: --page A4 is \
+             another one"
         )
     })
 }

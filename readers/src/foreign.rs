@@ -1,4 +1,5 @@
-//! Knows files of other programs by their beginnings, so that the user is told what to do with them.
+//! Knows files of other programs by their beginnings, so that the user is told what to do with
+//! them.
 
 const AS_SVG: &str = "open it in Inkscape and save it as SVG";
 const AS_MESH: &str = "save the model as STL, OBJ or PLY";

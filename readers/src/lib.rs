@@ -6,13 +6,13 @@
 //!
 //! Nothing here opens a file, starts a thread, or prints. So the readers serve the client and, in
 //! WebAssembly, the page. A format that the page only loads when it is needed is a feature: `dxf`,
-//! `gcode`, `hpgl`, `ply`, `svg`, `tape`; `svgz` is that of compressed SVG files, and `text` that of
-//! fonts for their texts.
+//! `gcode`, `hpgl`, `ply`, `svg`, `tape`; `svgz` is that of compressed SVG files, and `text` that
+//! of fonts for their texts.
 //!
 //! The extension of a file's name decides its format. Where no format has that extension, or more
 //! than one has, the content decides. A file of no known format is refused with a list of those
-//! that are read, or with what it is, if that is known; and so is one that is empty, that is no text
-//! where its format is, or of 4 GiB or more.
+//! that are read, or with what it is, if that is known; and so is one that is empty, that is no
+//! text where its format is, or of 4 GiB or more.
 
 mod arrange;
 #[cfg(feature = "dxf")]

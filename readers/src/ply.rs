@@ -2,7 +2,8 @@
 //!
 //! Vertices are joined where they are equal, and faces may have any number of corners. Edges are
 //! lines. What else the file holds, colours or normals for instance, has no meaning for a plotter;
-//! other elements are counted. The reader refuses files without faces and edges, corners that are no vertices, and numbers that are not finite.
+//! other elements are counted. The reader refuses files without faces and edges, corners that are
+//! no vertices, and numbers that are not finite.
 
 use super::arrange::Arrangement;
 use super::error::ReadError;
@@ -16,8 +17,8 @@ use std::borrow::Cow;
 #[derive(Debug)]
 pub(super) struct Ply;
 
-/// What is read of an element of the file: a vertex has coordinates, a face has corners, and an edge
-/// has ends.
+/// What is read of an element of the file: a vertex has coordinates, a face has corners, and an
+/// edge has ends.
 #[derive(Debug, Default)]
 struct Element {
     point: [Option<Coordinate>; 3],

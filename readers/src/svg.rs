@@ -8,11 +8,12 @@
 //!
 //! A plotter draws lines: a stroke is drawn along its middle, with its dashes, whatever its width;
 //! a dot with round or square ends is a very short line; a shape that is only filled is drawn as
-//! its outline. What has neither is not drawn, nor what would not be seen: a filled shape without an
-//! area, and a white one where no other colour lies below it and not all is white. Texts are drawn as the outlines of their letters, if
-//! the caller knows fonts. Clip paths cut lines off, and are a part of the outline of what is only
-//! filled, and so do masks ([`areas`]). An image that is an SVG is drawn ([`embedded`]). Other
-//! images, filters and patterns are counted, and the user is told.
+//! its outline. What has neither is not drawn, nor what would not be seen: a filled shape without
+//! an area, and a white one where no other colour lies below it and not all is white. Texts are
+//! drawn as the outlines of their letters, if the caller knows fonts. Clip paths cut lines off, and
+//! are a part of the outline of what is only filled, and so do masks ([`areas`]). An image that is
+//! an SVG is drawn ([`embedded`]). Other images, filters and patterns are counted, and the user is
+//! told.
 //!
 //! The names of layers may hold the codes of AxiDraw ([`axidraw`]).
 //!

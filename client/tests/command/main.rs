@@ -161,6 +161,26 @@ fn only_a_board_limits_a_preview() {
     }
 }
 
+/// An icon or a poster has a page that is none of a plotter.
+#[test]
+fn a_drawing_that_is_fitted_to_its_own_page_is_told_so() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let icon = "<svg xmlns='http://www.w3.org/2000/svg' width='24' height='24'>\
+                <path d='M2 2H22V9' fill='none' stroke='black'/></svg>";
+    fs::write(folder.path().join("icon.svg"), icon).expect("written");
+    let said = |options: &[&str]| {
+        let all = [&["preview", "icon.svg", "--fit", "--svg", "out.svg"], options].concat();
+        let (code, _, noted) = penup(folder.path(), &all);
+        (code, noted)
+    };
+    let note =
+        "--fit scales to the page of the file, which is 6.35 x 6.35 mm: --page A4 is another";
+    let (code, noted) = said(&[]);
+    assert_eq!((code, noted.contains(note)), (Some(4), true), "{noted}");
+    let (code, noted) = said(&["--page", "A4"]);
+    assert_eq!((code, noted.as_str()), (Some(0), ""));
+}
+
 /// What the options of plans do is drawn: the plotter itself measures the ink.
 #[test]
 fn a_plan_is_arranged_before_it_is_drawn() {

@@ -371,8 +371,9 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         Ok(())
     }
 
-    /// Whether nothing would be seen of a path that is filled, because it is only painted white and
-    /// nothing of another colour is filled below it. What is filled is noted.
+    /// Notes what a path fills, and returns whether nothing of it would be seen: it is filled with
+    /// white alone, and no other colour below it. The bounds decide, so a shape is drawn where it
+    /// may be seen, and all are drawn if there are too many to look at.
     fn is_white_on_paper(&mut self, path: &Path, paint: &Paint, to_page: Affine) -> bool {
         let bounds = path.bounding_box();
         let [left, top, right, bottom] =
@@ -381,12 +382,10 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         if path.fill().is_some_and(|fill| !is_white(fill.paint())) {
             self.coloured.push(bounds);
         }
-        // Where there is too much to look at, the shape is drawn.
-        let is_below = |it: &Rect| it.overlaps(bounds);
         is_white(paint)
             && path.stroke().is_none_or(|stroke| stroke.opacity().get() == 0.0)
             && self.coloured.len() <= MOST_COLOURED
-            && !self.coloured.iter().any(is_below)
+            && !self.coloured.iter().any(|it| it.overlaps(bounds))
     }
 
     /// Returns what clip paths leave of the lines of a path. If the path is only filled, the

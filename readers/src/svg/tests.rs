@@ -120,7 +120,8 @@ fn units_and_the_view_box_give_true_size() {
         ("width='50mm' viewBox='0 0 100 200'", [50.0, 100.0], 0.5),
     ] {
         let svg = format!(
-            "<svg xmlns='http://www.w3.org/2000/svg' {size} stroke='red'><path d='M0 0L20 10'/></svg>"
+            "<svg xmlns='http://www.w3.org/2000/svg' {size} stroke='red'>\
+             <path d='M0 0L20 10'/></svg>"
         );
         let contents = read(&svg).expect("an SVG");
         let Page { width, height } = contents.page().expect("a page");
@@ -387,7 +388,8 @@ fn layers_choose_pens_or_else_colours_do() {
 fn the_codes_of_axidraw_are_obeyed_or_named() {
     let layer = |label: &str, y: u32| {
         format!(
-            "<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9' stroke='black'/></g>"
+            "<g inkscape:groupmode='layer' inkscape:label='{label}'>\
+             <path d='M0 {y}H9' stroke='black'/></g>"
         )
     };
     let notes = "<g inkscape:groupmode='layer' inkscape:label='% notes'><text>a</text></g>";
@@ -435,7 +437,8 @@ fn what_becomes_too_short_is_counted() {
 fn layers_are_chosen_by_label_number_or_colour() {
     let layer = |label: &str, y: u32| {
         format!(
-            "<g inkscape:groupmode='layer' inkscape:label='{label}'><path d='M0 {y}H9' stroke='black'/></g>"
+            "<g inkscape:groupmode='layer' inkscape:label='{label}'>\
+             <path d='M0 {y}H9' stroke='black'/></g>"
         )
     };
     let svg = in_mm(&[layer("Sky", 1), layer("4 house", 2), layer("Tree", 3)].concat());
