@@ -13,7 +13,8 @@
 //!    nearest part first.
 //! 4. `improve` shortens the tour of several parts: `patch_cycles` changes pen-up moves so that
 //!    they join the parts, `exchange` exchanges moves while that helps (`search` finds the
-//!    exchanges), and `orient` chooses the direction of each stroke.
+//!    exchanges), `orient` chooses the direction of each stroke, and `kicks` changes the tour at
+//!    random where nothing else helps any more.
 //!
 //! Where the pen begins while this is done, `first` chooses the strokes that it draws meanwhile.
 //!
@@ -31,6 +32,7 @@ mod first;
 mod greedy;
 mod improve;
 mod incidence;
+mod kicks;
 mod matching;
 mod patch_cycles;
 mod metric;
