@@ -1,7 +1,11 @@
-//! Labels: the size, direction and slant of letters, and where each stroke of a letter lies.
+//! Labels: their bytes, the size, direction and slant of letters, and where each stroke of a
+//! letter lies.
 
 use super::LABEL_END;
 use super::coordinates::{Frame, Point, UNIT};
+use super::interpreter::{ErrorNumber, Interpreter, Step};
+use super::parser::Mode;
+use super::polygon::PolygonBuffer;
 use crate::array::MapEach;
 use crate::drawing::LetterStrokes;
 use crate::fixed::{divide_rounding, product};
@@ -18,14 +22,14 @@ const DEFAULT_SIZE: [i64; 2] = [(UNIT * 748 + 5) / 10, (UNIT * 1076 + 5) / 10];
 pub(super) struct TextStyle {
     /// The width and the height of letters, in coordinates, or in percent of the distances between
     /// P1 and P2 if `is_relative_size`.
-    pub(super) size: [i64; 2],
-    pub(super) is_relative_size: bool,
+    size: [i64; 2],
+    is_relative_size: bool,
     /// The direction in which letters follow each other, or in percent of the distances between P1
     /// and P2 if `is_relative_direction`.
-    pub(super) direction: [i64; 2],
-    pub(super) is_relative_direction: bool,
+    direction: [i64; 2],
+    is_relative_direction: bool,
     /// The tangent of the slant, in units of 2^-16.
-    pub(super) slant: i64,
+    slant: i64,
     /// The byte that ends a label.
     pub(super) terminator: u8,
     /// The letter that is drawn at each point, 0 for none.
@@ -52,7 +56,7 @@ impl TextStyle {
     };
 
     /// `SI` without numbers.
-    pub(super) fn set_default_size(&mut self) {
+    fn set_default_size(&mut self) {
         (self.size, self.is_relative_size) = (DEFAULT_SIZE, false);
     }
 
@@ -85,7 +89,7 @@ impl TextStyle {
 
     /// The distance on the page of this many letters and this many lines up, in units of 2^-16.
     /// `None` beyond the range.
-    pub(super) fn spaces(&self, frame: &Frame, [columns, lines]: [i64; 2]) -> Option<Point> {
+    fn spaces(&self, frame: &Frame, [columns, lines]: [i64; 2]) -> Option<Point> {
         let [width, height] = self.letter(frame);
         let times = |count: i64, length: i64, halves: i64| {
             let distance = divide_rounding(product(count, length) * i128::from(halves), 2 << 16);
@@ -109,5 +113,114 @@ impl TextStyle {
         // The slant is limited, so the sum is far below 2^63.
         let along = scaled(2 * i64::from(x) + right, width, WIDTH_UNITS) + slanted as i64;
         self.on_page(frame, Point { x: along, y: across })
+    }
+}
+
+impl<B: PolygonBuffer> Interpreter<B> {
+    /// `SI`, `SR`, `DI`, `DR` and `SL`: the size, direction and slant of letters.
+    pub(super) fn choose_text_style(
+        &mut self,
+        name: &[u8; 2],
+        numbers: &[i64],
+    ) -> Result<(), ErrorNumber> {
+        let text = &mut self.text;
+        // Letters of more than a metre do not fit on any page.
+        let is_size = |size: i64| size != 0 && size.abs() <= 110 * UNIT;
+        match (name, numbers) {
+            (b"SI", []) => text.set_default_size(),
+            (b"SI", &[width, height]) if is_size(width) && is_size(height) => {
+                // A centimetre has 400 plotter units.
+                (text.size, text.is_relative_size) = ([400 * width, 400 * height], false);
+            }
+            (b"SR", []) => {
+                (text.size, text.is_relative_size) = ([UNIT * 3 / 4, UNIT * 3 / 2], true);
+            }
+            (b"SR", &[width, height]) if is_size(width) && is_size(height) => {
+                (text.size, text.is_relative_size) = ([width, height], true);
+            }
+            (b"DI" | b"DR", []) => {
+                (text.direction, text.is_relative_direction) = ([UNIT, 0], false);
+                text.advanced = Point::default();
+            }
+            (b"DI" | b"DR", &[run, rise]) if run != 0 || rise != 0 => {
+                (text.direction, text.is_relative_direction) = ([run, rise], name == b"DR");
+                text.advanced = Point::default();
+            }
+            (b"SL", []) => text.slant = 0,
+            (b"SL", &[tangent]) => text.slant = tangent.clamp(-30 * UNIT, 30 * UNIT),
+            (b"SI" | b"SR" | b"DI" | b"DR", [_, _]) => return Err(ErrorNumber::BadParameter),
+            _ => return Err(ErrorNumber::WrongCount),
+        }
+        Ok(())
+    }
+
+    /// Takes a byte of a label.
+    pub(super) fn push_text(&mut self, byte: u8) {
+        if byte == self.text.terminator {
+            self.mode = Mode::Code;
+            return;
+        }
+        let (partial, left) = self.partial;
+        self.partial = match (byte, left) {
+            (0x80..=0xBF, 1..) => (partial << 6 | u32::from(byte & 0x3F), left - 1),
+            (0xC2..=0xDF, _) => (u32::from(byte & 0x1F), 1),
+            (0xE0..=0xEF, _) => (u32::from(byte & 0x0F), 2),
+            (0xF0..=0xF4, _) => (u32::from(byte & 0x07), 3),
+            _ => (byte.into(), 0),
+        };
+        let (letter, left) = self.partial;
+        if left > 0 {
+            return;
+        }
+        match byte {
+            0x00..=0x1F | 0x7F => self.control_letter(byte, false),
+            0x20..=0x7E => self.write(byte.into()),
+            // Bytes that are no letters are drawn as boxes.
+            0x80..=0xBF => self.write(char::from_u32(letter).unwrap_or('\u{FFFD}')),
+            _ => self.write('\u{FFFD}'),
+        }
+    }
+
+    /// Draws a letter, and goes to where the next one begins.
+    fn write(&mut self, letter: char) {
+        if self.is_lost {
+            return;
+        }
+        // A polygon has no letters.
+        if self.polygon.is_open {
+            return self.fail(ErrorNumber::Unknown);
+        }
+        self.add_letter(letter, false);
+        self.space([UNIT, 0]);
+    }
+
+    /// A control character of a label: CR, LF and the step back. With `feeds`, CR also goes one
+    /// line down. Others have no effect.
+    pub(super) fn control_letter(&mut self, byte: u8, feeds: bool) {
+        match byte {
+            b'\r' => {
+                self.at = self.at.minus(core::mem::take(&mut self.text.advanced));
+                if feeds {
+                    self.space([0, -UNIT]);
+                }
+            }
+            b'\n' => self.space([0, -UNIT]),
+            0x08 => self.space([-UNIT, 0]),
+            _ => {}
+        }
+    }
+
+    /// Moves the pen by this many letters and lines without drawing.
+    pub(super) fn space(&mut self, columns_and_lines: [i64; 2]) {
+        let [columns, lines] = columns_and_lines;
+        let along = self.text.spaces(&self.frame, [columns, 0]);
+        let across = self.text.spaces(&self.frame, [0, lines]);
+        let (Some(along), Some(across)) = (along, across) else { return self.overflow() };
+        let at = self.at.plus(along).and_then(|at| at.plus(across));
+        let (Some(at), Some(advanced)) = (at, self.text.advanced.plus(along)) else {
+            return self.overflow();
+        };
+        self.text.advanced = advanced;
+        self.add(Step::Place(at));
     }
 }

@@ -6,14 +6,15 @@
 //! from one point of a pair to the other (Harrison 5.6). The steps are:
 //!
 //! 1. `network` turns the segments of one pen into a graph of stations and chains.
-//! 2. `matching` pairs the odd stations so that the total length is the least. `greedy` pairs them
-//!    in less memory, without that guarantee; `remaining` finds for it, and for step 3, what is
-//!    near.
+//! 2. `pairing` has the odd stations paired: `matching` does so with the least total length,
+//!    `greedy` in less memory, without that guarantee; `remaining` finds for it, and for step 3,
+//!    what is near.
 //! 3. `euler` traces the strokes along Eulerian tours, one connected part after another, the
 //!    nearest part first.
 //! 4. `improve` shortens the tour of several parts: `patch_cycles` changes pen-up moves so that
 //!    they join the parts, `exchange` exchanges moves while that helps (`search` finds the
-//!    exchanges), and `orient` chooses the direction of each stroke.
+//!    exchanges), `orient` chooses the direction of each stroke, and `kicks` changes the tour at
+//!    random where nothing else helps any more.
 //!
 //! Where the pen begins while this is done, `first` chooses the strokes that it draws meanwhile.
 //!
@@ -31,6 +32,7 @@ mod first;
 mod greedy;
 mod improve;
 mod incidence;
+mod kicks;
 mod matching;
 mod patch_cycles;
 mod metric;
@@ -38,6 +40,7 @@ mod neighbours;
 mod network;
 mod odd;
 mod orient;
+mod pairing;
 mod work_budget;
 mod partition;
 mod remaining;
@@ -48,7 +51,7 @@ pub use first::{FirstStrokes, StrokeDurations, choose_first, first_legs, order_r
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 
-use crate::array::{MapEach, rotate_left};
+use crate::array::rotate_left;
 use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
 use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
@@ -56,7 +59,7 @@ use bytemuck::{Pod, Zeroable};
 use euler::Unused;
 use improve::{Tour, improve};
 use network::{Anchor, Network, start_point};
-use odd::OddPoints;
+use pairing::pair_odd;
 use work_budget::WorkBudget;
 
 /// Returns the value that marks, in place of a partner, a station of a part that has no odd point.
@@ -428,102 +431,6 @@ fn mark_parts<I: Index>(
         }
     }
     Ok(parts)
-}
-
-/// Pairs the odd stations, which `mate` marks by their own numbers, and writes each one's partner
-/// to `mate`. Returns the station where an open path begins.
-fn pair_odd<I: Index>(
-    network: Network<'_, I>,
-    options: Options,
-    mut scratch: Scratch<'_>,
-    work_budget: &mut WorkBudget<'_>,
-    mate: &mut [I],
-    report: &mut Report,
-) -> Result<Option<I>, OrderError> {
-    let odd_stations = || I::all().zip(mate.iter()).filter(|&(station, &mark)| station == mark);
-    let stations: &mut [I] = scratch.take(odd_stations().count())?;
-    for (slot, (station, _)) in stations.iter_mut().zip(odd_stations()) {
-        *slot = station;
-    }
-    work_budget.sort(stations, |&station| (network.position(station).x, station))?;
-    let odd = OddPoints::new(network, stations, options.shape == Shape::OpenPath);
-    report.odd_points += odd.real_count().into();
-    let partners: &mut [I] = scratch.take(odd.count().get())?;
-    report.bound += pair_points(&odd, options.method, scratch, work_budget, partners)?;
-    for (&station, &partner) in stations.iter().zip(partners.iter()) {
-        mate[station.get()] = odd.station(partner).unwrap_or(I::NONE);
-    }
-    if !odd.has_free_ends() {
-        return Ok(None);
-    }
-    if let Some(anchor) = network.anchor() {
-        return Ok(free_for_anchor(network, anchor, stations, mate));
-    }
-    let ends = odd.free_ends().map_each(|end| partners[end.get()]);
-    let ends = ends.into_iter().filter_map(|end| odd.station(end));
-    Ok(ends.min_by_key(|&station| (network.position(station).x, station)))
-}
-
-/// Pairs the two ends of the path with each other, and frees that move in their place whose loss
-/// saves most if the path begins at one end of it and the pen comes from `anchor`. Returns that
-/// end. The ends of the path are the stations among `odd` whose mate is [`Index::NONE`].
-#[inline(always)] // Without the feature `early-ink`, this is left out.
-fn free_for_anchor<I: Index>(
-    network: Network<'_, I>,
-    anchor: I,
-    odd: &[I],
-    mate: &mut [I],
-) -> Option<I> {
-    let is_free = |station: &&I| mate.get(station.get()) == Some(&I::NONE);
-    let mut free = odd.iter().filter(is_free);
-    let (&start, &end) = (free.next()?, free.next()?);
-    let mut set = |station: I, to: I| {
-        if let Some(mate) = mate.get_mut(station.get()) {
-            *mate = to;
-        }
-    };
-    set(start, end);
-    set(end, start);
-    let saved = |&from: &I| {
-        let to = mate.get(from.get()).copied().unwrap_or(from);
-        let [lost, added] = [to, anchor].map(|to| i64::from(network.distance(from, to)));
-        lost - added
-    };
-    let start = odd.iter().copied().max_by_key(saved)?;
-    let end = mate.get(start.get()).copied()?;
-    for station in [start, end] {
-        if let Some(mate) = mate.get_mut(station.get()) {
-            *mate = I::NONE;
-        }
-    }
-    Some(start)
-}
-
-/// Pairs the odd points. Returns a lower bound of the total length of their moves in 1/256 steps,
-/// or 0 if none is known.
-// Not inlined, so that its stack frame is gone before the tour is improved and its cycles can be
-// counted.
-#[inline(never)]
-fn pair_points<I: Index>(
-    odd: &OddPoints<'_, I>,
-    method: Method,
-    mut scratch: Scratch<'_>,
-    work_budget: &mut WorkBudget<'_>,
-    partners: &mut [I],
-) -> Result<u64, OrderError> {
-    let exact = match method {
-        Method::Greedy => false,
-        Method::Exact => true,
-        Method::Auto => {
-            let fits = matching::scratch_bytes::<I>(partners.len()) <= scratch.available_bytes();
-            fits && odd.real_count().into() <= EXACT_POINTS
-        }
-    };
-    if exact {
-        return matching::pair(odd, scratch, work_budget, partners);
-    }
-    greedy::pair(odd, &mut scratch, work_budget, partners)?;
-    Ok(0)
 }
 
 /// Makes a closed cycle begin at its lowest x, and an open path at that of its ends that has the

@@ -1,13 +1,14 @@
 //! The plotter: it joins all other modules and borrows the large memory. Bytes go in; step events
 //! and replies come out.
 //!
-//! A [`Plotter`] is polled by the board's main loop ([`run`] is that loop). Each poll answers
-//! real-time requests, carries out received lines, and keeps the step queue full. `$plot` first
-//! computes the whole [`Job`], during which [`Cancel`] still answers the serial line. The strokes
-//! then go to the machine. This is the only module that knows all the others.
+//! A [`Plotter`] is polled by the board's main loop ([`run`] is that loop). Each poll (`poll`)
+//! answers real-time requests, carries out received lines (`commands`), and keeps the step queue
+//! full. `$plot` first computes the whole [`Job`], during which [`Cancel`] still answers the serial
+//! line. The strokes then go to the machine. This is the only module that knows all the others.
 
 mod board;
 pub mod budget;
+mod commands;
 #[cfg(feature = "early-ink")]
 mod early;
 mod editor;
@@ -23,6 +24,7 @@ mod options;
 mod overrides;
 mod plan;
 mod plot;
+mod poll;
 mod program;
 mod records;
 mod reply;
@@ -49,24 +51,18 @@ pub use options::{
 #[cfg(any(test, feature = "host"))]
 use crate::drawing::Drawing;
 use crate::index::Index;
-use crate::machine::{
-    Alarm, Machine, MachineError, PulserState, Setting, SettingError, Settings, State, Value,
-};
+use crate::machine::{Alarm, Machine, PulserState, Settings, State};
 use crate::model::Model;
-use crate::protocol::{
-    Command, CommandError, Label, LineReader, Numbering, RealTime, Received, Significant,
-    next_number,
-};
+use crate::protocol::{CommandError, Label, LineReader, Numbering};
 use crate::stage::Cancel;
 #[cfg(any(test, feature = "host"))]
 pub use program::to_steps;
 
-use plot::Drawing as DrawnJob;
 use program::{Parameters, Program};
 use reply::Reply;
 use report::ReportCounts;
 use resume::Resumption;
-use stream::{Listing, Progress, Task};
+use stream::Task;
 
 /// The least time by which step events are planned ahead of the pins, and so the delay until a hold
 /// takes effect: 50 ms. The machine plans further ahead if it could not stop within that time.
@@ -130,27 +126,6 @@ pub struct Plotter<'m, I = u16> {
     /// The state of HP-GL, which may take the place of lines.
     #[cfg(feature = "hpgl")]
     hpgl: hpgl::HpGl<'m>,
-}
-
-/// The task that is left after a line has been carried out. Jobs are left to the caller, because
-/// their computation needs much stack.
-enum Next {
-    /// The line has been carried out completely.
-    Nothing,
-    /// The plotter is reset, as by ctrl-X.
-    Reset,
-    /// Compute the model's job and draw it (`$plot`).
-    Plot,
-    /// Draw the last job again (`$again`).
-    Again,
-    /// Draw the rest of the job that has stopped (`$resume`).
-    #[cfg(feature = "resume")]
-    Resume {
-        /// Whether the user has put the pen at the origin.
-        at_origin: bool,
-    },
-    /// Become the USB drive onto which a new firmware image is copied (`$UF2`).
-    ShowDrive,
 }
 
 /// The plotter without the line being read: that line stays borrowed while it is carried out.
@@ -340,129 +315,6 @@ impl<'m, I: Index> Plotter<'m, I> {
         report::greet(board);
     }
 
-    /// Answers the serial line, and keeps the queue of step events full. Returns whether there was
-    /// anything to do.
-    pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
-        let requests = board.take_real_time();
-        self.act(requests, board);
-        self.inner.watch(board);
-        self.inner.watch_idleness(board);
-        #[cfg(feature = "driver-pins")]
-        self.inner.watch_drivers(board);
-        self.inner.note_progress(board);
-        let planned = self.inner.plan(BegunJob::default(), board);
-        #[cfg(feature = "early-ink")]
-        let planned = self.inner.follow_order(board) || planned;
-        #[cfg(feature = "hpgl")]
-        let planned = self.carry_out_hpgl(board) || planned;
-        if self.inner.task.is_some() {
-            match self.inner.proceed(board) {
-                Progress::Done(outcome) => self.answer(outcome, board),
-                Progress::More => {}
-                #[cfg(feature = "early-ink")]
-                Progress::Reset => {
-                    self.answer(Ok(()), board);
-                    self.begin_anew(board);
-                }
-                Progress::Waits => return planned || requests != RealTime::default(),
-            }
-            return true;
-        }
-        // A byte is read only when the output has room for a reply, so that no reply blocks and
-        // delays the steps.
-        let waits = self.inner.must_wait();
-        #[cfg(feature = "hpgl")]
-        let waits = self.hpgl.must_wait(waits);
-        let waits = waits || !board.has_room(REPLY_BYTES);
-        let byte = if waits { None } else { board.read_byte() };
-        let Some((port, byte)) = byte else {
-            #[cfg(feature = "tiles")]
-            if self.tend_parts(board) {
-                return true;
-            }
-            return planned || requests != RealTime::default();
-        };
-        self.inner.busy_at = board.microseconds();
-        #[cfg(feature = "hpgl")]
-        if self.take_hpgl(port, byte, board) {
-            return true;
-        }
-        // Nothing comes between the instructions of HP-GL that are being carried out.
-        #[cfg(feature = "hpgl")]
-        let is_busy =
-            self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
-        #[cfg(not(feature = "hpgl"))]
-        let is_busy = false;
-        let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
-        let Some((reader, numbering)) = reader else { return true };
-        let Some(line) = reader.push(byte) else { return true };
-        let (mut shows_drive, mut resets) = (false, false);
-        let (outcome, label) = match numbering.receive(line) {
-            Received::Line(_, label) if is_busy => (Err(CommandError::Busy), label),
-            Received::Line(line, label) => {
-                let outcome = match self.inner.carry_out(line, board) {
-                    Ok(Next::Plot) => self.inner.plot(board, DrawnJob::Model),
-                    Ok(Next::Again) => self.inner.plot(board, DrawnJob::LastJob),
-                    #[cfg(feature = "resume")]
-                    Ok(Next::Resume { at_origin }) => {
-                        self.inner.plot(board, DrawnJob::Stopped { at_origin })
-                    }
-                    Ok(Next::Nothing) => Ok(()),
-                    Ok(Next::Reset) => {
-                        resets = true;
-                        Ok(())
-                    }
-                    Ok(Next::ShowDrive) => {
-                        shows_drive = true;
-                        Ok(())
-                    }
-                    Err(command_error) => Err(command_error),
-                };
-                (outcome, label)
-            }
-            Received::Answer(outcome, label) => (outcome, label),
-        };
-        if matches!(outcome, Err(CommandError::Aborted)) {
-            self.reset(board);
-        }
-        (self.port, self.label) = (port, label);
-        if self.inner.task.is_none() {
-            self.answer(outcome, board);
-        }
-        if resets {
-            self.begin_anew(board);
-        }
-        if shows_drive {
-            board.show_drive();
-        }
-        true
-    }
-
-    /// Computes the next part of a drawing that is drawn part by part. Returns whether there was
-    /// one to compute.
-    #[cfg(feature = "tiles")]
-    #[inline(always)] // It is called in every turn of the main loop.
-    fn tend_parts<B: Board>(&mut self, board: &mut B) -> bool {
-        if !self.inner.parts.is_active() {
-            return false;
-        }
-        let tended = self.inner.tend_parts(board);
-        if tended == stored::PartsProgress::Aborted {
-            self.inner.machine.abort();
-            self.reset(board);
-        }
-        tended != stored::PartsProgress::Idle
-    }
-
-    /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
-    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    fn answer<B: Board>(&mut self, outcome: Result<(), CommandError>, board: &mut B) {
-        if let Some(numbering) = self.numberings.get_mut(self.port) {
-            numbering.note(self.label, outcome);
-        }
-        Reply(board).outcome(outcome, self.label);
-    }
-
     /// Returns the model that the user has sent.
     pub fn model(&self) -> &Model<'m, I> {
         &self.inner.model
@@ -512,254 +364,9 @@ impl<'m, I: Index> Plotter<'m, I> {
         let ends = self.inner.machine.stroke_ends();
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor, ends)
     }
-
-    /// Carries out the real-time `requests`, and everything else that does not come by a line.
-    fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
-        let state = self.inner.machine.state();
-        let settings = Some(self.inner.machine.settings());
-        report::greet_opened(state, self.inner.resumption, settings, board);
-        if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
-            board.show_drive();
-        }
-        if requests.has(RealTime::ABORT) {
-            self.inner.machine.abort();
-            self.reset(board);
-        }
-        self.inner.act(requests);
-        self.status_due |= requests.has(RealTime::STATUS);
-        if self.status_due && board.has_room(REPLY_BYTES) {
-            self.status_due = false;
-            // Writing the report takes 10 ms, and so may what was done since the queue was last
-            // filled.
-            self.inner.plan(BegunJob::default(), board);
-            #[cfg(feature = "hpgl")]
-            if let Some(port) = self.hpgl.port() {
-                board.reply_to(Replies::OthersIfAny(port));
-            }
-            self.inner.report_status("", board);
-            #[cfg(feature = "hpgl")]
-            self.mute(board);
-        }
-    }
-
-    /// Forgets unfinished lines, line numbers, overrides, and the modes of G-code, leaves check
-    /// mode and sleep, and greets the user.
-    fn reset<B: Board>(&mut self, board: &mut B) {
-        // What is in force is kept, too.
-        #[cfg(feature = "early-ink")]
-        if let Some(outcome) = self.inner.keep_rest(true, board) {
-            self.answer(outcome, board);
-        }
-        self.readers.iter_mut().for_each(LineReader::clear);
-        self.numberings = [Numbering::default(), Numbering::default()];
-        self.inner.task = None;
-        #[cfg(feature = "hpgl")]
-        self.end_hpgl(board);
-        self.begin_anew(board);
-    }
-
-    /// Begins with the modes of a start, and greets the user.
-    #[inline(never)] // Its callers share one copy of the code.
-    fn begin_anew<B: Board>(&mut self, board: &mut B) {
-        self.inner.reset();
-        self.greet(board);
-        self.inner.run_startup_lines(board);
-    }
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Keeps the step queue full. While the order of the job is computed, `begun` is what of it is
-    /// known. Returns whether the planned position has changed.
-    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    fn plan<B: Board>(&mut self, begun: BegunJob<'_, I>, board: &mut B) -> bool {
-        let before = self.machine.planned_position();
-        let ends = self.machine.stroke_ends();
-        #[cfg(feature = "early-ink")]
-        let mut strokes = self.job.strokes_of(begun, self.words, &mut self.cursor, ends);
-        #[cfg(not(feature = "early-ink"))]
-        let mut strokes = {
-            let _ = begun;
-            self.job.strokes(self.words, &mut self.cursor, ends)
-        };
-        #[cfg(feature = "stream")]
-        {
-            strokes.streamed = Some(&self.streamed);
-        }
-        #[cfg(feature = "tiles")]
-        if self.parts.is_active() {
-            strokes.ring = self.model.spare_words();
-        }
-        self.machine.fill(&mut strokes, board.queue());
-        self.machine.planned_position() != before
-    }
-
-    /// Forgets the modes of G-code and the overrides, and leaves check mode and sleep.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn reset(&mut self) {
-        self.program = self.program.reset();
-        self.report_counts = ReportCounts::default();
-        self.machine.set_override(100);
-        self.machine.set_rapid_override(100);
-        if self.machine.state() == State::Check {
-            // It is not refused in this state.
-            let _ = self.machine.check(false);
-        }
-        self.machine.wake();
-    }
-
-    /// Whether nothing moves and there is no interrupted job that could continue.
-    fn is_without_job(&self) -> bool {
-        let is_over = matches!(
-            self.machine.state(),
-            State::Idle | State::Alarm(_) | State::Sleep | State::Check
-        );
-        is_over && self.machine.is_stopped()
-    }
-
-    /// Carries out a line. Returns what is left to the caller to do.
-    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    fn carry_out<B: Board>(&mut self, line: &str, board: &mut B) -> Result<Next, CommandError> {
-        let command = Command::parse(line)?;
-        #[cfg(feature = "tiles")]
-        let Some(command) = self.carry_out_in_flash(command, board)? else {
-            return Ok(Next::Nothing);
-        };
-        let one_pen = self.options.one_pen;
-        let (model, mut undo_copy, _) = self.split();
-        let save_copy = &mut |model: &Model<'_, I>| undo_copy.save(model);
-        let added = match command {
-            Command::Nothing => Ok(()),
-            Command::Vertex(coordinates) => model.add_vertex(coordinates, save_copy),
-            Command::Face(numbers) => model.add_face(numbers.iter(), save_copy),
-            Command::Polyline(numbers) => model.add_polyline(numbers.iter(), save_copy),
-            Command::Degree(degree) => model.set_degree(degree),
-            Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
-            Command::Knots(knots) => model.add_knots(knots.iter()),
-            // With a single pen, choices of a pen are ignored: no file can then use too many pens.
-            Command::Pen { .. } if one_pen => Ok(()),
-            Command::Pen { by_material, name } => model.choose_pen(by_material, name, save_copy),
-            Command::EndCurve => model.end_curve(save_copy),
-            Command::Clear => {
-                save_copy(model);
-                model.clear();
-                Ok(())
-            }
-            command => return self.carry_out_other(command, board),
-        };
-        added.map_err(CommandError::Model)?;
-        Ok(Next::Nothing)
-    }
-
-    /// Carries out a command that is no line of a model. Returns what is left to the caller to do.
-    #[inline(never)] // Inlined, its frame would take stack while a model is sent.
-    fn carry_out_other<B: Board>(
-        &mut self,
-        command: Command<'_>,
-        board: &mut B,
-    ) -> Result<Next, CommandError> {
-        match command {
-            // The caller has carried these out.
-            Command::Nothing
-            | Command::Vertex(_)
-            | Command::Face(_)
-            | Command::Polyline(_)
-            | Command::Degree(_)
-            | Command::Curve { .. }
-            | Command::Knots(_)
-            | Command::Pen { .. }
-            | Command::EndCurve
-            | Command::Clear => {}
-            Command::Help => self.task = Some(Task::List(Listing::Help, 0)),
-            Command::BuildInfo => {
-                self.check_idle()?;
-                self.report_build(board);
-            }
-            Command::Settings => {
-                #[cfg(feature = "stream")]
-                let may_run = self.is_streamed();
-                #[cfg(not(feature = "stream"))]
-                let may_run = false;
-                let state = self.machine.state();
-                let has_stopped = matches!(state, State::Hold { stopped: true });
-                if !may_run && !has_stopped && !matches!(state, State::Check | State::Jog) {
-                    self.check_idle()?;
-                }
-                self.task = Some(Task::List(Listing::Settings, 0));
-            }
-            Command::Modes => self.report_modes(board),
-            Command::Parameters => {
-                self.check_idle()?;
-                self.report_parameters(board);
-            }
-            Command::StartupLines => {
-                self.check_idle()?;
-                self.report_startup_lines(board);
-            }
-            Command::SetStartupLine { index, line } => self.set_startup_line(index, line, board)?,
-            Command::SetInfo(text) => {
-                self.check_idle()?;
-                self.set_info(text, board)?;
-            }
-            Command::Restore { settings, parameters, texts } => {
-                let is_over = self.restore([settings, parameters, texts], board)?;
-                return Ok(if is_over { Next::Reset } else { Next::Nothing });
-            }
-            Command::Assign { name, value } => {
-                if !self.options.set(name, value)? {
-                    let before = self.machine.held_to();
-                    self.change_setting(name, value)?;
-                    #[cfg(feature = "driver-pins")]
-                    self.set_driver_pins(board);
-                    self.report_held(before, board);
-                    records::save_settings(self.machine.settings(), board)?;
-                }
-            }
-            Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
-            Command::Model => self.report_model(board),
-            Command::Edit(edit) => self.edit(edit, board)?,
-            Command::List(part, numbers) => self.begin_list(part, numbers)?,
-            Command::Undo => self.undo()?,
-            Command::Plot => return Ok(Next::Plot),
-            Command::Again => return Ok(Next::Again),
-            #[cfg(feature = "resume")]
-            Command::Resume { at_origin } if board.keeps_progress() => {
-                return Ok(Next::Resume { at_origin });
-            }
-            Command::Resume { .. } => return Err(CommandError::NoJobKept),
-            Command::ShowDrive if !B::HAS_DRIVE => return Err(CommandError::UnknownSystemCommand),
-            Command::ShowDrive if !self.is_without_job() => return Err(CommandError::Busy),
-            Command::ShowDrive => return Ok(Next::ShowDrive),
-            // The receive interrupt does not know it in this form.
-            #[cfg(feature = "hpgl")]
-            Command::HpGl => return Err(CommandError::UnknownSystemCommand),
-            #[cfg(feature = "stream")]
-            Command::BeginStream(header) => self.begin_streamed(header, board)?,
-            #[cfg(feature = "stream")]
-            Command::Strokes(strokes) => self.take_strokes(strokes)?,
-            #[cfg(feature = "stream")]
-            Command::Stream => self.report_streamed(board)?,
-            Command::Unlock => self.unlock(board)?,
-            Command::Home => self.home()?,
-            Command::Check => {
-                let is_over = self.machine.state() == State::Check;
-                self.machine.check(!is_over).map_err(|_| CommandError::Busy)?;
-                let text = if is_over { "Disabled" } else { "Enabled" };
-                Reply(board).line(format_args!("[MSG:{text}]"));
-                if is_over {
-                    return Ok(Next::Reset);
-                }
-            }
-            Command::Sleep => {
-                self.machine.sleep()?;
-                self.resumption.lose_position();
-                Reply(board).line(format_args!("[MSG:Sleeping]"));
-            }
-            Command::Jog(line) => self.jog(line)?,
-            Command::GCode(line) => self.run_gcode(line, board)?,
-        }
-        Ok(Next::Nothing)
-    }
-
     /// Computes the drawing alone, in place of the last job.
     #[cfg(any(test, feature = "host"))]
     fn draw(&mut self, cancel: &mut dyn Cancel) -> Result<Drawing<'_, I>, CommandError> {
@@ -783,39 +390,5 @@ impl<I: Index> Inner<'_, I> {
         };
         let stored = pipeline.draw()?;
         Ok(stored.drawing(self.words).unwrap_or(Drawing { points: &[], segments: &[] }))
-    }
-
-    /// Sets the setting with the number `name`.
-    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
-    fn change_setting(&mut self, name: &str, value: &str) -> Result<(), CommandError> {
-        let mut name = Significant(name.bytes());
-        let number = next_number(&mut name).filter(|_| name.next().is_none());
-        let setting = number
-            .and_then(|number| u16::try_from(number.to_whole().ok()?).ok())
-            .and_then(Setting::numbered)
-            .ok_or(CommandError::UnknownSystemCommand)?;
-        let mut value = Significant(value.bytes());
-        let number = next_number(&mut value).ok_or(CommandError::NotANumber)?;
-        if value.next().is_some() {
-            return Err(CommandError::UnknownSystemCommand);
-        }
-        let value: Value = number.to_millimetres().map_err(|_| CommandError::NumberOutOfRange)?;
-        self.machine.set(setting, value).map_err(CommandError::Setting)
-    }
-}
-
-impl From<MachineError> for CommandError {
-    fn from(error: MachineError) -> Self {
-        match error {
-            MachineError::State(State::Alarm(_) | State::Sleep) => Self::Locked,
-            MachineError::State(_) => Self::Busy,
-            error => Self::Machine(error),
-        }
-    }
-}
-
-impl From<SettingError> for CommandError {
-    fn from(error: SettingError) -> Self {
-        Self::Setting(error)
     }
 }

@@ -11,8 +11,9 @@ use crate::command::{cargo, describe, output, run};
 
 /// The modules whose changes are tried: what decides which lines are drawn, in which order, by
 /// which steps and when.
-const FILES: [&str; 9] = [
+const FILES: [&str; 10] = [
     "src/fixed.rs",
+    "src/fixed/**",
     "src/geometry.rs",
     "src/view/**",
     "src/visibility/**",

@@ -2,12 +2,13 @@
 //! modes that earlier lines have set.
 //!
 //! Lines are understood as Grbl 1.1 understands them, and refused with its numbers. [`block`] reads
-//! and checks the words of a line, this file gives them their meaning, [`arc`] finds arcs,
-//! [`coordinates`] keeps the origins, and [`pen`] decides what is drawn.
+//! and checks the words of a line, this file gives them their meaning, [`feed`] has the speed,
+//! [`arc`] finds arcs, [`coordinates`] keeps the origins, and [`pen`] decides what is drawn.
 
 mod arc;
 mod block;
 mod coordinates;
+mod feed;
 mod parameters;
 mod pen;
 
@@ -20,6 +21,7 @@ use crate::machine::{Machine, Settings};
 use crate::protocol::{BlockError, CommandError, GCode};
 use crate::step::{Arc, Turn};
 use block::{Action, AxisUse, Block, Flow};
+use feed::inverse_feed;
 use pen::PenRule;
 
 /// A position of the machine, in millimetres from the page's origin. Z is only counted: the pen has
@@ -192,11 +194,6 @@ impl Program {
         Self { at: [Millimetres::ZERO, Millimetres::ZERO, z], ..Self::default() }
     }
 
-    /// The bound of the speed of the present move in mm/min, if there is one.
-    pub(super) fn feed(&self) -> Option<Millimetres> {
-        Some(self.move_feed).filter(|feed| *feed > 0)
-    }
-
     /// Z of the machine, in millimetres.
     pub(super) fn z(&self) -> Millimetres {
         self.at[2]
@@ -321,29 +318,6 @@ impl Program {
         if servo && PenRule::of(settings) != PenRule::Power {
             return Err(BlockError::ServoIsOff.into());
         }
-        Ok(())
-    }
-
-    /// Sets the speed of the line, and the units that it is given in.
-    fn set_feed(&mut self, block: &Block) -> Result<(), CommandError> {
-        self.inches = block.inches.unwrap_or(self.inches);
-        let was_inverse = self.inverse_time;
-        self.inverse_time = block.inverse_time.unwrap_or(self.inverse_time);
-        let motion = block.motion.unwrap_or(self.motion);
-        if self.inverse_time {
-            let is_feed = matches!(motion, Motion::Line | Motion::Arc(_));
-            let feed = block.number(b'F').map(clamped).unwrap_or_default();
-            if block.axis_use == AxisUse::Motion && is_feed && feed <= 0 {
-                return Err(BlockError::NoFeed.into());
-            }
-            self.feed = feed;
-        } else if let Some(feed) = block.number(b'F') {
-            // A speed beyond the range of numbers is beyond every limit, too.
-            self.feed = self.length(feed).unwrap_or(Millimetres::MAX);
-        } else if was_inverse {
-            self.feed = Millimetres::ZERO;
-        }
-        self.move_feed = self.feed;
         Ok(())
     }
 
@@ -476,17 +450,6 @@ impl Program {
 /// Converts a number that is not a length, limiting it to the range.
 fn clamped(number: Decimal) -> Millimetres {
     number.to_millimetres().unwrap_or(Millimetres::MAX)
-}
-
-/// The speed of a straight move in mm/min, where `feed` is one divided by its minutes.
-fn inverse_feed(from: [Millimetres; 2], to: [Millimetres; 2], feed: Millimetres) -> Millimetres {
-    // Differences are below 2^32 units of 2^-16 mm; halved, their squares are below 2^62.
-    let half = |axis: usize| {
-        (i64::from(to[axis].to_bits()) - i64::from(from[axis].to_bits())).unsigned_abs() / 2
-    };
-    let length = 2 * (half(0) * half(0) + half(1) * half(1)).isqrt();
-    let bits = (u128::from(length) * u128::from(feed.to_bits().unsigned_abs())) >> 16;
-    Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX).max(1))
 }
 
 /// The length in steps from the page's origin, clamped to a value that still lies beyond every

@@ -1,0 +1,242 @@
+//! What the plotter does in each turn of the main loop: real-time requests, bytes and lines, and the
+//! queue of step events.
+
+#[cfg(feature = "hpgl")]
+use super::Replies;
+use super::commands::Next;
+use super::plot::Drawing;
+#[cfg(feature = "tiles")]
+use super::stored::PartsProgress;
+use super::stream::Progress;
+use super::{BegunJob, Board, Inner, Plotter, REPLY_BYTES, Reply, ReportCounts, report};
+use crate::index::Index;
+use crate::machine::State;
+use crate::protocol::{CommandError, LineReader, Numbering, RealTime, Received};
+
+impl<I: Index> Plotter<'_, I> {
+    /// Answers the serial line, and keeps the queue of step events full. Returns whether there was
+    /// anything to do.
+    pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
+        let requests = board.take_real_time();
+        self.act(requests, board);
+        self.inner.watch(board);
+        self.inner.watch_idleness(board);
+        #[cfg(feature = "driver-pins")]
+        self.inner.watch_drivers(board);
+        self.inner.note_progress(board);
+        let planned = self.inner.plan(BegunJob::default(), board);
+        #[cfg(feature = "early-ink")]
+        let planned = self.inner.follow_order(board) || planned;
+        #[cfg(feature = "hpgl")]
+        let planned = self.carry_out_hpgl(board) || planned;
+        if self.inner.task.is_some() {
+            match self.inner.proceed(board) {
+                Progress::Done(outcome) => self.answer(outcome, board),
+                Progress::More => {}
+                #[cfg(feature = "early-ink")]
+                Progress::Reset => {
+                    self.answer(Ok(()), board);
+                    self.begin_anew(board);
+                }
+                Progress::Waits => return planned || requests != RealTime::default(),
+            }
+            return true;
+        }
+        // A byte is read only when the output has room for a reply, so that no reply blocks and
+        // delays the steps.
+        let waits = self.inner.must_wait();
+        #[cfg(feature = "hpgl")]
+        let waits = self.hpgl.must_wait(waits);
+        let waits = waits || !board.has_room(REPLY_BYTES);
+        let byte = if waits { None } else { board.read_byte() };
+        let Some((port, byte)) = byte else {
+            #[cfg(feature = "tiles")]
+            if self.tend_parts(board) {
+                return true;
+            }
+            return planned || requests != RealTime::default();
+        };
+        self.inner.busy_at = board.microseconds();
+        #[cfg(feature = "hpgl")]
+        if self.take_hpgl(port, byte, board) {
+            return true;
+        }
+        // Nothing comes between the instructions of HP-GL that are being carried out.
+        #[cfg(feature = "hpgl")]
+        let is_busy =
+            self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
+        #[cfg(not(feature = "hpgl"))]
+        let is_busy = false;
+        let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
+        let Some((reader, numbering)) = reader else { return true };
+        let Some(line) = reader.push(byte) else { return true };
+        let (mut shows_drive, mut resets) = (false, false);
+        let (outcome, label) = match numbering.receive(line) {
+            Received::Line(_, label) if is_busy => (Err(CommandError::Busy), label),
+            Received::Line(line, label) => {
+                let outcome = match self.inner.carry_out(line, board) {
+                    Ok(Next::Plot) => self.inner.plot(board, Drawing::Model),
+                    Ok(Next::Again) => self.inner.plot(board, Drawing::LastJob),
+                    #[cfg(feature = "resume")]
+                    Ok(Next::Resume { at_origin }) => {
+                        self.inner.plot(board, Drawing::Stopped { at_origin })
+                    }
+                    Ok(Next::Nothing) => Ok(()),
+                    Ok(Next::Reset) => {
+                        resets = true;
+                        Ok(())
+                    }
+                    Ok(Next::ShowDrive) => {
+                        shows_drive = true;
+                        Ok(())
+                    }
+                    Err(command_error) => Err(command_error),
+                };
+                (outcome, label)
+            }
+            Received::Answer(outcome, label) => (outcome, label),
+        };
+        if matches!(outcome, Err(CommandError::Aborted)) {
+            self.reset(board);
+        }
+        (self.port, self.label) = (port, label);
+        if self.inner.task.is_none() {
+            self.answer(outcome, board);
+        }
+        if resets {
+            self.begin_anew(board);
+        }
+        if shows_drive {
+            board.show_drive();
+        }
+        true
+    }
+
+    /// Computes the next part of a drawing that is drawn part by part. Returns whether there was
+    /// one to compute.
+    #[cfg(feature = "tiles")]
+    #[inline(always)] // It is called in every turn of the main loop.
+    fn tend_parts<B: Board>(&mut self, board: &mut B) -> bool {
+        if !self.inner.parts.is_active() {
+            return false;
+        }
+        let tended = self.inner.tend_parts(board);
+        if tended == PartsProgress::Aborted {
+            self.inner.machine.abort();
+            self.reset(board);
+        }
+        tended != PartsProgress::Idle
+    }
+
+    /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
+    fn answer<B: Board>(&mut self, outcome: Result<(), CommandError>, board: &mut B) {
+        if let Some(numbering) = self.numberings.get_mut(self.port) {
+            numbering.note(self.label, outcome);
+        }
+        Reply(board).outcome(outcome, self.label);
+    }
+
+    /// Carries out the real-time `requests`, and everything else that does not come by a line.
+    fn act<B: Board>(&mut self, requests: RealTime, board: &mut B) {
+        let state = self.inner.machine.state();
+        let settings = Some(self.inner.machine.settings());
+        report::greet_opened(state, self.inner.resumption, settings, board);
+        if B::HAS_DRIVE && board.wants_drive() && self.inner.is_without_job() {
+            board.show_drive();
+        }
+        if requests.has(RealTime::ABORT) {
+            self.inner.machine.abort();
+            self.reset(board);
+        }
+        self.inner.act(requests);
+        self.status_due |= requests.has(RealTime::STATUS);
+        if self.status_due && board.has_room(REPLY_BYTES) {
+            self.status_due = false;
+            // Writing the report takes 10 ms, and so may what was done since the queue was last
+            // filled.
+            self.inner.plan(BegunJob::default(), board);
+            #[cfg(feature = "hpgl")]
+            if let Some(port) = self.hpgl.port() {
+                board.reply_to(Replies::OthersIfAny(port));
+            }
+            self.inner.report_status("", board);
+            #[cfg(feature = "hpgl")]
+            self.mute(board);
+        }
+    }
+
+    /// Forgets unfinished lines, line numbers, overrides, and the modes of G-code, leaves check
+    /// mode and sleep, and greets the user.
+    fn reset<B: Board>(&mut self, board: &mut B) {
+        // What is in force is kept, too.
+        #[cfg(feature = "early-ink")]
+        if let Some(outcome) = self.inner.keep_rest(true, board) {
+            self.answer(outcome, board);
+        }
+        self.readers.iter_mut().for_each(LineReader::clear);
+        self.numberings = [Numbering::default(), Numbering::default()];
+        self.inner.task = None;
+        #[cfg(feature = "hpgl")]
+        self.end_hpgl(board);
+        self.begin_anew(board);
+    }
+
+    /// Begins with the modes of a start, and greets the user.
+    #[inline(never)] // Its callers share one copy of the code.
+    fn begin_anew<B: Board>(&mut self, board: &mut B) {
+        self.inner.reset();
+        self.greet(board);
+        self.inner.run_startup_lines(board);
+    }
+}
+
+impl<I: Index> Inner<'_, I> {
+    /// Keeps the step queue full. While the order of the job is computed, `begun` is what of it is
+    /// known. Returns whether the planned position has changed.
+    #[inline(never)] // Inlined, its frame would take stack while a job is computed.
+    pub(super) fn plan<B: Board>(&mut self, begun: BegunJob<'_, I>, board: &mut B) -> bool {
+        let before = self.machine.planned_position();
+        let ends = self.machine.stroke_ends();
+        #[cfg(feature = "early-ink")]
+        let mut strokes = self.job.strokes_of(begun, self.words, &mut self.cursor, ends);
+        #[cfg(not(feature = "early-ink"))]
+        let mut strokes = {
+            let _ = begun;
+            self.job.strokes(self.words, &mut self.cursor, ends)
+        };
+        #[cfg(feature = "stream")]
+        {
+            strokes.streamed = Some(&self.streamed);
+        }
+        #[cfg(feature = "tiles")]
+        if self.parts.is_active() {
+            strokes.ring = self.model.spare_words();
+        }
+        self.machine.fill(&mut strokes, board.queue());
+        self.machine.planned_position() != before
+    }
+
+    /// Forgets the modes of G-code and the overrides, and leaves check mode and sleep.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn reset(&mut self) {
+        self.program = self.program.reset();
+        self.report_counts = ReportCounts::default();
+        self.machine.set_override(100);
+        self.machine.set_rapid_override(100);
+        if self.machine.state() == State::Check {
+            // It is not refused in this state.
+            let _ = self.machine.check(false);
+        }
+        self.machine.wake();
+    }
+
+    /// Whether nothing moves and there is no interrupted job that could continue.
+    pub(super) fn is_without_job(&self) -> bool {
+        let is_over = matches!(
+            self.machine.state(),
+            State::Idle | State::Alarm(_) | State::Sleep | State::Check
+        );
+        is_over && self.machine.is_stopped()
+    }
+}

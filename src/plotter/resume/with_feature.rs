@@ -1,0 +1,446 @@
+//! What a board does that keeps how far jobs come.
+
+use super::Resumption;
+use crate::checksum::Crc32;
+use crate::index::Index;
+use crate::machine::{Path, Setting, Settings, State, Value};
+#[cfg(feature = "early-ink")]
+use crate::plotter::NotStored;
+use crate::plotter::listener::MeasuredStrokes;
+use crate::plotter::{Board, Inner, Reply, records};
+use crate::protocol::CommandError;
+use crate::stage::Cancel;
+use crate::storage::LogProgress;
+
+/// The settings that decide where ink falls, so that they must be the same in all parts of a
+/// drawing.
+const PLACING: [Setting; 16] = [
+    Setting::InvertDirections,
+    Setting::HomingPullOff,
+    Setting::StepsPerMmX,
+    Setting::StepsPerMmY,
+    Setting::PointDistance,
+    Setting::DotLength,
+    Setting::Kinematics,
+    Setting::AnchorWidth,
+    Setting::AnchorLeft,
+    Setting::AnchorHeight,
+    Setting::HomedBelt,
+    Setting::BacklashX,
+    Setting::BacklashY,
+    Setting::StrokeOverlap,
+    Setting::StrokeLead,
+    Setting::StrokeTrail,
+];
+
+/// A mark at the beginning of the notes; those with another layout have another mark.
+const LAYOUT: u32 = u32::from_le_bytes(*b"run2");
+/// The mark of the notes of a job that is sent while it is drawn.
+const STREAMED: u32 = u32::from_le_bytes(*b"str1");
+/// The most strokes that are noted at once.
+#[cfg(feature = "stream")]
+const MOST_AT_ONCE: u32 = 1 << 12;
+/// Number of words before the settings: layout, version, strokes, whether the model is known,
+/// and the checksums of model and options. For a job that is sent the last three are how many
+/// strokes are noted at once, the number by which its sender knows it, and 0.
+const HEAD: usize = 6;
+/// Size of the notes in words: each setting takes two.
+const WORDS: usize = HEAD + 2 * PLACING.len();
+const _: () = assert!(WORDS * size_of::<u32>() <= crate::storage::NOTE_BYTES);
+
+/// The notes that are kept with the progress of a job.
+type Notes = [[u8; 4]; WORDS];
+
+/// A number that differs between versions of the firmware.
+fn version() -> u32 {
+    let mut digest = Crc32::new();
+    digest.update(env!("CARGO_PKG_VERSION").as_bytes());
+    digest.finalize()
+}
+
+/// The three words of notes that tell what a job was computed from: the checksums of the model
+/// and of the options, if they are known.
+fn words_of(contents: Option<[u32; 2]>) -> [u32; 3] {
+    let [model, options] = contents.unwrap_or_default();
+    [u32::from(contents.is_some()), model, options]
+}
+
+/// The word of notes with this index.
+fn word(notes: &Notes, index: usize) -> u32 {
+    notes.get(index).map_or(0, |word| u32::from_le_bytes(*word))
+}
+
+/// Returns the notes of a job of this many strokes. `layout` is the mark of their layout, and
+/// `more` are three words that identify the job.
+#[inline(never)] // It is called in several places, and its loop is unrolled.
+fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
+    let [first, second, third] = more;
+    let head = [layout, version(), strokes, first, second, third];
+    let settings = PLACING.into_iter().flat_map(|setting| {
+        [setting.info().number().into(), settings.get(setting).to_bits().cast_unsigned()]
+    });
+    let mut notes: Notes = [[0; 4]; WORDS];
+    for (slot, word) in notes.iter_mut().zip(head.into_iter().chain(settings)) {
+        *slot = word.to_le_bytes();
+    }
+    notes
+}
+
+impl Resumption {
+    /// How many strokes of a job that has stopped are drawn, and how many there are.
+    pub(in crate::plotter) fn stopped(&self, state: State) -> Option<[u32; 2]> {
+        let is_over = !matches!(state, State::Run | State::Hold { .. } | State::Abort);
+        self.progress.filter(|[done, all]| is_over && done < all)
+    }
+
+    /// Whether the board keeps how far the job comes.
+    #[cfg(feature = "early-ink")]
+    pub(in crate::plotter) fn keeps(&self) -> bool {
+        self.progress.is_some()
+    }
+
+    /// Whether the position of the pen is not known since the job stopped.
+    pub(in crate::plotter) fn lose_position(&mut self) {
+        self.is_lost = true;
+    }
+
+    /// The machine has been homed.
+    pub(in crate::plotter) fn find_position(&mut self) {
+        self.is_lost = false;
+    }
+
+    /// Reports a job that has stopped, if there is one.
+    pub(in crate::plotter) fn report<B: Board>(&self, state: State, board: &mut B) {
+        let Some([done, all]) = self.stopped(state) else { return };
+        Reply(board).line(format_args!(
+            "[MSG:a job stopped at stroke {} of {all}: $resume goes on]",
+            done + 1
+        ));
+    }
+}
+
+impl<I: Index> Inner<'_, I> {
+    /// Records that the order of the job has become known, and with it the number of strokes.
+    /// `kept` says whether the flash has stored it.
+    #[cfg(feature = "early-ink")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn order_kept<B: Board>(
+        &mut self,
+        strokes: u32,
+        kept: Result<(), NotStored>,
+        board: &mut B,
+    ) {
+        if kept.is_err() {
+            self.machine.end_log();
+            self.resumption.progress = None;
+            return refuse(board);
+        }
+        if let Some([_, all]) = &mut self.resumption.progress {
+            *all = strokes;
+        }
+    }
+
+    /// Looks for a job that the last run of the firmware did not finish.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn find_stopped<B: Board>(&mut self, board: &mut B) {
+        let found = read(board);
+        self.resumption.progress =
+            found.map(|(notes, noted)| [done(&notes, noted), all_strokes(&notes, board)]);
+        self.resumption.is_lost = true;
+    }
+
+    /// Begins to keep how far the job comes that has just begun. `contents` as for
+    /// [`begin_notes`].
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn keep_progress<B: Board>(
+        &mut self,
+        contents: Option<[u32; 2]>,
+        board: &mut B,
+    ) {
+        self.resumption = Resumption::default();
+        if self.machine.state() != State::Run || !board.keeps_progress() {
+            return;
+        }
+        let strokes = self.machine.status().job.strokes;
+        let more = words_of(contents);
+        let notes = begin_notes(self.machine.settings(), LAYOUT, strokes, more);
+        if board.begin_progress(notes.as_flattened(), strokes).is_err() {
+            return refuse(board);
+        }
+        self.machine.log_strokes(0);
+        self.resumption.progress = Some([0, strokes]);
+    }
+
+    /// Keeps that a stroke has been drawn, or that a point within one has been passed, if the
+    /// pins have just done so and stand.
+    #[inline(always)] // It is called in every turn of the main loop.
+    pub(in crate::plotter) fn note_progress<B: Board>(&mut self, board: &mut B) {
+        if let Some(points) = self.machine.point_to_note() {
+            self.note_point(points, board);
+        }
+        if self.machine.may_note_stroke()
+            && let Some(strokes) = self.machine.stroke_to_note()
+        {
+            self.note_stroke(strokes, board);
+        }
+    }
+
+    /// Records in flash that this many strokes have been drawn.
+    #[inline(never)] // Inlined, it would take room in the main loop.
+    fn note_stroke<B: Board>(&mut self, strokes: u32, board: &mut B) {
+        let at_once = self.resumption.more_at_once.saturating_add(1);
+        let strokes = strokes.saturating_add(self.resumption.drawn_before);
+        let is_end = self.resumption.progress.is_some_and(|[_, all]| strokes == all);
+        // The last few strokes count as soon as all of them are drawn.
+        let parts = if is_end { strokes.div_ceil(at_once) } else { strokes / at_once };
+        if board.note_progress(parts).is_err() {
+            self.machine.end_log();
+            self.resumption.progress = None;
+            return refuse(board);
+        }
+        self.machine.stroke_noted();
+        if let Some([done, _]) = &mut self.resumption.progress {
+            *done = strokes;
+        }
+    }
+
+    /// Records in flash that this many points within strokes have been passed.
+    #[inline(never)] // Inlined, it would take room in the main loop.
+    fn note_point<B: Board>(&mut self, points: u32, board: &mut B) {
+        let kept = board.note_point(points);
+        self.machine.point_noted();
+        if kept.is_err() {
+            self.machine.end_log();
+            self.resumption.progress = None;
+            refuse(board);
+        }
+    }
+
+    /// Loads the job that has stopped, and returns how much of it is drawn. With `at_origin`
+    /// the user has put the pen at the origin. `None` if its sender has the strokes, and the
+    /// plotter knows no more than that the pen is at the origin.
+    ///
+    /// # Errors
+    /// [`CommandError::NothingToResume`] if no job has stopped, or the reason why it cannot go
+    /// on. The job stays kept.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn load_stopped<B: Board>(
+        &mut self,
+        at_origin: bool,
+        board: &mut B,
+    ) -> Result<Option<LogProgress>, CommandError> {
+        let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
+        let all = all_strokes(&notes, board);
+        if done(&notes, noted) >= all {
+            return Err(CommandError::NothingToResume);
+        }
+        self.check_notes(&notes)?;
+        if is_streamed(&notes) {
+            Reply(board).line(format_args!(
+                "[MSG:the job was sent while it was drawn: its sender sends the rest]"
+            ));
+            if !at_origin {
+                return Err(CommandError::NothingToResume);
+            }
+            self.machine.declare_origin()?;
+            self.resumption.is_lost = false;
+            return Ok(None);
+        }
+        if self.resumption.is_lost && !at_origin {
+            return Err(CommandError::PositionUnknown);
+        }
+        self.copy_words = 0;
+        self.job = Default::default();
+        self.cursor = Default::default();
+        self.job = records::load_job(self.machine.settings(), self.words, board)?;
+        if at_origin {
+            self.machine.declare_origin()?;
+        }
+        let progress = Some([noted.parts, all]);
+        self.resumption = Resumption { progress, ..Resumption::default() };
+        Ok(Some(noted))
+    }
+
+    /// Checks that what a job depends on is as it was when the job began.
+    fn check_notes(&self, notes: &Notes) -> Result<(), CommandError> {
+        if word(notes, 1) != version() {
+            return Err(CommandError::OtherVersion);
+        }
+        let (is_known, model) = (word(notes, 3), word(notes, 4));
+        for at in (HEAD..WORDS).step_by(2) {
+            let (number, bits) = (word(notes, at), word(notes, at + 1));
+            let setting = u16::try_from(number).ok().and_then(Setting::numbered);
+            let before = Value::from_bits(bits.cast_signed());
+            match setting {
+                Some(setting) if self.machine.settings().get(setting) == before => {}
+                Some(setting) => return Err(CommandError::OtherSetting { setting, before }),
+                None => return Err(CommandError::OtherVersion),
+            }
+        }
+        let is_empty = self.model.vertices().is_empty();
+        let is_computed = is_known != 0 && !is_streamed(notes);
+        if is_computed && !is_empty && model != self.model.checksum() {
+            return Err(CommandError::OtherModel);
+        }
+        Ok(())
+    }
+
+    /// Hands the rest of the job to the machine. `drawn` is the part that has been drawn
+    /// already.
+    ///
+    /// # Errors
+    /// The machine's refusal, or [`CommandError::Aborted`].
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn begin_rest(
+        &mut self,
+        drawn: LogProgress,
+        cancel: &mut dyn Cancel,
+    ) -> Result<(), CommandError> {
+        let ends = self.machine.stroke_ends();
+        let strokes = self.job.strokes(self.words, &mut self.cursor, ends);
+        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+        let whole = self.machine.measure_whole(&mut strokes)?;
+        if strokes.aborted {
+            return Err(CommandError::Aborted);
+        }
+        if !strokes.strokes.begin_at(drawn.parts) {
+            return Err(CommandError::NoJobKept);
+        }
+        let (mut points, distance) = (0, self.machine.point_distance());
+        if drawn.points > 0 && distance > 0 {
+            let length = |ends| self.machine.length(ends);
+            let LogProgress { parts, points: passed } = drawn;
+            points = strokes.strokes.begin_at_point(parts, passed, distance, &length);
+        }
+        self.machine.start_rest(&mut strokes, whole)?;
+        if strokes.aborted {
+            self.machine.abort();
+            return Err(CommandError::Aborted);
+        }
+        strokes.strokes.rewind();
+        if self.machine.state() == State::Run {
+            self.machine.log_strokes(points);
+        }
+        Ok(())
+    }
+}
+
+impl<I: Index> Inner<'_, I> {
+    /// Begins to keep how far a job comes that is sent while it is drawn, and that its sender
+    /// knows by the number `id`. If it is the rest of the job that has stopped, goes on with
+    /// what is kept of that. Nothing may move yet.
+    #[cfg(feature = "stream")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn keep_streamed<B: Board>(&mut self, id: u32, board: &mut B) {
+        let stopped = core::mem::take(&mut self.resumption).progress;
+        if self.machine.state() != State::Run || !board.keeps_progress() {
+            return;
+        }
+        let strokes = self.machine.status().job.strokes;
+        // The sender names the rest of a job by the number of the whole job.
+        let is_rest = |[done, all]: &[u32; 2]| done < all && strokes == all - done;
+        if let Some([drawn, all]) = stopped.filter(is_rest)
+            && let Some((notes, _)) = read(board)
+            && is_streamed(&notes)
+            && word(&notes, 4) == id
+        {
+            self.machine.log_strokes(0);
+            self.resumption = Resumption {
+                progress: Some([drawn, all]),
+                more_at_once: word(&notes, 3).saturating_sub(1),
+                drawn_before: drawn,
+                is_lost: false,
+            };
+            return;
+        }
+        // This job replaces the one that `$again` would draw, which is no longer the last one.
+        if records::save_streamed(id, board).is_err() {
+            return refuse(board);
+        }
+        for power in 0..=MOST_AT_ONCE.ilog2() {
+            let at_once = 1 << power;
+            let more = [at_once, id, 0];
+            let notes = begin_notes(self.machine.settings(), STREAMED, strokes, more);
+            let parts = strokes.div_ceil(at_once);
+            if board.begin_progress(notes.as_flattened(), parts).is_ok() {
+                self.machine.log_strokes(0);
+                self.resumption.more_at_once = at_once - 1;
+                self.resumption.progress = Some([0, strokes]);
+                return;
+            }
+        }
+        refuse(board);
+    }
+
+    /// Says how far a job has come that was sent while it was drawn and has stopped, so that
+    /// its sender can go on: the number by which it knows the job, how many strokes are drawn
+    /// and how many there are, and whether the position of the pen is unknown since then.
+    /// Returns whether there is such a job.
+    ///
+    /// # Errors
+    /// What the job depends on has changed.
+    #[cfg(feature = "stream")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn report_stopped_stream<B: Board>(
+        &self,
+        board: &mut B,
+    ) -> Result<bool, CommandError> {
+        let Some([drawn, all]) = self.resumption.stopped(self.machine.state()) else {
+            return Ok(false);
+        };
+        let Some((notes, _)) = read(board).filter(|(notes, _)| is_streamed(notes)) else {
+            return Ok(false);
+        };
+        self.check_notes(&notes)?;
+        let id = word(&notes, 4);
+        let is_lost = u8::from(self.resumption.is_lost);
+        Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost}]"));
+        Ok(true)
+    }
+}
+
+/// Whether the notes are those of a job that is sent while it is drawn.
+fn is_streamed(notes: &Notes) -> bool {
+    word(notes, 0) == STREAMED
+}
+
+/// Returns the number of strokes of a job with these notes that are drawn, according to its
+/// log.
+fn done(notes: &Notes, noted: LogProgress) -> u32 {
+    let (strokes, at_once) = (word(notes, 2), word(notes, 3));
+    if is_streamed(notes) { noted.parts.saturating_mul(at_once).min(strokes) } else { noted.parts }
+}
+
+/// Reads the notes of the kept job, and how much of it is drawn.
+fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
+    let mut notes: Notes = [[0; 4]; WORDS];
+    let (length, noted) = board.progress(notes.as_flattened_mut())?;
+    let layout = word(&notes, 0);
+    let is_known = layout == LAYOUT || layout == STREAMED;
+    (length == size_of::<Notes>() && is_known).then_some((notes, noted))
+}
+
+/// The number of strokes of the kept job. Of a job that began before its order was known, the
+/// notes have an estimate, and the order the number.
+fn all_strokes<B: Board>(notes: &Notes, board: &mut B) -> u32 {
+    #[cfg(feature = "early-ink")]
+    if !is_streamed(notes)
+        && let Some(strokes) = records::strokes_of_added_order(board)
+    {
+        return strokes;
+    }
+    let _ = board;
+    strokes(notes)
+}
+
+/// The number of strokes of a job, as its notes have it.
+fn strokes(notes: &Notes) -> u32 {
+    word(notes, 2)
+}
+
+/// Tells the user that a job cannot go on after a loss of power.
+fn refuse<B: Board>(board: &mut B) {
+    Reply(board).line(format_args!(
+        "[MSG:$resume will not go on with this: the flash does not take how far it comes]"
+    ));
+}
