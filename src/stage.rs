@@ -98,6 +98,14 @@ impl<'a> Scratch<'a> {
         Ok(items_mut(taken, count).unwrap_or(&mut []))
     }
 
+    /// Takes all the memory that is left as items of `T`, with whatever it holds. So a list that is
+    /// mostly shorter than its room costs no time to clear.
+    pub fn take_rest<T: Pod>(&mut self) -> &'a mut [T] {
+        let words = core::mem::take(&mut self.words);
+        let count = size_of_val(words) / size_of::<T>();
+        items_mut(words, count).unwrap_or(&mut []) // It has as many.
+    }
+
     /// Lends the memory that is left, for a part of this stage's work. All of it is free again
     /// afterwards.
     pub fn reborrow(&mut self) -> Scratch<'_> {

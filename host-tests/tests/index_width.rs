@@ -1,5 +1,6 @@
 //! The width of the numbers, 16 bits on boards and 32 on a computer, changes no result.
 
+use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
 use penup::model::{Corner, Elements};
 use penup::stage::{NeverCancel, Scratch};
@@ -7,6 +8,7 @@ use penup::visibility::{
     Crease, EdgeParameter, Options, Scene, SinkFull, Stretch, StretchSink, Unrounded,
     find_stretches, scratch_bytes,
 };
+use penup_host_tests::random::Random;
 use penup_host_tests::random_scenes::{RandomScene, random_scene};
 use proptest::prelude::*;
 
@@ -58,6 +60,66 @@ proptest! {
         let random = random_scene(seed);
         let crease = with_crease.then_some(Crease { cosine: 1 << 14, depth_stretch: (1, 1) });
         let options = Options { with_hidden, with_seams, merged_blocks, crease };
+        let narrow = stretches::<u16>(&random, options, spare);
+        prop_assert_eq!(narrow, stretches::<u32>(&random, options, spare));
+    }
+}
+
+/// Hexahedra, one behind the other and through each other, on a grid so coarse that their sides lie
+/// on each other's lines. A computer does not test all faces of a solid against the edges behind
+/// it, so some are turned inside out, and some have a face that is missing, turned over or there
+/// twice, or a corner that is moved.
+fn random_solids(seed: u64) -> RandomScene {
+    const SIDES: [[u16; 4]; 6] =
+        [[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+    let random = &mut Random::new(seed);
+    let projection = random.one_of(&[Projection::Perspective, Projection::Parallel]);
+    let lean = random.one_of(&[[0, 0], [1, 0], [1, -2]]);
+    let (mut vertices, mut corners): (Vec<Vertex>, Vec<Corner>) = (Vec::new(), Vec::new());
+    for _ in 0..random.between(1, 12) {
+        let first = vertices.len() as u16;
+        let low = [0; 3].map(|_| random.between(-5, 5));
+        let size = [0; 3].map(|_| random.between(1, 4));
+        for number in 0..8 {
+            // The corners run around the bottom and then around the top.
+            let shift = [i32::from(number % 4 % 3 != 0), number % 4 / 2, number / 4];
+            let mut at = [0, 1, 2].map(|axis| low[axis] + shift[axis] * size[axis]);
+            if random.once_in(40) {
+                at[random.below(3) as usize] += 1;
+            }
+            let [x, y, z] = at;
+            vertices.push(Vertex::new(
+                10 * (x + lean[0] * z),
+                10 * (y + lean[1] * z),
+                100 + 10 * z,
+            ));
+        }
+        let is_turned = random.once_in(3);
+        for side in SIDES {
+            let copies = if random.once_in(30) { random.between(0, 2) } else { 1 };
+            for _ in 0..copies {
+                let mut side = side.map(|vertex| first + vertex);
+                if is_turned != random.once_in(40) {
+                    side.reverse();
+                }
+                let end = |(number, vertex): (usize, u16)| Corner::new(vertex, false, number == 3);
+                corners.extend(side.into_iter().enumerate().map(end));
+            }
+        }
+    }
+    RandomScene { vertices, corners, projection }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1024))]
+    #[test]
+    fn hidden_lines_of_solids_are_the_same(
+        seed in any::<u64>(),
+        [with_hidden, with_seams, merged_blocks] in any::<[bool; 3]>(),
+        spare in prop::sample::select(vec![0usize, 1000, 1 << 14]),
+    ) {
+        let random = random_solids(seed);
+        let options = Options { with_hidden, with_seams, merged_blocks, crease: None };
         let narrow = stretches::<u16>(&random, options, spare);
         prop_assert_eq!(narrow, stretches::<u32>(&random, options, spare));
     }

@@ -6,10 +6,11 @@
 //! lying to the right in the first decision and to the left in the second. So every degenerate case
 //! falls on one side or the other.
 
-use super::coarse_projection::{CoarseLine, CoarsePoint, CoarseProjection, End};
+use super::coarse_projection::{CoarseLine, CoarseProjection, End};
 use super::edges::sides;
 use super::faces::Face;
 use super::profile::{EdgeInterval, Profile, mark};
+use super::raster::Bounds;
 use super::scene_index::SceneIndex;
 use crate::array::MapEach;
 use crate::geometry::{EdgeParameter, line_side, page_offset, page_side};
@@ -31,10 +32,8 @@ pub struct EdgeQuery<I> {
     pub far: i32,
     /// The two triangles that pass through each other along it, if this is a seam.
     pub seam: Option<[[I; 3]; 2]>,
-    /// The lower left corner of the rectangle around the edge on the coarse grid.
-    low: CoarsePoint,
-    /// The upper right corner of that rectangle.
-    high: CoarsePoint,
+    /// The rectangle around the edge on the coarse grid.
+    pub bounds: Bounds,
     /// The line of the edge on the coarse grid.
     line: CoarseLine,
 }
@@ -143,8 +142,7 @@ impl<I: Index> EdgeQuery<I> {
             near: p.vertex.z.min(q.vertex.z),
             far: p.vertex.z.max(q.vertex.z),
             seam: None,
-            low: p.position.low(q.position),
-            high: p.position.high(q.position),
+            bounds: Bounds { low: p.position.low(q.position), high: p.position.high(q.position) },
             line: CoarseLine::new(p.position, q.position),
         }
     }
@@ -168,18 +166,27 @@ impl<I: Index> EdgeQuery<I> {
     }
 
     /// Marks on `profile` the parts of this edge that `face` hides or that one of its sides
-    /// replaces.
-    pub fn mark_face(&self, around: &SceneIndex<'_, I>, face: Face, profile: &mut Profile<'_>) {
+    /// replaces. The caller has asked [`SceneIndex::may_meet`]. Where `hides` is `false`, all that
+    /// the face hides is hidden by others.
+    pub fn mark_face(
+        &self,
+        around: &SceneIndex<'_, I>,
+        face: Face,
+        hides: bool,
+        profile: &mut Profile<'_>,
+    ) {
         let coarse_projection = &around.coarse_projection;
         let corners = around.outlines.element(face.first);
         let mut numbers = [I::ZERO; FEW_CORNERS];
         let mut sides = [0; FEW_CORNERS];
         let (mut left, mut right) = (true, true);
-        let (mut low, mut high) = (CoarsePoint::HIGHEST, CoarsePoint::LOWEST);
+        let mut bounds = Bounds::NOWHERE;
         for (n, corner) in corners.iter().enumerate() {
             let number = corner.vertex();
             let position = coarse_projection.position(number);
-            (low, high) = (low.low(position), high.high(position));
+            if !SceneIndex::<I>::HAS_SHORTCUTS {
+                bounds.add(position);
+            }
             let mut side = 0;
             if number != self.p.number && number != self.q.number {
                 side = self.line.side(position);
@@ -193,7 +200,7 @@ impl<I: Index> EdgeQuery<I> {
         }
         // If all other corners lie on one side of the line, a face that contains p or q meets the
         // edge nowhere else; a face that contains both is not nearer than the edge.
-        if left || right || high.is_before(self.low) || self.high.is_before(low) {
+        if left || right || !SceneIndex::<I>::HAS_SHORTCUTS && !bounds.may_meet(&self.bounds) {
             return;
         }
         let count = corners.len();
@@ -204,13 +211,13 @@ impl<I: Index> EdgeQuery<I> {
                 }
             }
             let piece = CrossedPolygon::new(&numbers[..count], &sides);
-            if !face.is_fan || !self.pass(coarse_projection, piece, profile) {
+            if hides && !(face.is_fan && self.pass(coarse_projection, piece, profile)) {
                 self.pass_triangles(around, face, profile);
             }
             if piece.sides_on_line() == 0 {
                 return;
             }
-        } else {
+        } else if hides {
             self.pass_triangles(around, face, profile);
         }
         self.pass_sides(around, face.first, corners, profile);

@@ -25,6 +25,8 @@
 //! * Sort the faces by depth (`faces`) and into the cells of the page (`grid`, `raster`).
 //! * Of a fine mesh, find the cells that one sheet of faces covers (`sheet`), where it is known at
 //!   once which edges are visible.
+//! * On a computer, find the solids whose back faces need not be tested against the edges behind
+//!   them (`solids`).
 //! * Follow each edge through the cells (`search`) and mark on its `profile` which part each face
 //!   hides (`edge_query`), each face once (`face_set`).
 //! * If the options ask for it, find the lines where faces pass through each other (`seams`) and
@@ -47,7 +49,8 @@
 //! The search takes 4 bytes for each vertex, 1/8 for each corner, 4 1/4 for each element, 2 for
 //! each entry of the grid and 6 for each cell. Before that, the choice of the edges takes 2 bytes
 //! for each vertex and 2 1/8 for each corner. Each face that no fan of triangles covers takes 4
-//! bytes, and 6 for each of its triangles.
+//! bytes, and 6 for each of its triangles. With the numbers of a computer most of this is twice as
+//! much, and 8 bytes for each element and 4 for each corner are added (`bounds` and `solids`).
 //!
 //! # Limits
 //! Refused are vertices out of range, a model that is too large and too little working memory.
@@ -69,6 +72,8 @@ mod scene_index;
 mod search;
 mod sheet;
 #[cfg(feature = "threads")]
+mod solids;
+#[cfg(feature = "threads")]
 pub mod threads;
 mod edge_query;
 mod triangles;
@@ -86,6 +91,8 @@ use faces::Faces;
 use grid::Grid;
 use scene_index::SceneIndex;
 use search::{Marks, StretchFinder};
+#[cfg(feature = "threads")]
+use solids::Solids;
 use triangles::Ears;
 #[cfg(not(feature = "tiles"))]
 use yield_counter::YieldCounter;
@@ -224,6 +231,7 @@ pub const fn least_bytes<I: Index>(vertices: usize, corners: usize, faces: usize
     let choosing = ChosenSides::bytes_while_choosing::<I>(vertices, corners);
     let searching = Scratch::bytes_for::<CoarsePoint>(vertices)
         + Scratch::bytes_for::<I::Pair>(faces)
+        + SceneIndex::<I>::bytes_of_shortcuts(corners, faces)
         + StretchFinder::<I>::least_bytes(faces);
     ChosenSides::bytes(corners) + if choosing > searching { choosing } else { searching }
 }
@@ -302,7 +310,20 @@ fn index<'a, I: Index>(
     let ears = Ears::cut(outlines, vertices, scratch, yield_counter)?;
     let coarse_projection = CoarseProjection::new(scene, scratch, yield_counter)?;
     let faces = Faces::sort(outlines, vertices, scratch, yield_counter)?;
-    Ok(SceneIndex { coarse_projection, outlines, ears, chosen, faces })
+    let around = SceneIndex {
+        coarse_projection,
+        outlines,
+        ears,
+        chosen,
+        faces,
+        #[cfg(feature = "threads")]
+        bounds: &[],
+        #[cfg(feature = "threads")]
+        solids: Solids::default(),
+    };
+    #[cfg(feature = "threads")]
+    let around = around.with_shortcuts(scratch, yield_counter)?;
+    Ok(around)
 }
 
 /// Refuses a scene whose numbers would overflow the arithmetic or that refers to unknown vertices.

@@ -13,6 +13,7 @@ use crate::array::MapEach;
 use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::Aborted;
+use bytemuck::{Pod, Zeroable};
 
 /// The division of the page into cells of equal size, which are blocks of the coarse grid.
 #[derive(Debug, Clone, Copy)]
@@ -99,21 +100,38 @@ impl Shape {
 }
 
 /// The bounding rectangle of a face on the coarse grid.
+#[derive(Debug, Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
 pub struct Bounds {
     /// The lower left corner of the rectangle.
-    low: CoarsePoint,
+    pub low: CoarsePoint,
     /// The upper right corner of the rectangle.
-    high: CoarsePoint,
+    pub high: CoarsePoint,
 }
 
 impl Bounds {
+    /// The rectangle around no point.
+    pub const NOWHERE: Self = Self { low: CoarsePoint::HIGHEST, high: CoarsePoint::LOWEST };
+
+    /// Whether both rectangles may have a point of the page in common.
+    #[inline]
+    pub fn may_meet(&self, other: &Self) -> bool {
+        !self.high.is_before(other.low) && !other.high.is_before(self.low)
+    }
+
     /// Returns the rectangle around the given corners.
     pub fn of<I: Index>(coarse_projection: &CoarseProjection<'_>, corners: &[Corner<I>]) -> Self {
-        let none = Self { low: CoarsePoint::HIGHEST, high: CoarsePoint::LOWEST };
-        corners.iter().fold(none, |bounds, corner| {
-            let position = coarse_projection.position(corner.vertex());
-            Self { low: bounds.low.low(position), high: bounds.high.high(position) }
-        })
+        let mut bounds = Self::NOWHERE;
+        for corner in corners {
+            bounds.add(coarse_projection.position(corner.vertex()));
+        }
+        bounds
+    }
+
+    /// Extends the rectangle to a point.
+    #[inline]
+    pub fn add(&mut self, point: CoarsePoint) {
+        *self = Self { low: self.low.low(point), high: self.high.high(point) };
     }
 }
 

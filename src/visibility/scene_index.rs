@@ -1,15 +1,23 @@
 //! What the search for visible stretches knows about a scene, and what it asks of its faces.
 
 use super::Report;
+#[cfg(feature = "threads")]
+use super::VisibilityError;
 use super::coarse_projection::CoarseProjection;
 use super::edges::{ChosenSides, Outlines};
 use super::faces::{Face, Faces};
+use super::raster::Bounds;
 use super::seams::Extent;
+#[cfg(feature = "threads")]
+use super::solids::Solids;
 use super::triangles::Ears;
+#[cfg(feature = "threads")]
+use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
 use crate::geometry::Plane;
 use crate::index::Index;
 use crate::model::Corner;
+use crate::stage::Scratch;
 
 /// Everything that the search for visible stretches needs to know about a scene.
 pub struct SceneIndex<'a, I: Index> {
@@ -24,9 +32,76 @@ pub struct SceneIndex<'a, I: Index> {
     pub chosen: ChosenSides<'a>,
     /// The faces and bars in the order of their depth, nearest first.
     pub faces: Faces<'a, I>,
+    /// The rectangles around the faces on the coarse grid, by rank.
+    #[cfg(feature = "threads")]
+    pub bounds: &'a [Bounds],
+    /// The faces whose solids hide what is behind them without them.
+    #[cfg(feature = "threads")]
+    pub solids: Solids<'a>,
+}
+
+#[cfg(feature = "threads")]
+impl<'a, I: Index> SceneIndex<'a, I> {
+    /// Fills `bounds` and `solids` where the numbers are those of a computer.
+    ///
+    /// # Errors
+    /// Returns an error if the memory is too small or the user cancels.
+    pub fn with_shortcuts(
+        mut self,
+        scratch: &mut Scratch<'a>,
+        yield_counter: &mut YieldCounter<'_>,
+    ) -> Result<Self, VisibilityError> {
+        if Self::HAS_SHORTCUTS {
+            let bounds: &mut [Bounds] = scratch.take(self.faces.len())?;
+            for (rank, bounds) in bounds.iter_mut().enumerate() {
+                let corners = self.outlines.element(self.faces.get(rank).first);
+                *bounds = Bounds::of(&self.coarse_projection, corners);
+                yield_counter.spend(50 * corners.len())?;
+            }
+            self.bounds = bounds;
+            let depths = scratch.take(self.outlines.corners.len())?;
+            self.solids = Solids::find(&self, depths, yield_counter)?;
+        }
+        Ok(self)
+    }
 }
 
 impl<I: Index> SceneIndex<'_, I> {
+    /// Whether `bounds` and `solids` are filled, with which faces are passed over without a look at
+    /// their corners. On a board their memory is worth more as cells.
+    pub const HAS_SHORTCUTS: bool = cfg!(feature = "threads") && I::BITS > 16;
+
+    /// Returns the bytes that `bounds` and `solids` take.
+    pub const fn bytes_of_shortcuts(corners: usize, faces: usize) -> usize {
+        if Self::HAS_SHORTCUTS {
+            Scratch::bytes_for::<Bounds>(faces) + Scratch::bytes_for::<i32>(corners)
+        } else {
+            0
+        }
+    }
+
+    /// Whether the face with this rank may meet what lies within a rectangle of the coarse grid, as
+    /// far as that is known without its corners.
+    #[inline(always)] // On a board it is nothing.
+    pub fn may_meet(&self, _rank: usize, _within: &Bounds) -> bool {
+        #[cfg(feature = "threads")]
+        if Self::HAS_SHORTCUTS {
+            return self.bounds.get(_rank).is_none_or(|bounds| bounds.may_meet(_within));
+        }
+        true
+    }
+
+    /// Whether the other faces on the page hide as much as this one of an edge that is nowhere
+    /// nearer than `near`.
+    #[inline(always)] // On a board it is nothing.
+    pub fn is_spared(&self, _face: Face, _near: i32) -> bool {
+        #[cfg(feature = "threads")]
+        if Self::HAS_SHORTCUTS {
+            return self.solids.spare(_face.first, _near);
+        }
+        false
+    }
+
     /// Returns what was noticed about the scene, for the user to be told.
     pub fn report(&self) -> Report {
         Report { degenerate_faces: self.faces.degenerate() }

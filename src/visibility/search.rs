@@ -362,10 +362,13 @@ impl<'s, I: Index> StretchFinder<'s, I> {
             seen.insert(rank);
         }
         let mut spent = yield_counter.spend(1000);
-        let mut test_face = |rank: I| {
+        let mut test_face = |rank: I, is_cover: bool| {
             let rank = rank.get();
-            if seen.insert(rank) {
-                edge_query.mark_face(around, faces_by_rank.get(rank), profile);
+            if seen.insert(rank) && around.may_meet(rank, &edge_query.bounds) {
+                let face = faces_by_rank.get(rank);
+                // Where there is a covering face, the others are not tested.
+                let hides = is_cover || !around.is_spared(face, edge_query.near);
+                edge_query.mark_face(around, face, hides, profile);
             }
             spent = spent.and_then(|()| yield_counter.spend(FACE_TEST));
             spent.is_ok() && !profile.is_hidden()
@@ -373,13 +376,13 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         // The covering faces come first: they hide most, and what they leave visible may need no
         // other cell.
         let _ = (!any_covered
-            || cells_along.visit(&mut |cell| cell.cover.is_none_or(&mut test_face)))
+            || cells_along.visit(&mut |cell| cell.cover.is_none_or(|rank| test_face(rank, true))))
             && cells_along.visit(&mut |cell| {
                 let faces = if cell.cover.is_some() { &[] } else { cell.faces };
                 faces
                     .iter()
                     .take_while(|&&rank| !faces_by_rank.begins_behind(rank.get(), edge_query.far))
-                    .all(|&rank| test_face(rank))
+                    .all(|&rank| test_face(rank, false))
             });
         spent?;
         if options.merged_blocks && !profile.is_hidden() {

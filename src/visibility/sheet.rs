@@ -19,6 +19,7 @@ use super::scene_index::SceneIndex;
 use crate::array::MapEach;
 use crate::geometry::COORDINATE_LIMIT;
 use crate::index::Index;
+use crate::model::Corner;
 
 /// The most sides that may be waiting for their second face. A cell that needs more is taken to
 /// have no sheet.
@@ -50,16 +51,26 @@ impl CellArea {
 /// The two ends of a side, in the direction in which its face runs anticlockwise on the page.
 type Directed<I> = [I; 2];
 
-/// The sides that were met once so far.
-struct OpenSides<I> {
+/// The sides of a chain of faces that were met in one direction only so far.
+pub struct OpenSides<I> {
     sides: [Directed<I>; MOST_OPEN_SIDES],
     count: usize,
 }
 
 impl<I: Index> OpenSides<I> {
+    /// No side was met so far.
+    pub fn new() -> Self {
+        Self { sides: [[I::ZERO; 2]; MOST_OPEN_SIDES], count: 0 }
+    }
+
+    /// Whether each side was met in both directions.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
     /// Removes the side that runs in the opposite direction, or adds this one. Returns `None` if
     /// there is no room for it.
-    fn meet(&mut self, [from, to]: Directed<I>) -> Option<()> {
+    pub fn meet(&mut self, [from, to]: Directed<I>) -> Option<()> {
         let open = self.sides.get_mut(..self.count)?;
         if let Some(found) = open.iter().position(|side| *side == [to, from]) {
             self.count -= 1;
@@ -77,7 +88,7 @@ impl<I: Index> SceneIndex<'_, I> {
     /// in a cell; `None` if they form none, or if that is not certain. The ranks ascend, and all
     /// faces on the cell are among them.
     pub fn sheet(&self, cell: &CellArea, ranks: &[I]) -> Option<i32> {
-        let mut open = OpenSides { sides: [[I::ZERO; 2]; MOST_OPEN_SIDES], count: 0 };
+        let mut open = OpenSides::new();
         let mut far = -COORDINATE_LIMIT;
         let mut count = 0;
         for rank in ranks.iter().map(|rank| rank.get()) {
@@ -95,7 +106,7 @@ impl<I: Index> SceneIndex<'_, I> {
                 }
             }
         }
-        if count == 0 || open.count > 0 {
+        if count == 0 || !open.is_empty() {
             return None;
         }
         let middle = self.coarse_projection.middle(cell.low, cell.high);
@@ -111,8 +122,13 @@ impl<I: Index> SceneIndex<'_, I> {
     /// Returns the sense in which all triangles of a face turn on the page: 1 anticlockwise, -1
     /// clockwise. `None` if they do not turn in one sense, or if the face is no fan of triangles.
     fn facing(&self, face: Face) -> Option<i32> {
-        let corners = self.outlines.element(face.first);
-        let (first, others) = corners.split_first().filter(|_| face.is_fan)?;
+        face.is_fan.then(|| self.turn(self.outlines.element(face.first)))?
+    }
+
+    /// Returns the sense in which all triangles of a fan turn on the page: 1 anticlockwise, -1
+    /// clockwise. `None` if they do not turn in one sense.
+    pub fn turn(&self, corners: &[Corner<I>]) -> Option<i32> {
+        let (first, others) = corners.split_first()?;
         let mut turns = others.windows(2).map(|pair| match pair {
             [b, c] => self.coarse_projection.side(first.vertex(), b.vertex(), c.vertex()),
             _ => 0,

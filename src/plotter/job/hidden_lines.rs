@@ -92,9 +92,7 @@ impl<I: Index> Pipeline<'_, I> {
         for (at, grid) in grids.iter().enumerate() {
             let (stage_memory, mut line_memory) = scratch.reborrow().split(needed + grid);
             let lines_at = (total - line_memory.available_bytes()) / size_of::<u64>();
-            let room = line_memory.available_bytes() / size_of::<PackedLine>();
-            let collected = line_memory.take(room).map_err(CommandError::DrawingTooLarge)?;
-            let collector = Collector { lines: collected, count: 0 };
+            let collector = Collector { lines: line_memory.take_rest(), count: 0 };
             let mut sink =
                 PageSink { collector, map: &map, view: &view, options, observer: &mut **observer };
             let found = if options.see == VisibilityMode::Wire {
