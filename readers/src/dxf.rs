@@ -66,8 +66,10 @@ const MODEL: &str = "entities in model space";
 /// The strokes of a drawing, and what of it is not drawn.
 struct Drawing<'d, 'a> {
     document: &'d Document<'a>,
-    /// The strokes with their entities' lines and kinds, and their layers.
-    strokes: Vec<(usize, &'a str, &'a str, Vec<Point>)>,
+    /// The strokes, of which the pens are chosen once all layers are known.
+    plan: Plan,
+    /// The numbers of the layers that strokes lie on.
+    layers: HashMap<&'a str, u32>,
     /// The number of entities of a kind that are not drawn, and the line of the first.
     skipped: BTreeMap<String, (usize, usize)>,
     points: usize,
@@ -313,7 +315,13 @@ impl<'d, 'a> Drawing<'d, 'a> {
             if self.points > MOST_POINTS {
                 return Err(too_many(entity));
             }
-            self.strokes.push((entity.line, entity.kind, placement.layer, points));
+            let next = self.layers.len() as u32;
+            let layer = *self.layers.entry(placement.layer).or_insert(next);
+            self.plan.begin(entity.line, entity.kind);
+            match points.as_slice() {
+                [dot] => self.plan.draw_dot(*dot, None, 1, layer),
+                _ => self.plan.draw_on(points, None, 1, layer),
+            }
         }
         Ok(())
     }
@@ -509,7 +517,8 @@ impl Format for Dxf {
         };
         let mut drawing = Drawing {
             document: &document,
-            strokes: Vec::new(),
+            plan: Plan::new(file.clone()),
+            layers: HashMap::new(),
             skipped: BTreeMap::new(),
             points: 0,
             is_of_paper: false,
@@ -523,38 +532,25 @@ impl Format for Dxf {
         let to_page = Affine([unit, 0.0, 0.0, unit, 0.0, 0.0]);
         let placement = Placement { to_page, layer: "0", line_type: "", depth: 0 };
         drawing.all(&document.entities, placement).map_err(in_line)?;
-        if drawing.strokes.is_empty() && drawing.skipped.contains_key(PAPER) {
+        if drawing.plan.is_empty() && drawing.skipped.contains_key(PAPER) {
             drawing.is_of_paper = true;
             drawing.skipped.clear();
             drawing.all(&document.entities, placement).map_err(in_line)?;
         }
-        let mut layers: Vec<&str> = Vec::new();
-        for (_, _, layer, _) in &drawing.strokes {
-            if !layers.contains(layer) {
-                layers.push(layer);
-            }
-        }
-        let numbered: Vec<Option<u32>> = layers
-            .iter()
-            .map(|layer| if *layer == "0" { None } else { number_in(layer) })
-            .collect();
+        let mut layers: Vec<(&str, u32)> = drawing.layers.into_iter().collect();
+        layers.sort_by_key(|(_, number)| *number);
+        let numbered: Vec<Option<u32>> =
+            layers.iter().map(|(layer, _)| number_in(layer).filter(|_| *layer != "0")).collect();
         let taken: HashSet<u32> = numbered.iter().copied().flatten().collect();
         let mut free = (1..).filter(|number| !taken.contains(number));
-        let pens: HashMap<&str, (u32, u32)> = (layers.iter().zip(numbered).zip(0..))
-            .map(|((layer, number), index)| {
-                (*layer, (number.or_else(|| free.next()).unwrap_or(1), index))
-            })
+        let pens: Vec<u32> = (numbered.into_iter())
+            .map(|number| number.or_else(|| free.next()).unwrap_or(1))
             .collect();
-        let mut plan = Plan::new(file.clone());
-        for (line, kind, layer, points) in drawing.strokes {
-            let (pen, number) = pens.get(layer).copied().unwrap_or((1, 0));
-            plan.begin(line, kind);
-            match points.as_slice() {
-                [dot] => plan.draw_dot(*dot, None, pen, number),
-                _ => plan.draw_on(points, None, pen, number),
-            }
+        let mut plan = drawing.plan;
+        for stroke in &mut plan.strokes {
+            stroke.pen = pens.get(stroke.layer as usize).copied().unwrap_or(1);
         }
-        plan.layers = layers.into_iter().map(str::to_owned).collect();
+        plan.layers = layers.into_iter().map(|(layer, _)| layer.to_owned()).collect();
         let mut notes: Vec<String> = drawing
             .skipped
             .iter()
