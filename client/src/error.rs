@@ -1,4 +1,7 @@
 //! The errors of the `penup` command. Each message also tells the user what to do about it.
+//!
+//! The file is longer than 500 lines, because most of it is one table: each variant with its
+//! message.
 
 use crate::fit::FitError;
 use crate::interrupt::EXIT_CODE;

@@ -1,5 +1,5 @@
-//! What the plotter does in each turn of the main loop: real-time requests, bytes and lines, and the
-//! queue of step events.
+//! What the plotter does in each turn of the main loop: real-time requests, lines, and the queue of
+//! step events.
 
 #[cfg(feature = "hpgl")]
 use super::Replies;

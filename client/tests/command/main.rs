@@ -8,6 +8,8 @@ mod at_a_port;
 mod machine;
 #[cfg(target_os = "linux")]
 mod many_points;
+mod plans;
+mod results;
 
 use std::fs;
 use std::io::Write as _;
@@ -181,37 +183,6 @@ fn a_drawing_that_is_fitted_to_its_own_page_is_told_so() {
     assert_eq!((code, noted.as_str()), (Some(0), ""));
 }
 
-/// What the options of plans do is drawn: the plotter itself measures the ink.
-#[test]
-fn a_plan_is_arranged_before_it_is_drawn() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let square = "G21 G90\nM5\nG0 X20 Y20\nM3\nG1 X60\nG1 Y60\nG1 X20\nG1 Y20\nM5\nG0 X0 Y0\n";
-    fs::write(folder.path().join("square.gcode"), square).expect("written");
-    let drawn = |options: &[&str]| {
-        let fixed = ["preview", "square.gcode", "--json", "square.json"];
-        let (code, said, noted) = penup(folder.path(), &[&fixed[..], options].concat());
-        assert_eq!(code, Some(0), "{said}{noted}");
-        let json = fs::read_to_string(folder.path().join("square.json")).expect("written");
-        let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-        (result["pen_down_mm"].as_f64().expect("a length"), said)
-    };
-    let near = |options: &[&str], expected: f64| {
-        let (length, said) = drawn(options);
-        assert!((length - expected).abs() < 0.05, "{options:?}: {length} {said}");
-    };
-    near(&[], 160.0);
-    near(&["--scale", "2"], 320.0);
-    near(&["--crop", "10,10,30,100"], 80.0);
-    // 13 lines of 40 mm, from 21 mm to 57 mm.
-    near(&["--hatch", "3,0"], 160.0 + 520.0);
-    let (_, said) = drawn(&["--center"]);
-    assert!(said.contains("reaches from 85, 128.5 to 125, 168.5 mm"), "{said}");
-    let (_, said) = drawn(&["--fit"]);
-    assert!(said.contains("before it is fitted to the page, the drawing reaches"), "{said}");
-    let (code, _, noted) = penup(folder.path(), &["preview", "square.gcode", "--layer", "7"]);
-    assert_eq!((code, noted.contains("there is no layer \"7\"")), (Some(1), true), "{noted}");
-}
-
 #[test]
 fn an_svg_is_drawn_at_its_place_with_two_pens() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -241,113 +212,6 @@ fn an_svg_is_drawn_at_its_place_with_two_pens() {
     let (code, _, noted) = penup(folder.path(), &arguments);
     assert_eq!(code, Some(0), "{noted}");
     assert!(noted.contains("the drawing is moved onto the page of 210 x 297 mm"), "{noted}");
-}
-
-#[test]
-fn options_that_change_nothing_on_a_plan_are_told() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let told = |text: &str, options: &[&str]| {
-        fs::write(folder.path().join("a.obj"), text).expect("written");
-        let (code, _, noted) =
-            penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
-        assert_eq!(code, Some(0), "{noted}");
-        let (_, names) = noted.split_once("nothing is changed by ")?;
-        names.lines().next().map(str::to_owned)
-    };
-    let (plan, solid) = ("v 0 0 0\nv 20 30 0\nl 1 2\n", "v 0 0 0\nv 20 30 0\nv 0 9 9\nf 1 2 3\n");
-    let idle = ["--hidden", "dotted", "--crease", "30"];
-    assert_eq!(told(plan, &idle).as_deref(), Some("--hidden, --crease"));
-    let lens = ["--projection", "orthographic"];
-    assert_eq!(told(plan, &lens).as_deref(), Some("--projection"));
-    assert_eq!(told(plan, &[]), None);
-    assert_eq!(told(plan, &["--lift", "3", "--page", "A4"]), None);
-    assert_eq!(told(plan, &[&idle[..], &["--eye=9,-9,9"]].concat()), None);
-    assert_eq!(told(solid, &idle), None);
-    assert_eq!(told(solid, &["--fit"]).as_deref(), Some("--fit"));
-    assert_eq!(told(solid, &["--title-size", "9"]).as_deref(), Some("--title-size"));
-}
-
-#[test]
-fn the_standard_input_and_output_are_those_of_tape_and_fit_too() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let piped = |arguments: &[&str], given: &[u8]| {
-        let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
-            .args(arguments)
-            .current_dir(folder.path())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .spawn()
-            .expect("the program runs");
-        program.stdin.take().expect("a pipe").write_all(given).expect("written");
-        let output = program.wait_with_output().expect("it ends");
-        assert_eq!(output.status.code(), Some(0), "{arguments:?}");
-        output.stdout
-    };
-    let plan: &[u8] = b"v 20 20 0\nv 40 20 0\nv 40 30 0\nl 1 2 3\n";
-    let tape = piped(&["tape", "encode", "-", "--quiet"], plan);
-    let decoded = piped(&["tape", "decode", "-"], &tape);
-    fs::write(folder.path().join("plan.obj"), plan).expect("written");
-    piped(&["tape", "encode", "plan.obj"], b"");
-    assert_eq!(fs::read(folder.path().join("plan.tape")).expect("readable"), tape);
-    assert_eq!(piped(&["tape", "decode", "plan.tape"], b""), decoded);
-    let shown = piped(&["tape", "show", "-", "--svg", "-"], &tape);
-    assert_eq!(piped(&["tape", "show", "plan.tape", "--svg", "-"], b""), shown);
-    let fitted = piped(&["fit", "-", "--quiet"], plan);
-    piped(&["fit", "plan.obj"], b"");
-    assert_eq!(fs::read(folder.path().join("plan-fitted.obj")).expect("readable"), fitted);
-    assert_eq!(files(folder.path()), ["plan-fitted.obj", "plan.obj", "plan.tape"]);
-}
-
-#[test]
-fn a_plan_that_the_margin_moves_is_told_and_a_solid_is_not() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let told = |text: &str, options: &[&str]| {
-        fs::write(folder.path().join("a.obj"), text).expect("written");
-        let (code, _, noted) =
-            penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
-        assert_eq!(code, Some(0), "{noted}");
-        noted.contains("the drawing is moved onto the page of 210 x 297 mm with its margin of")
-    };
-    assert!(told("v 0 0 0\nv 20 30 0\nl 1 2\n", &[]));
-    assert!(!told("v 0 0 0\nv 20 30 0\nl 1 2\n", &["--margin", "0"]));
-    assert!(!told("v 0 0 0\nv 20 30 0\nl 1 2\n", &["--fit"]));
-    assert!(!told("v 30 30 2\nv 50 50 2\nl 1 2\n", &[]));
-    assert!(!told("v 0 0 0\nv 20 30 0\nv 0 9 0\nf 1 2 3\n", &[]));
-    assert!(!told("v 0 0 0\nv 20 30 1\nl 1 2\n", &[]));
-}
-
-#[test]
-fn a_plan_that_is_too_small_to_be_drawn_is_told_its_size() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let plan = "v 0 0 42\nv 0.00001 0 42\nv 0 0.00001 42\nl 1 2 3\n";
-    fs::write(folder.path().join("a.obj"), plan).expect("written");
-    let preview = ["preview", "a.obj", "--svg", "a.svg"];
-    let (code, _, noted) = penup(folder.path(), &preview);
-    assert_eq!(code, Some(4));
-    assert!(noted.contains("the drawing is 0.00001 x 0.00001 mm at true size"), "{noted}");
-    assert!(noted.contains("nothing to draw") && noted.contains("a motor step"), "{noted}");
-    let (code, said, noted) = penup(folder.path(), &[&preview[..], &["--fit"]].concat());
-    assert_eq!((code, noted.as_str()), (Some(0), ""), "{said}");
-}
-
-#[test]
-fn a_plan_that_fits_the_turned_page_is_told_how_to_turn_it() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let told = |size: &str, options: &[&str]| {
-        fs::write(folder.path().join("a.obj"), format!("v 0 0 0\nv {size} 0\nl 1 2\n"))
-            .expect("written");
-        let (code, _, noted) =
-            penup(folder.path(), &[&["preview", "a.obj", "--svg", "a.svg"], options].concat());
-        (code, noted.contains("the drawing fits the page if that is turned: --landscape=auto"))
-    };
-    assert_eq!(told("250 100", &[]), (Some(4), true));
-    assert_eq!(told("250 100", &["--landscape=auto"]), (Some(0), false));
-    assert_eq!(told("100 250", &["--landscape"]), (Some(4), true));
-    assert_eq!(told("100 250", &["--landscape=auto"]), (Some(0), false));
-    assert_eq!(told("300 100", &[]), (Some(4), false));
-    assert_eq!(told("250 195", &[]), (Some(4), false));
-    assert_eq!(told("250 100", &["--fit"]), (Some(0), false));
-    assert_eq!(told("150 100", &[]), (Some(0), false));
 }
 
 #[test]
@@ -438,83 +302,6 @@ fn a_far_eye_and_a_near_one_are_drawn_or_refused_with_their_option() {
     }
 }
 
-const PLAN: &str = "v 0 0 0\nv 10 0 0\nv 10 10 0\nl 1 2 3\n";
-
-#[test]
-fn no_result_replaces_its_file_or_another_result() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::create_dir(folder.path().join("sub")).expect("a folder");
-    fs::write(folder.path().join("b.obj"), PLAN).expect("written");
-    fs::write(folder.path().join("plot.svg"), [0x33; 9]).expect("written");
-    let mut before = files(folder.path());
-    let refused = |arguments: &[&str], reason: &str| {
-        let (code, stdout, stderr) = penup(folder.path(), arguments);
-        assert_eq!((code, stdout.as_str()), (Some(1), ""), "{arguments:?}: {stderr}");
-        assert_eq!(stderr, format!("penup: {reason}\n"), "{arguments:?}");
-    };
-    let read = "is the file to read: give the result another name, so that it is not overwritten";
-    for (arguments, output) in [
-        (&["fit", "b.obj", "--output", "b.obj"][..], "b.obj"),
-        (&["fit", "b.obj", "--output", "./sub/../b.obj"], "./sub/../b.obj"),
-        (&["tape", "encode", "b.obj", "--output", "b.obj"], "b.obj"),
-        (&["tape", "show", "plot.svg"], "plot.svg"),
-        (&["preview", "b.obj", "--svg", "b.obj"], "b.obj"),
-        (&["preview", "b.obj", "--json", "b.obj"], "b.obj"),
-        (&["plot", "b.obj", "--png", "b.obj"], "b.obj"),
-    ] {
-        refused(arguments, &format!("{output} {read}"));
-    }
-    let one = "are one file: give each result a file of its own";
-    refused(&["preview", "b.obj", "--svg", "x", "--png", "x"], &format!("x and x {one}"));
-    refused(&["preview", "b.obj", "--svg", "x", "--json", "./x"], &format!("x and ./x {one}"));
-    refused(&["preview", "b.obj", "--png", "x", "--json", "x"], &format!("x and x {one}"));
-    refused(
-        &["plot", "b.obj", "--svg", "x", "--png", "sub/../x"],
-        &format!("x and sub/../x {one}"),
-    );
-    #[cfg(unix)]
-    {
-        std::os::unix::fs::symlink("b.obj", folder.path().join("link.obj")).expect("a link");
-        refused(&["fit", "link.obj", "--output", "b.obj"], &format!("b.obj {read}"));
-        before = [before, vec!["link.obj".to_owned()]].concat();
-        before.sort();
-    }
-    assert_eq!(files(folder.path()), before);
-    assert_eq!(fs::read_to_string(folder.path().join("b.obj")).expect("readable"), PLAN);
-}
-
-/// The file to read is not there either: where the results go is looked at first.
-#[test]
-fn an_output_that_cannot_be_written_is_an_error_before_any_work() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("file"), "").expect("written");
-    fs::create_dir(folder.path().join("folder")).expect("a folder");
-    let before = files(folder.path());
-    let mut outputs = vec!["no/x", "file/x", "folder", "folder/", "new/"];
-    // Even the system's administrator cannot make a file there.
-    if cfg!(target_os = "linux") {
-        outputs.push("/proc/x");
-    }
-    for output in outputs {
-        for arguments in [
-            &["plot", "none.obj", "--svg", output][..],
-            &["plot", "none.obj", "--png", output],
-            &["preview", "none.obj", "--svg", output],
-            &["preview", "none.obj", "--png", output],
-            &["preview", "none.obj", "--json", output],
-            &["fit", "none.obj", "--output", output],
-            &["tape", "encode", "none.obj", "--output", output],
-            &["tape", "show", "none.tape", "--svg", output],
-        ] {
-            let (code, _, stderr) = penup(folder.path(), arguments);
-            assert_eq!(code, Some(1));
-            let reason = format!("penup: cannot write {output}: ");
-            assert!(stderr.starts_with(&reason), "{arguments:?}: {stderr}");
-        }
-    }
-    assert_eq!(files(folder.path()), before);
-}
-
 /// Every command reads its file from a pipe that never ends, and is given up there.
 #[cfg(unix)]
 #[test]
@@ -548,33 +335,6 @@ fn ctrl_c_ends_every_command_at_once() {
         drop(writer);
     }
     assert_eq!(files(folder.path()), ["endless.obj"]);
-}
-
-#[cfg(target_os = "linux")]
-#[test]
-fn an_output_that_is_closed_is_no_error_and_a_full_one_is() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("long.tape"), [0x33; 100_000]).expect("written");
-    let shell = |line: &str| {
-        let program = env!("CARGO_BIN_EXE_penup");
-        let output = Command::new("bash")
-            .args(["-c", &line.replace("penup", program)])
-            .current_dir(folder.path())
-            .output()
-            .expect("a shell");
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-    };
-    for line in [
-        "penup --help | head -1; exit ${PIPESTATUS[0]}",
-        "penup tape decode long.tape | true; exit ${PIPESTATUS[0]}",
-        "penup tape decode long.tape >&-",
-    ] {
-        assert_eq!(shell(line), (Some(0), String::new()), "{line}");
-    }
-    let (code, said) = shell("penup tape decode long.tape > /dev/full");
-    assert_eq!(code, Some(1));
-    assert!(said.starts_with("penup: cannot write the standard output: "), "{said}");
-    assert_eq!(shell("penup preview none.obj 2> /dev/full").0, Some(1));
 }
 
 /// A copy of a checkout: what tells one from other folders, and the program in its target
@@ -650,42 +410,6 @@ fn a_broken_emulator_is_reported_in_a_sentence() {
     assert!(details.contains("Object.<anonymous>"), "{details}");
 }
 
-#[test]
-fn a_drawing_is_written_for_other_machines() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let square = "v 10 10 0\nv 60 10 0\nv 60 60 0\nv 10 60 0\nv 80 20 0\nv 80 70 0\n\
-                  usemtl pen1\nl 1 2 3 4 1\nusemtl pen2\nl 5 6\n";
-    fs::write(folder.path().join("a.obj"), square).expect("written");
-    let export = |options: &[&str]| {
-        let all =
-            [&["preview", "a.obj", "--gcode", "a.gcode", "--hpgl", "a.plt"], options].concat();
-        let (code, said, error) = penup(folder.path(), &all);
-        assert_eq!(code, Some(0), "{error}");
-        assert!(said.starts_with("a.gcode, a.plt: 2 strokes, 250.0 mm drawn"), "{said}");
-        let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("readable");
-        (read("a.gcode"), read("a.plt"))
-    };
-    let ink = |file: &str| {
-        let (code, _, error) = penup(folder.path(), &["preview", file, "--json", "ink.json"]);
-        assert_eq!(code, Some(0), "{error}");
-        let json = fs::read_to_string(folder.path().join("ink.json")).expect("readable");
-        let result: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-        result["pen_down_mm"].as_f64().expect("a number")
-    };
-    let (gcode, hpgl) = export(&[]);
-    assert!(gcode.contains("(pen 2)\nM0\n") && hpgl.contains("SP2;"), "{gcode}{hpgl}");
-    for file in ["a.gcode", "a.plt"] {
-        // The files draw the same when they are read again.
-        assert!((ink(file) - 250.0).abs() < 0.1, "{file}");
-    }
-    let (thrice, _) = export(&["--multipass", "3"]);
-    let draws = |text: &str| text.matches("G1 ").count();
-    assert_eq!((draws(&gcode), draws(&thrice)), (5, 15));
-    assert_eq!(thrice.matches("M3").count(), 2, "{thrice}");
-    let (looped, _) = export(&["--reloop"]);
-    assert_eq!(draws(&looped), 5);
-}
-
 /// Of a machine whose steps are no grid on the page, the lines are computed, and not read from the
 /// pins.
 #[test]
@@ -708,27 +432,6 @@ fn broken_lines_are_broken_on_every_machine() {
             assert!(lifts.abs_diff(of_grid) <= 2, "{line_type} {setting}: {lifts}, not {of_grid}");
         }
     }
-}
-
-#[test]
-fn the_standard_output_takes_one_file_and_nothing_else() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nl 1 2\n").expect("written");
-    for (option, begin, end) in [
-        ("--svg", "<svg ", "</svg>\n"),
-        ("--gcode", "(penup ", "M2\n"),
-        ("--hpgl", "IN;", "SP0;\n"),
-        ("--json", "{", "}\n"),
-    ] {
-        let (code, said, error) = penup(folder.path(), &["preview", "a.obj", option, "-"]);
-        assert_eq!(code, Some(0), "{error}");
-        assert!(said.starts_with(begin) && said.ends_with(end), "{said}");
-        assert!(error.starts_with("-: 1 strokes, 50.0 mm drawn"), "{error}");
-    }
-    let (code, _, error) = penup(folder.path(), &["preview", "a.obj", "--svg=-", "--hpgl=-"]);
-    assert_eq!(code, Some(1));
-    assert!(error.contains("give each result a file of its own"), "{error}");
-    assert_eq!(files(folder.path()), ["a.obj"]);
 }
 
 #[test]
@@ -761,43 +464,4 @@ fn the_page_is_given_the_standard_input() {
     program.kill().expect("killed");
     program.wait().expect("it ends");
     assert!(answer.ends_with("\r\n\r\nv 1 2 3\n"), "{answer}");
-}
-
-#[test]
-fn what_a_preview_says_stands_in_its_json() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nv 60 35 0\nl 1 2\nl 2 3\n")
-        .expect("written");
-    let json = |options: &[&str]| {
-        let (code, said, error) =
-            penup(folder.path(), &[&["preview", "a.obj", "--json", "a.json"], options].concat());
-        assert_eq!(code, Some(0), "{error}");
-        let json = fs::read_to_string(folder.path().join("a.json")).expect("readable");
-        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
-        (said, json)
-    };
-    let (said, once) = json(&[]);
-    assert_eq!(once["bounds"], serde_json::json!([[10.0, 10.0, 0.0], [60.0, 35.0, 0.0]]));
-    assert_eq!(once["passes"], 1);
-    assert_eq!(once["page_mm"], serde_json::json!({ "width": 210.0, "height": 297.0 }));
-    let drawn = &once["drawn"];
-    let figures = format!(
-        "a.json: {} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %; the \
-         drawing reaches from 10, 10 to 60, 35 mm, 0:{:02.0} to draw\n",
-        drawn["strokes"],
-        drawn["pen_down_mm"].as_f64().expect("a number"),
-        drawn["pen_up_mm"].as_f64().expect("a number"),
-        drawn["efficiency_percent"].as_f64().expect("a number"),
-        once["duration_s"].as_f64().expect("a number").round(),
-    );
-    assert_eq!(said, figures);
-    let (said, twice) = json(&["--multipass", "2"]);
-    assert!(said.contains(", 2 passes, "), "{said}");
-    let of = |json: &serde_json::Value, name: &str| json[name].as_f64().expect("a number");
-    assert_eq!(of(&twice, "pen_down_mm"), of(&once, "pen_down_mm"));
-    assert!(of(&twice, "duration_s") > 1.8 * of(&once, "duration_s"));
-    assert!(of(&twice, "steps") > 1.8 * of(&once, "steps"));
-
-    let (_, turned) = json(&["--page", "A5", "--landscape"]);
-    assert_eq!(turned["page_mm"], serde_json::json!({ "width": 210.0, "height": 148.0 }));
 }

@@ -5,6 +5,8 @@
 //! error, with its number, its meaning, what the client says instead where the sentence for the
 //! serial line would not help, and that sentence. A new error is a variant, its row, and a sample
 //! of it in `samples.rs`; none of them can be forgotten, because the others then do not compile.
+//!
+//! The file is longer than 500 lines, because most of it is that one table.
 
 mod of_blocks;
 mod of_modules;
