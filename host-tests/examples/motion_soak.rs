@@ -12,31 +12,14 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::drawing::PagePoint;
-use penup_host_tests::event_checker::Run;
-use penup_host_tests::motion_cases::{Case, Orders};
-use penup_host_tests::motion_paths::{STEPS_PER_MM, draw, positions};
+use penup_host_tests::motion_cases::{Case, Orders, in_bends, number, random_curve};
+use penup_host_tests::motion_paths::draw;
 use penup_host_tests::random::Random;
 use std::panic::catch_unwind;
 use std::process::ExitCode;
 
 /// The jobs of each kind for one seed.
 const JOBS: u32 = 10;
-
-/// A number between two others.
-fn number(random: &mut Random, from: f64, to: f64) -> f64 {
-    from + (to - from) * random.below(1 << 40) as f64 / (1u64 << 40) as f64
-}
-
-/// Settings within the ranges of the property tests. `jerk` is the range of the decimal logarithm
-/// of the jerk in mm/s³.
-fn case(random: &mut Random, jerk: [f64; 2]) -> Case {
-    Case {
-        speed: number(random, 5.0, 120.0),
-        acceleration: number(random, 50.0, 5000.0),
-        jerk: 10f64.powf(number(random, jerk[0], jerk[1])),
-        deviation: number(random, 0.001, 0.5),
-    }
-}
 
 /// A random path; with `back`, one that turns back nearly into itself again and again.
 fn path(random: &mut Random, back: bool) -> Vec<PagePoint> {
@@ -53,45 +36,6 @@ fn path(random: &mut Random, back: bool) -> Vec<PagePoint> {
     }
     points.dedup();
     points
-}
-
-/// A random walk in small steps that bends smoothly, as drawings from a camera or a font do; and
-/// for each point how sharply it bends there, in 1/mm, before it is rounded to steps.
-fn curve(random: &mut Random) -> (Vec<PagePoint>, Vec<f64>) {
-    let mut bends = vec![0.0];
-    let mut points = vec![PagePoint { x: 20_000, y: 20_000 }];
-    let chord = number(random, 2.0, 40.0);
-    let (mut x, mut y, mut heading, mut bend) = (20_000.0f64, 20_000.0f64, 0.0f64, 0.0f64);
-    for _ in 0..random.between(20, 400) {
-        if random.once_in(12) {
-            let radius = 10f64.powf(number(random, 1.3, 4.0));
-            bend = chord / radius * random.one_of(&[-1.0, 0.0, 1.0]);
-        }
-        let turn = bend.clamp(-0.5, 0.5);
-        heading += turn;
-        *bends.last_mut().expect("never empty") = turn.abs() / chord * STEPS_PER_MM;
-        (x, y) = (x + chord * heading.cos(), y + chord * heading.sin());
-        points.push(PagePoint { x: x.round() as i32, y: y.round() as i32 });
-        bends.push(0.0);
-    }
-    (points, bends)
-}
-
-/// The greatest acceleration towards the centre of a bend, as a part of the limit, on lines that
-/// bend at both ends. Each line is at least a step long.
-fn centripetal(case: Case, points: &[PagePoint], bends: &[f64], run: &Run) -> f64 {
-    let places = positions(points);
-    let (mut first, mut greatest) = (0, 0.0f64);
-    for (ends, bends) in points.windows(2).zip(bends.windows(2)) {
-        let moves = (ends[1].x - ends[0].x).abs().max((ends[1].y - ends[0].y).abs()) as usize;
-        for index in first.max(1)..first + moves {
-            let speed =
-                (places[index] - places[index - 1]) / (run.times[index] - run.times[index - 1]);
-            greatest = greatest.max((speed - 0.1).powi(2) * bends[0].min(bends[1]));
-        }
-        first += moves;
-    }
-    greatest / case.acceleration
 }
 
 /// What was measured of the jobs of one kind: its names, limits, and the worst so far.
@@ -161,12 +105,12 @@ fn main() -> ExitCode {
         let mut random = Random::new(seed);
         for _ in 0..JOBS {
             let blocks = random.between(2, 129) as usize;
-            let now = case(&mut random, [2.7, 5.0]);
+            let now = Case::random(&mut random, [2.7, 5.0]);
             stroke(&mut worst[0], now, &path(&mut random, false), blocks);
-            let now = case(&mut random, [2.7, 5.9]);
+            let now = Case::random(&mut random, [2.7, 5.9]);
             stroke(&mut worst[1], now, &path(&mut random, true), blocks);
-            let now = case(&mut random, [2.7, 5.9]);
-            let (points, bends) = curve(&mut random);
+            let now = Case::random(&mut random, [2.7, 5.9]);
+            let (points, bends) = random_curve(&mut random);
             for (kind, case) in [(2, now), (3, Case { jerk: 0.0, ..now })] {
                 let measured = catch_unwind(|| {
                     let run = draw(&points, case.settings(), blocks);
@@ -174,7 +118,7 @@ fn main() -> ExitCode {
                     // What is known of the whole path beforehand is the most that can be known.
                     let all = draw(&points, case.settings(), points.len());
                     let [bend, known] =
-                        [&run, &all].map(|run| centripetal(case, &points, &bends, run));
+                        [&run, &all].map(|run| in_bends(case, &points, &bends, run));
                     let bend = bend / known.max(1.0);
                     [nearness.acceleration, nearness.jerk, bend]
                 });

@@ -7,6 +7,7 @@ use crate::event_checker::{self, Ratios, Run};
 use crate::motion_optimum::{Limits, squared_limits};
 use crate::motion_paths::{STEPS_PER_MM, circle, positions, settings, steps};
 use crate::pin_machine;
+use crate::random::Random;
 use penup::drawing::{LineType, PagePoint};
 use penup::machine::{Setting, Settings, State, Target, TargetList, Value};
 
@@ -38,6 +39,17 @@ pub struct Nearness {
 }
 
 impl Case {
+    /// Settings within the ranges of the property tests. `jerk` is the range of the decimal logarithm
+    /// of the jerk in mm/s³.
+    pub fn random(random: &mut Random, jerk: [f64; 2]) -> Self {
+        Self {
+            speed: number(random, 5.0, 120.0),
+            acceleration: number(random, 50.0, 5000.0),
+            jerk: 10f64.powf(number(random, jerk[0], jerk[1])),
+            deviation: number(random, 0.001, 0.5),
+        }
+    }
+
     /// The settings of the machine, with bends limited.
     pub fn settings(self) -> Settings {
         let mut settings = settings(self.speed, self.acceleration, self.deviation, true);
@@ -192,4 +204,48 @@ impl Orders {
         }
         event_checker::speed_ratios(&drawn.runs, &targets, &settings, false)
     }
+}
+
+/// A number between two others.
+pub fn number(random: &mut Random, from: f64, to: f64) -> f64 {
+    from + (to - from) * random.below(1 << 40) as f64 / (1u64 << 40) as f64
+}
+
+/// A random walk in small steps that bends smoothly, as drawings from a camera or a font do; and
+/// for each point how sharply it bends there, in 1/mm, before it is rounded to steps.
+pub fn random_curve(random: &mut Random) -> (Vec<PagePoint>, Vec<f64>) {
+    let mut bends = vec![0.0];
+    let mut points = vec![PagePoint { x: 20_000, y: 20_000 }];
+    let chord = number(random, 2.0, 40.0);
+    let (mut x, mut y, mut heading, mut bend) = (20_000.0f64, 20_000.0f64, 0.0f64, 0.0f64);
+    for _ in 0..random.between(20, 400) {
+        if random.once_in(12) {
+            let radius = 10f64.powf(number(random, 1.3, 4.0));
+            bend = chord / radius * random.one_of(&[-1.0, 0.0, 1.0]);
+        }
+        let turn = bend.clamp(-0.5, 0.5);
+        heading += turn;
+        *bends.last_mut().expect("never empty") = turn.abs() / chord * STEPS_PER_MM;
+        (x, y) = (x + chord * heading.cos(), y + chord * heading.sin());
+        points.push(PagePoint { x: x.round() as i32, y: y.round() as i32 });
+        bends.push(0.0);
+    }
+    (points, bends)
+}
+
+/// The greatest acceleration towards the centre of a bend, as a part of the limit, on lines that
+/// bend at both ends. Each line is at least a step long.
+pub fn in_bends(case: Case, points: &[PagePoint], bends: &[f64], run: &Run) -> f64 {
+    let places = positions(points);
+    let (mut first, mut greatest) = (0, 0.0f64);
+    for (ends, bends) in points.windows(2).zip(bends.windows(2)) {
+        let moves = (ends[1].x - ends[0].x).abs().max((ends[1].y - ends[0].y).abs()) as usize;
+        for index in first.max(1)..first + moves {
+            let speed =
+                (places[index] - places[index - 1]) / (run.times[index] - run.times[index - 1]);
+            greatest = greatest.max((speed - 0.1).powi(2) * bends[0].min(bends[1]));
+        }
+        first += moves;
+    }
+    greatest / case.acceleration
 }

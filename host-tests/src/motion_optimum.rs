@@ -78,18 +78,36 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
     sharp.dedup();
     if limits.centripetal {
         for ends in sharp.windows(2) {
+            // The least radius of the tight bends that smaller strides have found up to each point.
+            let mut found = vec![f64::INFINITY; points.len()];
             for stride in [2usize, 4, 8, 16, 32, 64] {
+                let smaller = std::mem::replace(&mut found, vec![f64::INFINITY; points.len()]);
+                let (mut now, mut earlier) = (f64::INFINITY, f64::INFINITY);
                 let mut tight_before = None;
-                let mut last = ends[0] + 2 * stride;
+                let mut last = ends[0] + stride;
                 while last <= ends[1] {
+                    now = now.min(smaller[last - stride / 2]).min(smaller[last]);
+                    if last < ends[0] + 2 * stride {
+                        found[last] = smaller[last];
+                        last += stride;
+                        continue;
+                    }
+                    let known = now.min(earlier);
+                    (earlier, now) = (now, f64::INFINITY);
                     let middle = last - stride;
                     let is_first = middle - stride == ends[0];
                     let outer = (points[middle - stride], points[last]);
                     let circle = circle(outer.0, points[middle], outer.1, limits.step);
                     let is_last = last + stride > ends[1];
-                    // A tight bend has the whole circle and a stride on both sides. Another circle
-                    // applies to half of its arc; at the ends of a curve, to all of it.
+                    let is_known = circle.is_some_and(|(radius, _)| known <= radius / 2.0);
+                    found[last] = circle
+                        .filter(|circle| circle.1)
+                        .map_or(known, |(radius, _)| known.min(radius));
+                    // A tight bend has the whole circle and a stride on both sides, but not beside
+                    // one that is known to be much narrower. Another circle applies to half of its
+                    // arc; at the ends of a curve, to all of it.
                     let (from, to) = match circle {
+                        Some((_, true)) if is_known => (last - 2 * stride, last),
                         Some((_, true)) => (last.saturating_sub(3 * stride).max(ends[0]), last),
                         _ if tight_before.is_some() => (last - stride, last),
                         _ if is_first => (ends[0], middle + stride / 2),
@@ -106,7 +124,7 @@ pub fn squared_limits(points: &[Point], limits: Limits) -> (Vec<f64>, Vec<f64>) 
                         }
                     }
                     tight_before = circle
-                        .filter(|circle| limits.beside_bends && circle.1)
+                        .filter(|circle| limits.beside_bends && circle.1 && !is_known)
                         .map(|circle| circle.0);
                     last += stride;
                 }

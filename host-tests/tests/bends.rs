@@ -5,8 +5,9 @@
 
 use penup::board_table::{LM3S6965, PICO};
 use penup_host_tests::half_circles::{HalfCircles, Straights};
-use penup_host_tests::motion_cases::Case;
+use penup_host_tests::motion_cases::{Case, in_bends, random_curve};
 use penup_host_tests::motion_paths::{draw, positions, steps};
+use penup_host_tests::random::Random;
 
 /// The radius is known to a few percent only where it is a few steps: of 10 steps, one may be
 /// rounding. So these figures are measured, and the limit is 1.
@@ -34,6 +35,24 @@ fn half_circles_keep_the_acceleration_from_their_first_chord_to_their_last() {
                     }
                 }
             }
+        }
+    }
+}
+
+/// At these seeds a bend was passed too fast, because a circle through points far apart, which only
+/// blurred a narrower one, became known too late where the blocks are few.
+#[test]
+fn few_blocks_pass_bends_as_the_whole_path_does() {
+    for seed in [6759, 7536] {
+        let mut random = Random::new(seed);
+        let case = Case::random(&mut random, [2.7, 5.9]);
+        let blocks = random.between(2, 129) as usize;
+        let (points, bends) = random_curve(&mut random);
+        for case in [case, Case { jerk: 0.0, ..case }] {
+            let [few, all] = [blocks, points.len()].map(|blocks| {
+                in_bends(case, &points, &bends, &draw(&points, case.settings(), blocks))
+            });
+            assert!(few <= 1.3 * all.max(1.0), "{seed} {case:?} {blocks}: {few:.2}, not {all:.2}");
         }
     }
 }

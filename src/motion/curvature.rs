@@ -10,8 +10,11 @@
 //! angle between the two chords, more than 21°, proves that it is a bend, so the height is reduced
 //! by only a quarter of what rounding can explain. Such a circle is valid for its whole arc and for
 //! one more stride on both sides, because there are fewer points than that between the beginning of
-//! the bend and the first circle that lies within it. Beside a line much longer than the chords, a
-//! curve begins or ends, so no circle joins the two ([`Curvature::restart`]).
+//! the bend and the first circle that lies within it. But where smaller strides have found a bend at
+//! most half as wide in it, they know better where that begins and ends: the circle only blurs it,
+//! and is valid for its own arc alone. (Otherwise it would slow the machine far from the bend, and
+//! come too late for that.) Beside a line much longer than the chords, a curve begins or ends, so no
+//! circle joins the two ([`Curvature::restart`]).
 
 use super::{Limits, Lookahead, PathLength};
 use crate::drawing::PagePoint;
@@ -40,6 +43,9 @@ struct Level {
     points: [PathPoint; 2],
     /// The last circle.
     circle: Circle,
+    /// The lowest limits of tight bends that smaller strides have found: since that circle, and
+    /// since the one before it.
+    found: [PathLength; 2],
 }
 
 /// The limit that results from a circle through three points.
@@ -48,7 +54,7 @@ struct Circle {
     /// Half the radius of the circle, which is the greatest stopping distance; 0 if it limits
     /// nothing.
     limit: PathLength,
-    /// Whether the circle is that of a tight bend.
+    /// Whether the circle is that of a tight bend, and is valid beside its arc, too.
     is_tight: bool,
 }
 
@@ -78,7 +84,8 @@ impl Curvature {
         blocks.end_curve();
         self.count = 0;
         let points = [path_point(limits, point); 2];
-        self.levels = [Level { points, circle: Circle::default() }; LEVELS];
+        let found = [PathLength::MAX; 2];
+        self.levels = [Level { points, circle: Circle::default(), found }; LEVELS];
     }
 
     /// Extends the path to `point`, the end of the last block of `blocks`, and limits the blocks
@@ -90,8 +97,10 @@ impl Curvature {
     pub(super) fn extend(&mut self, limits: &Limits, point: PagePoint, blocks: &mut Lookahead<'_>) {
         let latest = path_point(limits, point);
         self.count = self.count.wrapping_add(1);
+        let mut found = PathLength::MAX;
         for (number, level) in (1u32..).zip(self.levels.iter_mut()) {
             let stride = 1 << number;
+            level.found[0] = level.found[0].min(found);
             if !self.count.is_multiple_of(stride) {
                 return;
             }
@@ -102,13 +111,22 @@ impl Curvature {
             }
             let before =
                 core::mem::replace(&mut level.circle, circle(limits, first, middle, latest));
+            let [now, earlier] = level.found;
+            let known = now.min(earlier);
+            level.found = [PathLength::MAX, now];
             let Circle { mut limit, is_tight } = level.circle;
+            found = found.min(known);
+            let is_known = known <= limit / 2;
+            if is_tight {
+                found = found.min(limit);
+                level.circle.is_tight = !is_known;
+            }
             let (mut least, mut most) = (1, stride);
             if before.is_tight && (limit == 0 || limit > before.limit) {
                 limit = before.limit;
             }
             if is_tight {
-                most = (3 * stride).min(self.count);
+                most = ((if is_known { 2 } else { 3 }) * stride).min(self.count);
             } else if !before.is_tight {
                 // The circle spans the last two strides. It is valid for the middle half, and for
                 // the beginning of the curve.
