@@ -1,5 +1,8 @@
 //! Carries out the blocks of the look-ahead: plans their speed slice by slice, and hands over the
 //! events of moves, pen changes and dwells.
+//!
+//! The file is longer than 500 lines, because most of it are the short questions and orders of the
+//! machine. What takes thought is in `append`, `plan` and `pen_moves`.
 
 mod append;
 #[cfg_attr(not(feature = "pen-overlap"), path = "runner/pen_at_rest.rs")]

@@ -1,5 +1,8 @@
 //! Emulates a Raspberry Pi Pico in rp2040js through the script `pico.mjs`, which describes the
 //! protocol between both.
+//!
+//! The file is longer than 500 lines, because it is the list of what the script can be told to do
+//! to a board: each method sends one order of that protocol.
 
 mod flash;
 mod interrupt_times;

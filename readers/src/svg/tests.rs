@@ -1,4 +1,6 @@
 //! Tests of what an SVG draws: the lines that are sent are compared with the SVG's own geometry.
+//!
+//! The file is longer than 500 lines, because it is a list of short cases.
 
 use super::*;
 use crate::SourceFile;
