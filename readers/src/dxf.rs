@@ -1,13 +1,13 @@
-//! Reads DXF, as text or binary, as plans: lines, polylines with bulges, arcs, circles, ellipses and
-//! splines, points, level faces, dimensions and texts, also in blocks, as they are seen from above,
-//! with the dashes of their line types.
+//! Reads DXF, as text or binary, as plans: lines, polylines with bulges, arcs, circles, ellipses
+//! and splines, points, level faces, dimensions and texts, also in blocks, as they are seen from
+//! above, with the dashes of their line types.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
 //! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
 //! refuses a file that does not consist of pairs of a code and a value.
 //!
-//! The file is longer than 500 lines, because it is the list of the entities of DXF: each is drawn by
-//! the same placement on the page and pen.
+//! The file is longer than 500 lines, because it is the list of the entities of DXF: each is drawn
+//! by the same placement on the page and pen.
 
 mod binary;
 mod curves;

@@ -13,8 +13,9 @@
 //! Lengths are counted in units of 2a·4^k ticks², with k such that the longest step is just below
 //! 2^16 units. Then the interval is 2^k·ℓ/√s ticks, which takes a product of 32 bits and a shift.
 //!
-//! The file is longer than 500 lines, because both sides of the rule are here: what the planner says
-//! of each step, and what the interrupt does with it. One cannot be understood without the other.
+//! The file is longer than 500 lines, because both sides of the rule are here: what the planner
+//! says of each step, and what the interrupt does with it. One cannot be understood without the
+//! other.
 
 use super::limits::hypotenuse;
 use super::{Limits, StepEvent};

@@ -10,11 +10,11 @@
 //! angle between the two chords, more than 21°, proves that it is a bend, so the height is reduced
 //! by only a quarter of what rounding can explain. Such a circle is valid for its whole arc and for
 //! one more stride on both sides, because there are fewer points than that between the beginning of
-//! the bend and the first circle that lies within it. But where smaller strides have found a bend at
-//! most half as wide in it, they know better where that begins and ends: the circle only blurs it,
-//! and is valid for its own arc alone. (Otherwise it would slow the machine far from the bend, and
-//! come too late for that.) Beside a line much longer than the chords, a curve begins or ends, so no
-//! circle joins the two ([`Curvature::restart`]).
+//! the bend and the first circle that lies within it. But where smaller strides have found a bend
+//! at most half as wide in it, they know better where that begins and ends: the circle only blurs
+//! it, and is valid for its own arc alone. (Otherwise it would slow the machine far from the bend,
+//! and come too late for that.) Beside a line much longer than the chords, a curve begins or ends,
+//! so no circle joins the two ([`Curvature::restart`]).
 
 use super::{Limits, Lookahead, PathLength};
 use crate::drawing::PagePoint;

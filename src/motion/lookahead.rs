@@ -378,8 +378,8 @@ impl<'m> Lookahead<'m> {
     /// bends that later points may reveal.
     ///
     /// At a distance D before the end, a bend that only later points reveal is so wide that the
-    /// stopping distance may be D² over [`Limits::surely_known`]. From further away the machine can brake
-    /// to that.
+    /// stopping distance may be D² over [`Limits::surely_known`]. From further away the machine can
+    /// brake to that.
     pub(super) fn stopping_distance_at(&self, to_end: u64, limits: &Limits) -> u64 {
         if !limits.centripetal || self.is_empty() {
             return to_end;

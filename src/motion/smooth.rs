@@ -17,8 +17,8 @@
 //! An acceleration is represented by its *ramp*: the time for which the jerk has built it up, in
 //! sixteenths of slices, negative for braking. Then all changes are polynomials in whole numbers.
 //!
-//! The file is longer than 500 lines, because the plan asks for distances and times of a ramp in whole
-//! numbers, and both must round in the same way.
+//! The file is longer than 500 lines, because the plan asks for distances and times of a ramp in
+//! whole numbers, and both must round in the same way.
 
 use super::limits::square;
 use super::profile::Slice;

@@ -135,8 +135,8 @@ impl Kinematics {
         }
     }
 
-    /// The anchors of the belts, where lines on the page must be cut into segments that are straight
-    /// for the motors too. `None` if the motors make straight lines of all.
+    /// The anchors of the belts, where lines on the page must be cut into segments that are
+    /// straight for the motors too. `None` if the motors make straight lines of all.
     pub(super) fn belts(self) -> Option<Anchors> {
         match self {
             Self::Cartesian | Self::CoreXy => None,
