@@ -21,7 +21,7 @@ use penup::index::Index;
 use penup::machine;
 use penup_job::picture::Picture;
 use penup_job::protocol::{GO_ON_AT_ORIGIN, Status};
-use penup_job::results::JobReport;
+use penup_job::results::{JobReport, counted_strokes};
 use penup_job::room::Room;
 use penup_job::streamed::{Form, StreamedJob};
 use penup_readers::lines::Lines;
@@ -155,7 +155,8 @@ impl Plot<'_> {
         let (streamed, report) = host.streamed(form, self.args.from)?;
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(
-            "{strokes} strokes with {points} points are sent, {:.1} bytes a point",
+            "it sends {} with {points} points, {:.1} bytes a point",
+            counted_strokes(strokes.into()),
             streamed.bytes() as f64 / f64::from(points.max(1))
         )]);
         self.send(sender, &streamed, self.args.from, passes, progress)?;

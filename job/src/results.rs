@@ -149,13 +149,18 @@ impl JobReport {
     }
 }
 
+/// A number of strokes with its noun.
+pub fn counted_strokes(number: u64) -> String {
+    format!("{number} {}", if number == 1 { "stroke" } else { "strokes" })
+}
+
 impl fmt::Display for JobReport {
     fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { strokes, pen_down_mm, pen_up_mm, efficiency } = self;
         write!(
             formatter,
-            "{strokes} strokes, {pen_down_mm} mm drawn, {pen_up_mm} mm between them, \
-             efficiency {efficiency} %"
+            "{}, {pen_down_mm} mm drawn, {pen_up_mm} mm between them, efficiency {efficiency} %",
+            counted_strokes(*strokes)
         )
     }
 }

@@ -393,7 +393,9 @@ fn judge(code: Option<i32>, said: &str, path: &str) -> Fate {
 
 /// How many strokes the client says that it has drawn.
 fn strokes(said: &str) -> Option<u64> {
-    let counts = said.lines().filter_map(|line| Some(line.split_once(" strokes, ")?.0));
+    let counts = (said.lines())
+        .filter_map(|line| line.split_once(" strokes, ").or(line.split_once(" stroke, ")))
+        .map(|(before, _)| before);
     counts.filter_map(|before| before.rsplit(' ').next()?.parse().ok()).next_back()
 }
 
@@ -426,7 +428,7 @@ mod tests {
         assert!(matches!(judge(None, "", "a.svg"), Fate::Panicked(_)));
         assert!(matches!(judge(Some(2), "", "a.svg"), Fate::Panicked(_)));
         let noted =
-            "penup: note: a.svg: it sends the strokes, and more\na.svg: 1 strokes, 9 mm drawn";
+            "penup: note: a.svg: it sends the strokes, and more\na.svg: 1 stroke, 9 mm drawn";
         assert!(matches!(judge(Some(0), noted, "a.svg"), Fate::Drawn));
         let refused =
             "penup: note: /b/a.obj: no unit\npenup: /b/a.obj:12: face 7 has 2 corners\n    f 1 2\n";

@@ -219,7 +219,7 @@ fn everything_is_drawn_so_many_times() {
     let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
     let (code, said, error) = run(&["plot", "a.obj", "--port", "auto", "--multipass", "3"]);
     assert_eq!(code, Some(0), "{error}");
-    assert!(said.starts_with("a.obj is drawn 3 times: 1 strokes, 50.0 mm drawn"), "{said}");
+    assert!(said.starts_with("a.obj is drawn 3 times: 1 stroke, 50.0 mm drawn"), "{said}");
 }
 
 #[test]
@@ -393,7 +393,7 @@ fn what_the_machine_cannot_draw_is_told_before_it_is_sent() {
     assert_eq!(run(&["set", "130=420"]).0, Some(0));
     let (code, said, error) = run(&["plot", "a.obj", "--page", "A3", "--port", "auto"]);
     assert_eq!(code, Some(0), "{error}");
-    assert!(said.starts_with("a.obj is drawn: 1 strokes, 270.0 mm drawn"), "{said}");
+    assert!(said.starts_with("a.obj is drawn: 1 stroke, 270.0 mm drawn"), "{said}");
 }
 
 #[test]

@@ -264,7 +264,7 @@ fn a_trace_is_fitted_and_the_curves_are_drawn() {
     let (code, said, error) = penup(folder.path(), &["preview", "arc-fitted.obj"]);
     assert_eq!(code, Some(0), "{error}");
     // Half the circumference.
-    assert!(said.contains("1 strokes, 157."), "{said}");
+    assert!(said.contains("1 stroke, 157."), "{said}");
     let (code, _, error) = penup(folder.path(), &["fit", "arc-fitted.obj"]);
     assert_eq!(code, Some(1));
     assert!(error.contains("no polyline"), "{error}");

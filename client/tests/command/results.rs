@@ -186,7 +186,7 @@ fn the_standard_output_takes_one_file_and_nothing_else() {
         let (code, said, error) = penup(folder.path(), &["preview", "a.obj", option, "-"]);
         assert_eq!(code, Some(0), "{error}");
         assert!(said.starts_with(begin) && said.ends_with(end), "{said}");
-        assert!(error.starts_with("-: 1 strokes, 50.0 mm drawn"), "{error}");
+        assert!(error.starts_with("-: 1 stroke, 50.0 mm drawn"), "{error}");
     }
     let (code, _, error) = penup(folder.path(), &["preview", "a.obj", "--svg=-", "--hpgl=-"]);
     assert_eq!(code, Some(1));
@@ -213,7 +213,7 @@ fn what_a_preview_says_stands_in_its_json() {
     assert_eq!(once["page_mm"], serde_json::json!({ "width": 210.0, "height": 297.0 }));
     let drawn = &once["drawn"];
     let figures = format!(
-        "a.json: {} strokes, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %; the \
+        "a.json: {} stroke, {:.1} mm drawn, {:.1} mm between them, efficiency {:.1} %; the \
          drawing reaches from 10, 10 to 60, 35 mm, 0:{:02.0} to draw\n",
         drawn["strokes"],
         drawn["pen_down_mm"].as_f64().expect("a number"),

@@ -226,7 +226,7 @@ fn a_drawing_goes_on_at_the_stroke_that_is_told() {
     let plot = |from: &str| run(&["plot", "a.obj", "--port", "auto", "--from", from]);
     let (code, _, noted) = plot("1");
     assert_eq!(code, Some(0), "{noted}");
-    assert!(noted.contains("1 strokes with 2 points are sent"), "{noted}");
+    assert!(noted.contains("it sends 1 stroke with 2 points"), "{noted}");
     let (code, _, noted) = plot("2");
     assert_ne!(code, Some(0), "there is nothing behind the last stroke: {noted}");
 }
