@@ -39,8 +39,8 @@ pub struct Nearness {
 }
 
 impl Case {
-    /// Settings within the ranges of the property tests. `jerk` is the range of the decimal logarithm
-    /// of the jerk in mm/s³.
+    /// Settings within the ranges of the property tests. `jerk` is the range of the decimal
+    /// logarithm of the jerk in mm/s³.
     pub fn random(random: &mut Random, jerk: [f64; 2]) -> Self {
         Self {
             speed: number(random, 5.0, 120.0),

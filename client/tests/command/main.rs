@@ -145,8 +145,8 @@ fn only_a_board_limits_a_preview() {
     let (code, _, refused) = penup(folder.path(), &[&preview[..], &["--board", "pico"]].concat());
     assert_eq!(code, Some(4));
     assert!(refused.contains("4096"), "{refused}");
-    let strokes = "The memory of pico does not hold this model, but `penup plot` draws it: it sends \
-                   the strokes. A preview without --board shows them.\n";
+    let strokes = "The memory of pico does not hold this model, but `penup plot` draws it: it \
+                   sends the strokes. A preview without --board shows them.\n";
     assert!(refused.ends_with(strokes), "{refused}");
     // A solid may go to the flash of a board that has room for it.
     let solid =
