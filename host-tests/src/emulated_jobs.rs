@@ -18,7 +18,7 @@ const TIMEOUT: Duration = Duration::from_secs(300);
 pub const STAGES: [&str; 5] = [
     "5penup4view4clip13project_scene17h",
     "5penup10visibility14find_stretches17h",
-    "5penup5order11pair_points17h",
+    "5penup5order7pairing11pair_points17h",
     "5penup5order7improve7improve17h",
     "5penup5order10order_pens17h",
 ];
