@@ -41,8 +41,9 @@ impl Rounding {
         let decimals = u32::from(self.decimals);
         let half = match 10u64.checked_pow(decimals) {
             _ if decimals < FEWEST_ROUNDED => 0,
-            // At most 2^30. Twice 10^19 is no number of 64 bits.
-            Some(power) => ((1 << fraction_bits) / power / 2) as u32 + 1,
+            // At most 2^30. Twice 10^19 is no number of 64 bits. The compiler does not know that no
+            // power is 0.
+            Some(power) => ((1 << fraction_bits) / power.max(1) / 2) as u32 + 1,
             None => 1,
         };
         let written = (half + unit).max(self.edited);
