@@ -4,19 +4,28 @@
 //! may lift a pen. [`signals`] decides on the whole program which of them does.
 //!
 //! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
-//! reader refuses arcs that do not exist, and numbers that it cannot read.
+//! reader refuses arcs that do not exist, numbers that it cannot read, and what would change where
+//! the pen goes in a way that it does not follow: subprograms, loops, splines, turned coordinates.
+//!
+//! A move in the coordinates of the machine (`G53`) goes to a place that only the machine knows, as
+//! to where it parks. It is not drawn; along z it lifts the pen. Ink that would begin at such a
+//! place is refused.
 
+mod extruder;
 mod moves;
 mod signals;
+mod text;
 
 use super::arrange::Arrangement;
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::Plan;
 use crate::lines::Origin;
+use extruder::Extruder;
 use moves::{Moves, Signals};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use text::{Line, parse};
 
 /// The format itself.
 #[derive(Debug)]
@@ -24,6 +33,9 @@ pub(super) struct GCode;
 
 /// The greatest distance between an arc and its chords, in mm: less than half a usual step.
 const CHORD_ERROR: f64 = 0.005;
+
+/// The motion of the cycles that drill holes (`G81` and others).
+const DRILLING: u8 = 80;
 
 /// The most points of a program. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
@@ -35,7 +47,7 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
 /// The modes of a program, and the moves that it has made so far.
 #[derive(Debug)]
 struct Interpreter {
-    /// The number of the mode G0 to G3.
+    /// The number of the mode G0 to G3, or [`DRILLING`].
     motion: u8,
     is_relative: bool,
     /// Whether I and J are positions (G90.1) rather than distances.
@@ -49,6 +61,11 @@ struct Interpreter {
     moves: Moves,
     /// Whether a height was given as such, and not as a distance.
     has_absolute_heights: bool,
+    extruder: Extruder,
+    /// For x and y, the line of the `G53` after which the position is not known.
+    unplaced: [Option<u32>; 2],
+    /// The number of moves along x or y by `G53`, and the line of the first.
+    machine_moves: (usize, usize),
     /// The words that were not obeyed, with their count and the first line.
     unknown: BTreeMap<String, (usize, usize)>,
 }
@@ -68,6 +85,9 @@ impl Interpreter {
             signals: Signals::default(),
             moves: Moves::from([0.0; 2]),
             has_absolute_heights: false,
+            extruder: Extruder::default(),
+            unplaced: [None; 2],
+            machine_moves: (0, 0),
             unknown: BTreeMap::new(),
         }
     }
@@ -76,23 +96,50 @@ impl Interpreter {
         self.unknown.entry(word).or_insert((0, line)).0 += 1;
     }
 
+    /// Says which words were not obeyed, and which moves go to places of the machine.
+    fn notes(&self) -> impl Iterator<Item = String> {
+        let machine_moves = match self.machine_moves {
+            (0, _) => None,
+            (1, line) => Some(format!(
+                "1 move goes to a place of the machine (G53 in line {line}), which is not known \
+                 here, and is not drawn"
+            )),
+            (count, line) => Some(format!(
+                "{count} moves go to places of the machine (G53, the first in line {line}), which \
+                 are not known here, and are not drawn"
+            )),
+        };
+        let unknown = self.unknown.iter().map(|(word, (count, line))| match count {
+            1 => format!("{word} has no meaning for a drawing (line {line})"),
+            _ => format!(
+                "{count} words {word} have no meaning for a drawing (the first in line {line})"
+            ),
+        });
+        machine_moves.into_iter().chain(unknown)
+    }
+
     /// Carries out a line. Returns whether the program continues after it.
     fn line(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
-        let text = without_comments(text);
-        let text = text.trim();
-        // A block delete, a mark of the beginning or end, or a setting of the machine.
-        if text.starts_with(['/', '%', '$']) || text.is_empty() {
-            return Ok(true);
-        }
-        let words = words(text)?;
+        let words = match parse(text)? {
+            Line::Words(words) => words,
+            Line::Skipped => return Ok(true),
+            Line::Command(name) => {
+                self.skip(name, number);
+                return Ok(true);
+            }
+        };
         let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
         let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
-        let mut servo = false;
+        let (mut servo, mut of_machine) = (false, false);
+        let (mut is_move, mut is_unknown) = (false, false);
         for &(letter, value) in &words {
             // Codes have at most one decimal, as G91.1.
             let code = (value * 10.0).round() as i64;
             match (letter, code) {
-                ('G', 0 | 10 | 20 | 30) => self.motion = (code / 10) as u8,
+                ('G', 0 | 10 | 20 | 30) => {
+                    (self.motion, is_move) = ((code / 10) as u8, true);
+                }
+                ('G', 530) => of_machine = true,
                 ('G', 200) => self.unit = 25.4,
                 ('G', 210) => self.unit = 1.0,
                 ('G', 900) => self.is_relative = false,
@@ -102,16 +149,44 @@ impl Interpreter {
                 ('G', 920) => (moves, sets_position) = (false, true),
                 ('G', 921) => self.origin = [0.0; 3],
                 ('G', 180 | 190) => return Err("arcs in other planes are not drawn".to_owned()),
+                ('G', 50..=52 | 60..=62 | 160 | 510 | 511 | 680) => {
+                    return Err(format!(
+                        "{letter}{value} changes where the pen goes in a way that is not read: let \
+                         the program that wrote this file write lines and arcs only"
+                    ));
+                }
+                ('M', 970 | 980) | ('G', 650 | 660) => {
+                    return Err(format!(
+                        "{letter}{value} calls a subprogram, which is not followed: let the \
+                         program that wrote this file write it without subprograms"
+                    ));
+                }
+                // Drilling moves to the hole as by G0; its Z and R are depths.
+                ('G', 730 | 810..=890) => {
+                    (self.motion, is_move) = (DRILLING, true);
+                    self.skip(format!("{letter}{value}"), number);
+                }
+                // The radius of the cutter is that of the pen, which is none.
+                ('G', 410 | 420) => self.skip(format!("{letter}{value}"), number),
+                ('G', 800) => self.motion = 0,
+                ('M', 820) => self.extruder.is_relative = false,
+                ('M', 830) => self.extruder.is_relative = true,
                 // A dwell, offsets and the places of the machine.
                 ('G', 40 | 100 | 280 | 281 | 300 | 301) => moves = false,
-                ('G', 170 | 400 | 490 | 540..=590 | 610 | 640 | 800 | 940) => {}
+                ('G', 170 | 400 | 430 | 490 | 540..=590 | 610 | 640 | 940) => {}
                 ('M', 30 | 40) => self.signals.spindle = Some(true),
                 ('M', 50) => self.signals.spindle = Some(false),
                 ('M', 2800 | 3000) => servo = true,
                 ('M', 20 | 300) => goes_on = false,
                 ('M', 0 | 10 | 60 | 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
-                ('G' | 'M', _) => self.skip(format!("{letter}{value}"), number),
-                ('X' | 'Y' | 'Z' | 'I' | 'J' | 'R' | 'F' | 'N' | 'P' | 'S' | 'T' | 'E', _) => {}
+                ('G' | 'M', _) => {
+                    is_unknown = true;
+                    self.skip(format!("{letter}{value}"), number);
+                }
+                (
+                    'X' | 'Y' | 'Z' | 'I' | 'J' | 'R' | 'F' | 'N' | 'P' | 'S' | 'T' | 'E' | 'H',
+                    _,
+                ) => {}
                 (letter, _) => self.skip(letter.to_string(), number),
             }
         }
@@ -125,13 +200,52 @@ impl Interpreter {
                 let now = if axis < 2 { self.moves.at()[axis] } else { self.height };
                 if let Some(value) = value(letter) {
                     self.origin[axis] = now - value * self.unit;
+                    // Before the first move, this is where the drawing begins.
+                    if self.moves.len() == 0
+                        && let Some(unplaced) = self.unplaced.get_mut(axis)
+                    {
+                        *unplaced = None;
+                    }
                 }
             }
         }
-        if moves {
+        if sets_position && let Some(value) = value('E') {
+            self.extruder.set(value);
+        }
+        // The X and Y of an unknown word, as of M201, are no coordinates.
+        if !moves || is_unknown && !is_move {
+            return Ok(goes_on);
+        }
+        if of_machine {
+            self.go_to_machine_place(&value, number)?;
+        } else {
             self.advance(&value, number)?;
         }
         Ok(goes_on)
+    }
+
+    /// Moves to coordinates of the machine, which are no place of the drawing.
+    fn go_to_machine_place(
+        &mut self,
+        value: &impl Fn(char) -> Option<f64>,
+        number: usize,
+    ) -> Result<(), RefusalText> {
+        if self.motion > 1 {
+            return Err("G53 is for G0 and G1 only".to_owned());
+        }
+        self.signals.is_parked |= value('Z').is_some();
+        let mut moves = false;
+        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
+            if value(letter).is_some() {
+                *unplaced = Some(u32::try_from(number).unwrap_or(u32::MAX));
+                moves = true;
+            }
+        }
+        if moves {
+            let (count, first) = self.machine_moves;
+            self.machine_moves = (count + 1, if count == 0 { number } else { first });
+        }
+        Ok(())
     }
 
     /// Moves to the coordinates of a line.
@@ -146,7 +260,11 @@ impl Interpreter {
             Some(value) if is_relative => now + value * unit,
             Some(value) => origin[axis] + value * unit,
         };
-        if value('Z').is_some() {
+        let extrudes = value('E').is_some_and(|to| self.extruder.advance(to, is_relative));
+        self.signals.extrudes = extrudes;
+        let drills = self.motion == DRILLING;
+        if value('Z').is_some() && !drills {
+            self.signals.is_parked &= is_relative;
             let before = self.height;
             self.height = target('Z', 2, self.height);
             self.has_absolute_heights |= !is_relative;
@@ -157,19 +275,27 @@ impl Interpreter {
         }
         let at = self.moves.at();
         let to = [target('X', 0, at[0]), target('Y', 1, at[1])];
-        let is_arc = self.motion >= 2 && ['I', 'J', 'R'].into_iter().any(|it| value(it).is_some());
+        let is_arc = matches!(self.motion, 2 | 3)
+            && ['I', 'J', 'R'].into_iter().any(|it| value(it).is_some());
         if value('X').is_none() && value('Y').is_none() && !is_arc {
             return Ok(());
         }
+        self.signals.unplaced = self.unplaced[0].or(self.unplaced[1]);
+        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
+            if value(letter).is_some() && !is_relative {
+                *unplaced = None;
+            }
+        }
         let mut points = Vec::new();
-        if self.motion >= 2 {
+        if matches!(self.motion, 2 | 3) {
             self.arc(to, value, &mut points)?;
         }
         points.push(to);
         if self.moves.point_count() + points.len() > MOST_POINTS {
             return Err("the program has too many points: leave a part of it out".to_owned());
         }
-        self.moves.push(number, self.motion == 0, self.signals, &points);
+        let is_rapid = self.motion == 0 || drills;
+        self.moves.push(number, is_rapid, self.signals, &points);
         Ok(())
     }
 
@@ -227,44 +353,6 @@ impl Interpreter {
     }
 }
 
-/// The line without comments in parentheses or after a semicolon, and without a checksum.
-fn without_comments(text: &str) -> String {
-    let mut kept = String::new();
-    let mut is_within = false;
-    for letter in text.chars() {
-        match letter {
-            ';' | '*' if !is_within => break,
-            '(' => is_within = true,
-            ')' => is_within = false,
-            letter if !is_within => kept.push(letter),
-            _ => {}
-        }
-    }
-    kept
-}
-
-/// The words of a line: letters in capitals and their numbers.
-fn words(text: &str) -> Result<Vec<(char, f64)>, RefusalText> {
-    let letters: Vec<char> = text.chars().filter(|letter| !letter.is_whitespace()).collect();
-    let mut words = Vec::new();
-    let mut rest = letters.as_slice();
-    while let [letter, after @ ..] = rest {
-        let is_number = |letter: &char| letter.is_ascii_digit() || "+-.".contains(*letter);
-        let end = after.iter().position(|it| !is_number(it)).unwrap_or(after.len());
-        let (number, next) = after.split_at(end);
-        let number: String = number.iter().collect();
-        if !letter.is_ascii_alphabetic() {
-            return Err(format!("\"{letter}\" is no word of G-code"));
-        }
-        // Marlin's commands may have letters without a number.
-        let value = if number.is_empty() { Ok(0.0) } else { number.parse() };
-        let value = value.map_err(|_| format!("\"{letter}{number}\" is no number"))?;
-        words.push((letter.to_ascii_uppercase(), value));
-        rest = next;
-    }
-    Ok(words)
-}
-
 impl Format for GCode {
     fn name(&self) -> &'static str {
         "G-code"
@@ -287,7 +375,10 @@ impl Format for GCode {
         }
         let is_read = |(index, line): (usize, &&str)| interpreter.line(line, index).is_ok();
         lines.iter().enumerate().all(is_read)
-            && interpreter.unknown.keys().all(|word| word.starts_with(['G', 'M']))
+            && interpreter.unknown.keys().all(|word| {
+                word.strip_prefix(['G', 'M'])
+                    .is_some_and(|rest| rest.starts_with(|it: char| it.is_ascii_digit()))
+            })
             && interpreter.moves.len() > 0
     }
 
@@ -311,6 +402,17 @@ impl Format for GCode {
         }
         let mut plan = Plan::new(file.clone());
         let drawn = signals::inked(&interpreter.moves, interpreter.has_absolute_heights);
+        let mut inked = interpreter.moves.iter().zip(&drawn).filter(|(_, draws)| **draws);
+        let unplaced = inked.find_map(|(it, _)| Some((it.line as usize, it.signals.unplaced?)));
+        if let Some((number, by)) = unplaced {
+            let line = text.lines().nth(number - 1).unwrap_or_default();
+            let reason = format!(
+                "the pen would draw from a place of the machine (G53 in line {by}), which is not \
+                 known here: let the program move to an X and a Y of the drawing before"
+            );
+            return Err(ReadError::Line { origin: origin(number - 1, line), reason });
+        }
+        let mut notes: Vec<String> = extruder::note(&interpreter.moves).into_iter().collect();
         let mut pairs = interpreter.moves.iter().zip(drawn).filter(|(_, draws)| *draws).peekable();
         let mut lines = (1..).zip(text.lines());
         while let Some((first, _)) = pairs.next() {
@@ -323,16 +425,11 @@ impl Format for GCode {
             plan.begin(first.line as usize, line.map_or("", |(_, text)| text));
             plan.draw(points, None, 1);
         }
-        let notes: Vec<String> = interpreter
-            .unknown
-            .iter()
-            .map(|(word, (count, line))| match count {
-                1 => format!("{word} has no meaning for a drawing (line {line})"),
-                _ => format!(
-                    "{count} words {word} have no meaning for a drawing (the first in line {line})"
-                ),
-            })
-            .collect();
+        if !notes.is_empty() {
+            // Temperatures, fans and the like.
+            interpreter.unknown.retain(|word, _| word.starts_with('G'));
+        }
+        notes.extend(interpreter.notes());
         if plan.is_empty() {
             let mut reason = "there is nothing to draw in this G-code".to_owned();
             notes.iter().for_each(|note| reason += &format!("; {note}"));

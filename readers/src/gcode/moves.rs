@@ -17,6 +17,12 @@ pub(super) struct Signals {
     /// Whether the spindle is on; `None` if the program has not said.
     pub spindle: Option<bool>,
     pub power: Option<f64>,
+    /// Whether the extruder of a 3D printer pushes.
+    pub extrudes: bool,
+    /// Whether the pen has been lifted to a height of the machine (`G53`), and no other since.
+    pub is_parked: bool,
+    /// The line of the `G53` because of which it is not known where the move begins or ends.
+    pub unplaced: Option<u32>,
 }
 
 /// A move of the program in mm.

@@ -4,7 +4,8 @@
 //! spindle is on from the first move that draws to the last; the spindle or laser (`M3`, `M4`,
 //! `M5`), which with the power 0 does not draw, nor before the first power if the program says one;
 //! or, if none of these changes between moves, G1 to G3 draw and G0 does not. A laser that stays on
-//! over G0 does not burn there.
+//! over G0 does not burn there. But if any move extrudes, as on a 3D printer, those that do draw,
+//! and no others.
 //!
 //! A signal has levels at which the pen is up and others at which it is down. They are divided
 //! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may
@@ -28,14 +29,19 @@ struct Division {
 /// height.
 pub(super) fn inked(moves: &Moves, has_absolute_heights: bool) -> Vec<bool> {
     let servo = || by_level(moves, |signals| signals.servo, None);
-    let height = || by_level(moves, |signals| signals.height, Some(true));
+    let height =
+        || by_level(moves, |signals| signals.height.filter(|_| !signals.is_parked), Some(true));
     let growth = || by_level(moves, |signals| signals.growth, Some(true));
     let drifts = !has_absolute_heights && drift(moves);
-    servo()
+    if moves.iter().any(|it| it.signals.extrudes) {
+        return moves.iter().map(|it| it.signals.extrudes).collect();
+    }
+    let draws = servo()
         .or_else(|| if drifts { growth() } else { height() })
         .or_else(|| by_power(moves))
         .or_else(|| by_spindle(moves))
-        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect())
+        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect());
+    draws.into_iter().zip(moves.iter()).map(|(draws, it)| draws && !it.signals.is_parked).collect()
 }
 
 /// Whether the moves are at more than two heights.

@@ -174,3 +174,90 @@ fn what_is_not_obeyed_is_counted_and_what_cannot_be_drawn_refused() {
     }
     assert!(sent("known by its beginning", b"G21\nG0 X5\nG1 X9\n").is_ok());
 }
+
+/// A square of two layers and a move without ink, as PrusaSlicer (M83) and Cura (M82) write it.
+#[test]
+fn of_a_program_for_a_3d_printer_only_what_it_extrudes_is_drawn() {
+    let square = vec![[10.0, 10.0], [20.0, 10.0], [20.0, 20.0]];
+    let line = vec![[30.0, 5.0], [40.0, 5.0]];
+    let relative = "M104 S210\nM862.3 P \"MK3S\" ; check\nM117 Layer 1 of 2: 50%\n\
+                    PRINT_START BED=60 NAME=a_b\nG28 W\nG21\nG90\nM83\nG92 E0.0\nG1 E5 F1000\n\
+                    G1 Z0.2\nG1 X10 Y10 F9000\nG1 X20 E.5\nG1 Y20 E0.5\nG1 X15 E-.4\nG1 E-2\n\
+                    G1 Z.4\nG1 X30 Y5\nG1 E2\nG1 X40 E.5\nG1 X0 Y0\nM84\n";
+    assert_eq!(strokes(relative), [square.clone(), line.clone()]);
+    let absolute = "M82\nG92 E0\nG0 Z0.2\nG0 X10 Y10\nG1 X20 E1\nG1 Y20 E2\nG1 X15 E1.5\n\
+                    G1 E-4\nG92 E0\nG0 Z.4\nG1 X30 Y5 E0\nG1 X40 E.5\nG1 X0 Y0 E0.5\n";
+    assert_eq!(strokes(absolute), [square, line]);
+    // G91 makes the extruder relative, too, until G90.
+    let both = "M82\nG0 X10 Y10\nG91\nG1 X5 E1\nG1 X5 E1\nG1 X5 E-1\nG90\nG1 X50 Y50 E1\n";
+    assert_eq!(strokes(both), [[[10.0, 10.0], [15.0, 10.0], [20.0, 10.0]]]);
+    // An extruder that only ever turns on the spot lifts nothing.
+    assert_eq!(strokes("G1 E5\nG0 X5\nG1 X9\n"), [[[5.0, 0.0], [9.0, 0.0]]]);
+    assert_eq!(
+        notes("a.gcode", absolute.as_bytes()),
+        ["the program is for a 3D printer: only what it extrudes is drawn, 4 moves are not, \
+             and its layers at 2 heights lie one upon the other",]
+    );
+}
+
+#[test]
+fn a_move_in_the_coordinates_of_the_machine_is_not_drawn() {
+    let line = [[[10.0, 10.0], [20.0, 10.0]]];
+    // To the stop of the z axis and to a corner of the machine, as milling programs end.
+    let milled = "G53 G0 Z0\nG0 X10 Y10\nG1 Z-1\nG1 X20\nG53 G0 Z0\nG53 G0 X0 Y0\nM30\n";
+    assert_eq!(strokes(milled), line);
+    let lifted = "G0 Z5\nG0 X10 Y10\nG1 Z-1\nG1 X20\nG53 G1 Z0\nG1 X30\nG53 G1 X-1 Y-1\nM30\n";
+    assert_eq!(strokes(lifted), line);
+    assert_eq!(
+        notes("a.nc", milled.as_bytes()),
+        ["1 move goes to a place of the machine (G53 in line 6), which is not known here, and is \
+             not drawn",]
+    );
+    for (program, expected) in [
+        // A place of the machine is where the ink would begin.
+        ("G0 X1\nG1 X5\nG53 G0 X0 Y0\nG1 X9 Y9\n", "a.nc:4: the pen would draw from a place of"),
+        ("G0 X1\nG1 X5\nG53 G0 X0 Y0\nG0 X9\nG1 Y9\n", "a.nc:5: the pen would draw from a"),
+        ("G1 X5\nG53 G2 X9 Y9 R9\n", "a.nc:2: G53 is for G0 and G1"),
+    ] {
+        let error = sent("a.nc", program.as_bytes()).expect_err("refused");
+        assert!(error.starts_with(expected), "{error}");
+    }
+    let known_again = "G0 X1\nG1 X5\nG53 G0 X0 Y0\nG0 X9 Y0\nG1 Y9\n";
+    assert_eq!(strokes(known_again), [[[1.0, 0.0], [5.0, 0.0]], [[9.0, 0.0], [9.0, 9.0]]]);
+}
+
+#[test]
+fn what_changes_where_the_pen_goes_is_refused_and_never_left_out() {
+    for (line, expected) in [
+        ("M98 P1000", "M98 calls a subprogram, which is not followed"),
+        ("M98 P\"prime.g\"", "M98 calls a subprogram"),
+        ("M97 P30", "M97 calls a subprogram"),
+        ("G65 P9810 X5", "G65 calls a subprogram"),
+        ("o100 call [5]", "O100 CALL is a subprogram, a loop or a condition"),
+        ("O<square> sub", "O<SQUARE> SUB is a subprogram"),
+        ("o101 repeat [5]", "O101 REPEAT"),
+        ("G5 X5 Y5 I1 J1 P1 Q1", "G5 changes where the pen goes"),
+        ("G68 X0 Y0 R45", "G68 changes where the pen goes"),
+        ("G51 X0 Y0 P2", "G51 changes where the pen goes"),
+        ("G16", "G16 changes where the pen goes"),
+    ] {
+        let error = sent("a.nc", format!("G1 X5\n{line}\nG1 X9\n").as_bytes());
+        let error = error.expect_err("refused");
+        assert!(error.starts_with(&format!("a.nc:2: {expected}")), "{error}");
+    }
+    // The number of a program is no call.
+    assert_eq!(strokes("%\nO1000 (PART)\nG0 X1\nG1 X5\nM30\n"), [[[1.0, 0.0], [5.0, 0.0]]]);
+    assert_eq!(notes("a.nc", b"O1000\nG0 X1\nG1 X5\nM30\n"), [""; 0]);
+}
+
+/// The X and Y of a setting are no coordinates, and a hole is no line.
+#[test]
+fn what_only_looks_like_a_move_is_none() {
+    let line = [[[1.0, 0.0], [5.0, 0.0]]];
+    assert_eq!(strokes("G0 X1\nG1 X5\nM201 X1000 Y1000 E5000\nM92 X80 Y80\nG29 X9 Y9\n"), line);
+    assert_eq!(strokes("G0 X1\nG1 X5\nM0 Put the pen in X and Y\nM117 X is Y\n"), line);
+    let drilled = "G43 H1 Z5\nG0 X1\nG1 Z-1\nG1 X5\nG0 Z5\nG81 X7 Y7 Z-3 R1\nX9\nG80\n\
+                   G0 X0 Y0\n";
+    assert_eq!(strokes(drilled), line);
+    assert_eq!(notes("a.nc", drilled.as_bytes()), ["G81 has no meaning for a drawing (line 6)"]);
+}

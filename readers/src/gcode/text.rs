@@ -1,0 +1,161 @@
+//! The text of a line of G-code: its words, and what a line may be instead of words.
+
+use super::RefusalText;
+
+/// A line of a program.
+#[derive(Debug, PartialEq)]
+pub(super) enum Line {
+    /// Letters in capitals and their numbers.
+    Words(Vec<(char, f64)>),
+    /// A line that orders nothing.
+    Skipped,
+    /// A command of this name that takes no words, but text or named values.
+    Command(String),
+}
+
+/// The commands `M` of Marlin behind which a text follows, such as a message or the name of a file.
+const WITH_TEXT: [u16; 10] = [0, 1, 16, 23, 28, 32, 70, 117, 118, 486];
+
+/// The words that begin or end a part of a program that is not carried out in its order.
+const CONTROL: [&str; 23] = [
+    "SUB",
+    "ENDSUB",
+    "CALL",
+    "RETURN",
+    "DO",
+    "WHILE",
+    "ENDWHILE",
+    "BREAK",
+    "CONTINUE",
+    "IF",
+    "ELSEIF",
+    "ELSE",
+    "ENDIF",
+    "REPEAT",
+    "ENDREPEAT",
+    "GOTO",
+    "END",
+    "FOR",
+    "NEXT",
+    "LABEL",
+    "GOSUB",
+    "THEN",
+    "LOOP",
+];
+
+/// Parses a line.
+///
+/// # Errors
+/// The reason why it is refused.
+pub(super) fn parse(text: &str) -> Result<Line, RefusalText> {
+    let text = without_comments(text);
+    let text = text.trim();
+    // A block delete, a mark of the beginning or end, or a setting of the machine.
+    if text.starts_with(['/', '%', '$']) || text.is_empty() {
+        return Ok(Line::Skipped);
+    }
+    let rest = after_number(text);
+    let rest = match rest.strip_prefix(['O', 'o']) {
+        Some(labelled) => after_label(labelled)?,
+        None => rest,
+    };
+    let name: String = rest
+        .chars()
+        .take_while(|letter| letter.is_ascii_alphanumeric() || *letter == '_')
+        .collect();
+    let name = name.to_ascii_uppercase();
+    let letters: String = name.chars().take_while(char::is_ascii_alphabetic).collect();
+    if CONTROL.contains(&letters.as_str()) {
+        return Err(not_followed(&letters));
+    }
+    let code = name.strip_prefix('M').and_then(|code| code.parse().ok());
+    if code.is_some_and(|code| WITH_TEXT.contains(&code)) {
+        return Ok(if code > Some(1) { Line::Command(name) } else { Line::Skipped });
+    }
+    let takes_values = rest.split_whitespace().skip(1).all(|word| word.contains('='));
+    if letters.len() > 1 && name.len() > 2 && takes_values {
+        return Ok(Line::Command(name));
+    }
+    let words = words(rest)?;
+    Ok(if words.is_empty() { Line::Skipped } else { Line::Words(words) })
+}
+
+fn not_followed(words: &str) -> RefusalText {
+    format!(
+        "{words} is a subprogram, a loop or a condition, which are not followed: let the program \
+         that wrote this file write it without them"
+    )
+}
+
+/// The text after the number of the line, if it has one.
+fn after_number(text: &str) -> &str {
+    let Some(rest) = text.strip_prefix(['N', 'n']) else { return text };
+    let digits = rest.trim_start();
+    match digits.trim_start_matches(|letter: char| letter.is_ascii_digit()) {
+        rest if rest.len() < digits.len() && !rest.starts_with('.') => rest.trim_start(),
+        _ => text,
+    }
+}
+
+/// The text after the number of a program.
+///
+/// # Errors
+/// The label is that of a subprogram, a loop or a condition.
+fn after_label(text: &str) -> Result<&str, RefusalText> {
+    let text = text.trim_start();
+    let end = match text.strip_prefix('<') {
+        Some(_) => text.find('>').map_or(text.len(), |at| at + 1),
+        None => text.find(|letter: char| !letter.is_ascii_digit()).unwrap_or(text.len()),
+    };
+    let (label, rest) = text.split_at(end);
+    let rest = rest.trim_start();
+    let word: String = rest.chars().take_while(char::is_ascii_alphabetic).collect();
+    if CONTROL.contains(&word.to_ascii_uppercase().as_str()) {
+        return Err(not_followed(&format!("O{label} {word}").to_ascii_uppercase()));
+    }
+    Ok(rest)
+}
+
+/// The line without comments in parentheses or after a semicolon, without texts in quotation marks,
+/// and without a checksum.
+fn without_comments(text: &str) -> String {
+    let mut kept = String::new();
+    let mut is_within = false;
+    let mut letters = text.chars();
+    while let Some(letter) = letters.next() {
+        match letter {
+            ';' | '*' if !is_within => break,
+            '(' => is_within = true,
+            ')' => is_within = false,
+            '"' if !is_within => match letters.as_str().split_once('"') {
+                Some((_, rest)) => letters = rest.chars(),
+                None => kept.push(letter),
+            },
+            letter if !is_within => kept.push(letter),
+            _ => {}
+        }
+    }
+    kept
+}
+
+/// The words of a line: letters in capitals and their numbers.
+fn words(text: &str) -> Result<Vec<(char, f64)>, RefusalText> {
+    let letters: Vec<char> = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+    let mut words = Vec::new();
+    let mut rest = letters.as_slice();
+    while let [letter, after @ ..] = rest {
+        let is_number = |letter: &char| letter.is_ascii_digit() || "+-.".contains(*letter);
+        let end = after.iter().position(|it| !is_number(it)).unwrap_or(after.len());
+        let (number, next) = after.split_at(end);
+        let number: String = number.iter().collect();
+        if !letter.is_ascii_alphabetic() {
+            return Err(format!("\"{letter}\" is no word of G-code"));
+        }
+        // Marlin's commands may have letters without a number.
+        let value = if number.is_empty() { Ok(0.0) } else { number.parse() };
+        let value = value.map_err(|_| format!("\"{letter}{number}\" is no number"))?;
+        words.push((letter.to_ascii_uppercase(), value));
+        rest = next;
+    }
+    Ok(words)
+}
