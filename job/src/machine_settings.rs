@@ -29,7 +29,8 @@ pub struct NoSuchMachine {
 impl AssignedSetting {
     /// Parses `NUMBER=VALUE`; a `$` before the number does no harm.
     ///
-    /// # Errors The reason why the text is no assignment, for the user.
+    /// # Errors
+    /// The reason why the text is no assignment, for the user.
     ///
     /// ```
     /// use penup_job::machine_settings::AssignedSetting;

@@ -396,7 +396,9 @@ impl Board for HostBoard<'_> {
         self.kept.as_mut().ok_or(NotStored)?.note_progress(strokes)
     }
 
-    /// # Panics When a step is due meanwhile, because a board that writes to its flash delays it.
+    /// # Panics
+
+    /// When a step is due meanwhile, because a board that writes to its flash delays it.
     fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
         let before = self.state.steps();
         self.pass(self.write_ticks);
@@ -408,7 +410,9 @@ impl Board for HostBoard<'_> {
         self.kept.as_mut()?.progress(notes)
     }
 
-    /// # Panics The returned writer panics if something moves.
+    /// # Panics
+
+    /// The returned writer panics if something moves.
     #[cfg(feature = "tiles")]
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         let state = self.state;

@@ -382,7 +382,8 @@ impl<'m> Machine<'m> {
 
     /// Declares that the pen has been put at the page's origin by hand.
     ///
-    /// # Errors [`MachineError::State`] unless the machine is idle and at rest.
+    /// # Errors
+    /// [`MachineError::State`] unless the machine is idle and at rest.
     #[cfg(feature = "resume")]
     pub fn declare_origin(&mut self) -> Result<(), MachineError> {
         if !matches!(self.activity, Activity::Idle) || !self.is_stopped() {

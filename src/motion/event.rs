@@ -313,7 +313,8 @@ pub trait EventQueue {
     fn push(&mut self, event: StepEvent) -> Result<(), StepEvent>;
     /// Appends the next `count` steps of a train, at least one. There must be room.
     ///
-    /// # Errors Hands back the first event for which the queue has no room after all.
+    /// # Errors
+    /// Hands back the first event for which the queue has no room after all.
     fn push_train(&mut self, train: &mut StepTrain, count: u32) -> Result<(), StepEvent> {
         train.push_each(count, |event| self.push(event))
     }
@@ -321,7 +322,8 @@ pub trait EventQueue {
     /// below 2^16. With `after_next`, the next step still has the old length. This takes as much
     /// room in the queue as an event.
     ///
-    /// # Errors The word for which the queue has no room.
+    /// # Errors
+    /// The word for which the queue has no room.
     fn set_step_length(&mut self, units: u32, after_next: bool) -> Result<(), StepEvent> {
         let _ = (units, after_next);
         Ok(())

@@ -195,7 +195,8 @@ impl<'m> Lookahead<'m> {
 
     /// Appends a block.
     ///
-    /// # Errors Hands the block back if the ring is full.
+    /// # Errors
+    /// Hands the block back if the ring is full.
     // So that the caller makes no whole block either.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
     pub(super) fn push(&mut self, block: Block) -> Result<(), Block> {

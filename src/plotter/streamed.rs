@@ -10,9 +10,9 @@ use super::{Board, Cursor, Inner, Job, Strokes};
 use crate::drawing::{LineType, PagePoint};
 use crate::index::Index;
 use crate::machine::{PendingTarget, State, Target};
-use crate::protocol::{
-    CommandError, MOST_TARGETS, RealTime, StreamHeader, StreamedTarget, StreamedTargets,
-};
+#[cfg(feature = "resume")]
+use crate::protocol::RealTime;
+use crate::protocol::{CommandError, MOST_TARGETS, StreamHeader, StreamedTarget, StreamedTargets};
 
 /// The number of bits of a coordinate, which is at most [`PAGE_LIMIT`](crate::drawing::PAGE_LIMIT).
 const COORDINATE_BITS: u32 = 21;

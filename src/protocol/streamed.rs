@@ -52,7 +52,8 @@ impl StreamHeader {
 
     /// Parses the text after `$stream=`: whole numbers with commas between them.
     ///
-    /// # Errors There are too few or too many numbers, or one of them is not a number or is too
+    /// # Errors
+    /// There are too few or too many numbers, or one of them is not a number or is too
     /// large.
     pub fn parse(text: &str) -> Result<Self, CommandError> {
         let wrong_count = CommandError::WrongNumberCount { needed: Self::COUNT };
