@@ -5,12 +5,13 @@
 //! events say as well, many times faster. All but the steps is the work of a [`HostBoard`].
 
 use penup::boards::host::{CutFlash, HostBoard};
-use penup::machine::{Contacts, EventRing, PulserState, Setting, Settings};
+use penup::machine::{Contacts, EventRing, PulserState, Settings};
 use penup::motion::{EventKind, EventQueue, StepEvent, StepTrain, TICKS_PER_SECOND};
 use penup::plotter::{Board, NotStored, Record, Replies, Stored};
 use penup::protocol::RealTime;
 use penup::storage::LogProgress;
 use penup_job::path::Run;
+use penup_job::pins::PenHeights;
 use penup_job::watch::PenPath;
 
 /// A board in memory without pins.
@@ -179,10 +180,7 @@ pub struct Steps {
     /// The levels of the pins apart from the pulses, once they are known, and the pen's height.
     levels: Option<u8>,
     height: Option<u8>,
-    /// The height between that of the raised pen and that of the lowered one, twice, and whether
-    /// the lowered pen lies above it.
-    middle: u32,
-    lowers_upwards: bool,
+    heights: PenHeights,
     job: Option<JobSteps>,
 }
 
@@ -211,8 +209,7 @@ impl Steps {
             backlash: [0; 2],
             levels: None,
             height: None,
-            middle: 127,
-            lowers_upwards: false,
+            heights: PenHeights::default(),
             job: None,
         }
     }
@@ -226,9 +223,7 @@ impl Steps {
         };
         path.begin_again();
         self.job = Some(JobSteps { path, steps: 0, span: None, waited: false, waits: 0 });
-        let [up, down] = [Setting::PenUpHeight, Setting::PenDownHeight]
-            .map(|setting| settings.get(setting).to_num::<u32>());
-        (self.middle, self.lowers_upwards) = (up + down, down < up);
+        self.heights = PenHeights::of(settings);
     }
 
     /// The pen with this number, counted from 1, was put in.
@@ -271,15 +266,14 @@ impl Steps {
 
     /// The pins stop, and the pen goes up.
     fn halt(&mut self) {
-        self.set_pen(0);
+        self.set_pen(self.heights.up);
     }
 
     fn set_pen(&mut self, height: u8) {
         if self.height.replace(height) == Some(height) {
             return;
         }
-        let doubled = 2 * u32::from(height);
-        let down = if self.lowers_upwards { doubled < self.middle } else { doubled > self.middle };
+        let down = self.heights.is_down(height);
         let at = self.at;
         if let Some(job) = &mut self.job {
             job.path.set_pen(down);
@@ -366,5 +360,28 @@ impl EventQueue for Steps {
             self.take(event);
             Ok(())
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use penup::machine::{Setting, Value};
+
+    /// A servo may be mounted such that a lower height lifts the pen.
+    #[test]
+    fn a_halt_lifts_a_pen_of_any_heights() {
+        for [up, down] in [[0_u8, 127], [100, 20]] {
+            let mut settings = Settings::default();
+            for (setting, height) in [(Setting::PenUpHeight, up), (Setting::PenDownHeight, down)] {
+                settings.set(setting, Value::from_num(height)).expect("a height");
+            }
+            let mut board = PlannedBoard::new(1, 100);
+            board.steps.begin(&settings);
+            board.steps.set_pen(down);
+            board.steps.halt();
+            let height = board.steps.height.expect("a height");
+            assert!(!PenHeights::of(&settings).is_down(height), "{up} {down}: {height}");
+        }
     }
 }

@@ -9,7 +9,7 @@ use crate::error::Error;
 use crate::files;
 use crate::fit::fit_obj;
 use crate::idle::{changed, idle_options};
-use crate::machine_settings::simulated;
+use crate::machine_settings::{AssignedSetting, simulated};
 use crate::manual;
 use crate::operate::{self, SavedSettings};
 use crate::outcome::Outcome;
@@ -94,6 +94,14 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
         None => Vec::new(),
     };
     machine.extend(args.set.iter().cloned());
+    if args.machine.is_none()
+        && let Some((travel, said)) = large_enough(&machine, source.settings.page)
+    {
+        machine.extend(travel);
+        if !quiet {
+            note(&args.file, &[said]);
+        }
+    }
     let machine = simulated(&machine)?;
     if args.motion.is_some() && machine.get(Setting::Kinematics) != 0 {
         return Err(Error::MotionOfOtherMachine);
@@ -117,6 +125,48 @@ fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Ou
             })
         }
     }
+}
+
+/// The travel of a machine that holds `page`, and what to tell the user about it, if that of the
+/// default machine does not and nobody has said what theirs is.
+fn large_enough(
+    assigned: &[AssignedSetting],
+    page: Page,
+) -> Option<([AssignedSetting; 2], String)> {
+    const TRAVEL: [Setting; 2] = [Setting::TravelX, Setting::TravelY];
+    let is_said = assigned.iter().any(|it| {
+        Setting::numbered(it.number)
+            .is_some_and(|setting| setting == Setting::Kinematics || TRAVEL.contains(&setting))
+    });
+    let settings = penup::machine::Settings::default();
+    let usual = TRAVEL.map(|setting| settings.get(setting).to_num::<f64>());
+    let needed = [page.width, page.height];
+    let fits = (0..2).all(|axis| needed[axis] <= usual[axis]);
+    if is_said || fits {
+        return None;
+    }
+    let travel = [0, 1].map(|axis| AssignedSetting {
+        number: TRAVEL[axis].info().number(),
+        value: needed[axis].max(usual[axis]).ceil().to_string(),
+    });
+    let [x, y] = &travel;
+    let said = format!(
+        "the page of {} x {} mm is larger than the travel of the default machine, which is {} x {} \
+         mm, so the preview is of a machine with {} x {} mm: say what yours has by --machine FILE, \
+         or by --set {}={} --set {}={}",
+        page.width,
+        page.height,
+        usual[0],
+        usual[1],
+        x.value,
+        y.value,
+        x.number,
+        x.value,
+        y.number,
+        y.value
+    );
+    // A page that no machine holds is refused in the plotter's words.
+    simulated(&travel).is_ok().then_some((travel, said))
 }
 
 /// The errors of a plotter whose memory does not hold all vertices, or all corners, of a model.

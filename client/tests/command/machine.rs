@@ -380,6 +380,49 @@ fn a_preview_tells_how_long_the_machine_draws() {
     assert!(error.contains("setting 100 cannot be 1: "), "{error}");
 }
 
+/// Somebody without a machine sees a large page; whoever says what theirs is hears the refusal.
+#[test]
+fn a_preview_of_a_large_page_needs_no_large_machine() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let svg = r#"<svg xmlns="http://www.w3.org/2000/svg" width="594mm" height="841mm"
+        viewBox="0 0 594 841"><rect x="10" y="10" width="570" height="820"/></svg>"#;
+    std::fs::write(folder.path().join("a1.svg"), svg).expect("written");
+    let preview = |options: &[&str]| {
+        let arguments = [&["preview", "a1.svg", "--svg", "out.svg"], options].concat();
+        let (code, _, error) = penup(folder.path(), &arguments);
+        (code, error)
+    };
+    let (code, error) = preview(&[]);
+    assert_eq!(code, Some(0), "{error}");
+    assert_eq!(
+        error,
+        "penup: note: a1.svg: the page of 594 x 841 mm is larger than the travel of the default \
+         machine, which is 420 x 420 mm, so the preview is of a machine with 594 x 841 mm: say \
+         what yours has by --machine FILE, or by --set 130=594 --set 131=841\n"
+    );
+    let picture = std::fs::read_to_string(folder.path().join("out.svg")).expect("a picture");
+    assert!(picture.contains("594mm") && picture.contains("841mm"), "{picture}");
+    let (code, error) = preview(&["--quiet"]);
+    assert_eq!((code, error.as_str()), (Some(0), ""));
+    assert_eq!(preview(&["--set", "130=594", "--set", "131=841"]), (Some(0), String::new()));
+    for own in ["130=594", "131=420"] {
+        let (code, error) = preview(&["--set", own]);
+        assert_eq!(code, Some(2), "{error}");
+        assert!(error.contains("(error 15)"), "{error}");
+    }
+    // Another setting says nothing of the travel.
+    let (code, error) = preview(&["--set", "204=20"]);
+    assert_eq!(code, Some(0), "{error}");
+    // No machine has such a travel.
+    let (code, error) = preview(&["--page", "9000x200", "--fit"]);
+    assert_ne!(code, Some(0), "{error}");
+    let plotter = Library::new();
+    let (code, _, error) =
+        penup(folder.path(), &["plot", "a1.svg", "--port", &plotter.device, "--page", "594x841"]);
+    assert_eq!(code, Some(2), "{error}");
+    assert!(error.contains("error 15"), "{error}");
+}
+
 #[test]
 fn what_the_machine_cannot_draw_is_told_before_it_is_sent() {
     let folder = tempfile::tempdir().expect("a folder");
