@@ -34,6 +34,7 @@ pub(crate) mod event;
 mod junction;
 mod lift;
 mod limits;
+mod long_move;
 mod lookahead;
 mod profile;
 mod runner;

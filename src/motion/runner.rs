@@ -14,8 +14,8 @@ mod reversals;
 #[cfg(feature = "input-shaping")]
 mod shaped;
 
+use append::LastMove;
 pub use append::{Chord, Move, PushError};
-use append::{LastMove, LongMove};
 #[cfg(feature = "pen-overlap")]
 pub use pen::PenOverlap;
 use pen::PenTiming;
@@ -30,6 +30,7 @@ use super::emitter::{LineLevels, MoveLevels, whole_ticks};
 use super::junction::{self, Corner, Heading};
 use super::lift::{Lift, LiftRule};
 use super::limits::{mm_per_min, square};
+use super::long_move::LongMove;
 use super::lookahead::{BlockKind, is_in_line};
 use super::profile::{FRACTION_BITS, PathSpeed, Profile, Slice};
 #[cfg(feature = "input-shaping")]

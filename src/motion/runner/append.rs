@@ -70,46 +70,6 @@ pub(super) struct LastMove {
     pub(super) ink: Option<LineType>,
 }
 
-/// The last move that is long enough to have a direction, whatever rounding does, and the short
-/// moves behind it, which may hide a corner.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LongMove {
-    heading: Heading,
-    length: PathLength,
-    /// The total length of the short moves behind it.
-    gap: PathLength,
-}
-
-impl LongMove {
-    /// A move is long from this many times what rounding can explain on.
-    const LEAST: u32 = 4;
-    /// The short moves behind it may be this many times as long in all.
-    const MOST_GAP: u32 = 8;
-
-    /// Whether a move of this `length` is a short one.
-    fn is_short(length: PathLength, limits: &Limits) -> bool {
-        length.to_bits() < Self::LEAST * limits.rounding.to_bits()
-    }
-
-    /// Appends a short move behind it. Returns `None` if there are too many of them.
-    fn followed_by(self, length: PathLength, limits: &Limits) -> Option<Self> {
-        let gap = self.gap.saturating_add(length);
-        let is_near = gap.to_bits() <= Self::MOST_GAP * limits.rounding.to_bits();
-        is_near.then_some(Self { gap, ..self })
-    }
-
-    /// The corner between it and the `next` long move, before which there is also the corner
-    /// `after` the short moves.
-    fn corner(&self, next: &Self, after: Corner, limits: &Limits) -> Corner {
-        if self.gap == 0 {
-            return after;
-        }
-        let shorter = self.length.min(next.length);
-        let hidden = junction::corner(limits, self.heading, next.heading, shorter, self.gap);
-        Corner { limit: hidden.limit.min(after.limit), is_sharp: hidden.is_sharp || after.is_sharp }
-    }
-}
-
 impl Runner<'_> {
     /// A move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.
     pub fn chord(&self, dx: i32, dy: i32) -> Option<Chord> {
@@ -246,9 +206,7 @@ impl Runner<'_> {
         length: PathLength,
         corner: Corner,
     ) -> Corner {
-        let next = LongMove { heading, length, gap: PathLength::ZERO };
-        let before = self.long.replace(next);
-        before.map_or(corner, |before| before.corner(&next, corner, &self.limits))
+        LongMove::replace(&mut self.long, heading, length, corner, &self.limits)
     }
 
     /// Appends steps by which the motors take up their backlash, from rest to rest. The pen stays
