@@ -397,7 +397,6 @@ impl Board for HostBoard<'_> {
     }
 
     /// # Panics
-
     /// When a step is due meanwhile, because a board that writes to its flash delays it.
     fn note_point(&mut self, points: u32) -> Result<(), NotStored> {
         let before = self.state.steps();
@@ -411,7 +410,6 @@ impl Board for HostBoard<'_> {
     }
 
     /// # Panics
-
     /// The returned writer panics if something moves.
     #[cfg(feature = "tiles")]
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
