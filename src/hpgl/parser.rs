@@ -248,7 +248,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
             }
             b"VS" => {
                 let speed = numbers.first().copied().unwrap_or(0);
-                if !(0..=128 * UNIT).contains(&speed) {
+                // Less than 0.3 cm/s is not held with every acceleration.
+                let is_held = (UNIT / 10 * 3..=128 * UNIT).contains(&speed);
+                if speed != 0 && !is_held {
                     return Err(bad);
                 }
                 self.speed = speed;

@@ -71,6 +71,12 @@ pub enum MachineError {
         /// The index of the target, counted from 0.
         target: u32,
     },
+    /// A move is so slow that it would not be held within 10 %: see
+    /// [`Limits::least_feed`](crate::motion::Limits::least_feed).
+    TooSlow {
+        /// The least speed that is held, in mm/min.
+        least: i32,
+    },
 }
 
 /// What the machine is doing: a [`State`] with the data that only this state needs.

@@ -14,6 +14,7 @@ impl Machine<'_> {
     /// [`MachineError::State`]. On an error nothing is appended.
     pub fn draw_to(&mut self, target: Target, feed: Option<Value>) -> Result<(), MachineError> {
         self.check_travel(0, target.point)?;
+        self.check_feed(feed)?;
         if self.is_checking_stream()? {
             return Ok(());
         }
@@ -45,9 +46,26 @@ impl Machine<'_> {
     pub fn jog(&mut self, point: PagePoint, feed: Option<Value>) -> Result<(), MachineError> {
         let (Activity::Idle | Activity::Jog) = self.activity else { return Err(self.refusal()) };
         self.check_travel(0, point)?;
+        self.check_feed(feed)?;
         self.append(Target { point, ink: None }, feed)?;
         self.activity = Activity::Jog;
         Ok(())
+    }
+
+    /// Checks that a `feed` in mm/min is held within 10 %. One that is no lower than
+    /// both speeds in the settings limits nothing and is never refused.
+    ///
+    /// # Errors
+    /// [`MachineError::TooSlow`].
+    pub fn check_feed(&self, feed: Option<Value>) -> Result<(), MachineError> {
+        let limits = self.runner.limits();
+        let least = limits.least_feed();
+        match feed {
+            Some(feed) if feed < least && feed < limits.greatest_rate() => {
+                Err(MachineError::TooSlow { least: least.to_num() })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Cancels the jog, if there is one.

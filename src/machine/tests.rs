@@ -309,3 +309,50 @@ fn the_planned_position_leaves_out_the_backlash_that_is_taken_up_on_the_way() {
         assert_eq!(machine.planned_position(), targets[count - 1].point, "{count}");
     }
 }
+
+#[test]
+fn a_low_feed_is_held_within_10_percent_or_refused() {
+    for (acceleration, jerk) in
+        [(10.0, 0.0), (800.0, 0.0), (32_000.0, 0.0), (800.0, 15.0), (800.0, 1000.0), (5000.0, 0.1)]
+    {
+        let settings = settings([70.0, acceleration, jerk, 0.05]);
+        let mut blocks = std::vec![Block::EMPTY; 32];
+        let pins = PulserState::new();
+        let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
+        let least = machine.runner.limits().least_feed();
+        let end = PagePoint { x: 400, y: 300 };
+        // A limit on jerk changes the speed by whole units.
+        let units = (70.0 * 60.0 / 1800.0f64).max(acceleration * 0.005);
+        let lower = if jerk > 0.0 { units } else { 0.0 };
+        let refusal = Err(MachineError::TooSlow { least: least.to_num() });
+        for too_slow in [Value::DELTA, least / 2, least - Value::DELTA] {
+            assert_eq!(machine.jog(end, Some(too_slow)), refusal);
+            let target = Target { point: end, ink: Some(LineType::Full) };
+            assert_eq!(machine.draw_to(target, Some(too_slow)), refusal);
+            assert_eq!((machine.state(), machine.end()), (State::Idle, PagePoint::default()));
+        }
+        for number in 0..6 {
+            let feed = least + least * number * 7 / 10;
+            let at = PagePoint { x: 400 * (number % 2), y: 300 * (number % 2) };
+            let to = PagePoint { x: 400 - at.x, y: 300 - at.y };
+            let mut events = Events::default();
+            machine.jog(to, Some(feed)).expect("fast enough");
+            machine.fill(&mut TargetList::new(&[]), &mut events);
+            let (mut ticks, mut steps) = (0u64, Vec::new());
+            for event in &events.0 {
+                if event.step() != (0, 0) {
+                    steps.push(ticks);
+                }
+                ticks += u64::from(event.ticks());
+            }
+            // The ramps at the ends take less than a step.
+            let (first, last) = (10, steps.len() - 10);
+            let minutes = (steps[last] - steps[first]) as f64 / f64::from(TICKS_PER_SECOND) / 60.0;
+            let mm = 5.0 * (last - first) as f64 / steps.len() as f64;
+            let off = mm / minutes / feed.to_num::<f64>() - 1.0;
+            let most = if feed < least * 3 { 0.1 } else { 0.012 };
+            let range = -most - lower / feed.to_num::<f64>()..most;
+            assert!(range.contains(&off), "{acceleration}, {jerk}: F{feed} is off by {off}");
+        }
+    }
+}

@@ -336,6 +336,7 @@ impl<I: Index> Inner<'_, I> {
                 let (least, most) = arc.bounds();
                 machine.check_travel(0, least)?;
                 machine.check_travel(0, most)?;
+                machine.check_feed(program.feed())?;
                 if waits {
                     self.task = Some(Task::Arc(machine.end(), arc));
                 }

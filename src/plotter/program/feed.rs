@@ -36,7 +36,8 @@ impl Program {
     }
 }
 
-/// The speed of a straight move in mm/min, where `feed` is one divided by its minutes.
+/// The speed of a straight move in mm/min, where `feed` is one divided by its minutes; 0 if it has
+/// no length.
 pub(super) fn inverse_feed(
     from: [Millimetres; 2],
     to: [Millimetres; 2],
@@ -47,6 +48,9 @@ pub(super) fn inverse_feed(
         (i64::from(to[axis].to_bits()) - i64::from(from[axis].to_bits())).unsigned_abs() / 2
     };
     let length = 2 * (half(0) * half(0) + half(1) * half(1)).isqrt();
+    if length == 0 {
+        return Millimetres::ZERO;
+    }
     let bits = (u128::from(length) * u128::from(feed.to_bits().unsigned_abs())) >> 16;
     Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX).max(1))
 }

@@ -19,7 +19,7 @@ pub(super) fn explain_block(refusal: &BlockError, row: Row<'_>) {
             format_args!("two words of the line exclude each other: send them in two lines"),
         ),
         BlockError::NoFeed => row(
-            error(22, "no speed"),
+            error(22, "no speed, or one too low"),
             format_args!("it takes F above 0, as in F1000, on the same line"),
         ),
         BlockError::NotWhole(word) => row(
