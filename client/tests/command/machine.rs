@@ -407,7 +407,7 @@ fn a_preview_of_a_large_page_needs_no_large_machine() {
     assert_eq!(preview(&["--set", "130=594", "--set", "131=841"]), (Some(0), String::new()));
     for own in ["130=594", "131=420"] {
         let (code, error) = preview(&["--set", own]);
-        assert_eq!(code, Some(2), "{error}");
+        assert_eq!(code, Some(4), "{error}");
         assert!(error.contains("(error 15)"), "{error}");
     }
     // Another setting says nothing of the travel.
@@ -419,7 +419,7 @@ fn a_preview_of_a_large_page_needs_no_large_machine() {
     let plotter = Library::new();
     let (code, _, error) =
         penup(folder.path(), &["plot", "a1.svg", "--port", &plotter.device, "--page", "594x841"]);
-    assert_eq!(code, Some(2), "{error}");
+    assert_eq!(code, Some(4), "{error}");
     assert!(error.contains("error 15"), "{error}");
 }
 
