@@ -419,7 +419,7 @@ fn a_preview_of_a_large_page_needs_no_large_machine() {
     let plotter = Library::new();
     let (code, _, error) =
         penup(folder.path(), &["plot", "a1.svg", "--port", &plotter.device, "--page", "594x841"]);
-    assert_eq!(code, Some(4), "{error}");
+    assert_eq!(code, Some(1), "{error}");
     assert!(error.contains("error 15"), "{error}");
 }
 
