@@ -131,7 +131,7 @@ impl Interpreter {
         let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
         let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
         let (mut servo, mut of_machine) = (false, false);
-        let (mut is_move, mut is_unknown) = (false, false);
+        let (mut is_move, mut is_setting, mut has_place) = (false, false, false);
         for &(letter, value) in &words {
             // Codes have at most one decimal, as G91.1.
             let code = (value * 10.0).round() as i64;
@@ -179,14 +179,16 @@ impl Interpreter {
                 ('M', 2800 | 3000) => servo = true,
                 ('M', 20 | 300) => goes_on = false,
                 ('M', 0 | 10 | 60 | 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
-                ('G' | 'M', _) => {
-                    is_unknown = true;
+                // Modes of speed and of cycles, and the ends of modes that are refused.
+                ('G', 150 | 500 | 690 | 930 | 950 | 960 | 970 | 980 | 990) => {
                     self.skip(format!("{letter}{value}"), number);
                 }
-                (
-                    'X' | 'Y' | 'Z' | 'I' | 'J' | 'R' | 'F' | 'N' | 'P' | 'S' | 'T' | 'E' | 'H',
-                    _,
-                ) => {}
+                ('G' | 'M', _) => {
+                    is_setting |= !has_place;
+                    self.skip(format!("{letter}{value}"), number);
+                }
+                ('X' | 'Y', _) => has_place = true,
+                ('Z' | 'I' | 'J' | 'R' | 'F' | 'N' | 'P' | 'S' | 'T' | 'E' | 'H', _) => {}
                 (letter, _) => self.skip(letter.to_string(), number),
             }
         }
@@ -212,8 +214,8 @@ impl Interpreter {
         if sets_position && let Some(value) = value('E') {
             self.extruder.set(value);
         }
-        // The X and Y of an unknown word, as of M201, are no coordinates.
-        if !moves || is_unknown && !is_move {
+        // X and Y behind an unknown word, as M201, are no coordinates.
+        if !moves || is_setting && !is_move {
             return Ok(goes_on);
         }
         if of_machine {

@@ -256,6 +256,9 @@ fn what_only_looks_like_a_move_is_none() {
     let line = [[[1.0, 0.0], [5.0, 0.0]]];
     assert_eq!(strokes("G0 X1\nG1 X5\nM201 X1000 Y1000 E5000\nM92 X80 Y80\nG29 X9 Y9\n"), line);
     assert_eq!(strokes("G0 X1\nG1 X5\nM0 Put the pen in X and Y\nM117 X is Y\n"), line);
+    // The coordinates of a move in force may stand beside words without a meaning for a plan.
+    let beside = "G0 X1\nG1 X2\nX3 M64 P1\nG95 X4\nG97 X5\n";
+    assert_eq!(strokes(beside), [[[1.0, 0.0], [2.0, 0.0], [3.0, 0.0], [4.0, 0.0], [5.0, 0.0]]]);
     let drilled = "G43 H1 Z5\nG0 X1\nG1 Z-1\nG1 X5\nG0 Z5\nG81 X7 Y7 Z-3 R1\nX9\nG80\n\
                    G0 X0 Y0\n";
     assert_eq!(strokes(drilled), line);
