@@ -34,7 +34,7 @@ impl<'a, I: Index> FaceSet<'a, I> {
     /// How many words are recorded.
     const MOST_USED: usize = 64;
     /// A set with fewer words than this is cleared as a whole, because recording takes longer.
-    const MANY_WORDS: usize = 64;
+    const MANY_WORDS: usize = 256;
 
     /// Returns how many words of a set of this many are recorded.
     const fn used(words: usize) -> usize {
@@ -111,13 +111,14 @@ impl<'a, I: Index> FaceSet<'a, I> {
         };
         let Self { words, used, count, .. } = self;
         match Self::recorded(used, *count) {
-            Some(used) => {
+            // Sorting many words takes longer than looking through all.
+            Some(used) if 8 * used.len() < words.len() => {
                 heap_sort_by_key(used, |word| *word);
                 for &word in &*used {
                     of_word((word as usize, words[word as usize]), each)?;
                 }
             }
-            None => {
+            _ => {
                 for (word, &bits) in words.iter().enumerate() {
                     of_word((word, bits), each)?;
                 }

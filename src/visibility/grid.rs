@@ -35,6 +35,12 @@ impl<I: Index> Cell<I> {
         self.0[0]
     }
 
+    /// Empties the list, which then begins and ends at index `begin`.
+    #[inline]
+    pub fn begin_at(&mut self, begin: I) {
+        self.0[0] = begin;
+    }
+
     /// Moves the end of the list by one.
     #[inline]
     pub fn lengthen(&mut self) {
@@ -148,13 +154,21 @@ impl<'a, I: Index> Grid<'a, I> {
             };
             if shape.cells() <= wanted_cells
                 && fits(faces.len())
-                && fits(shape.most_entries(coarse_projection, outlines, faces, yield_counter)?)
+                && fits(shape.most_entries(around, yield_counter)?)
             {
                 break;
             }
             shape.coarsen();
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
+        #[cfg(feature = "threads")]
+        if SceneIndex::<I>::HAS_SHORTCUTS {
+            // What the lists do not take serves for the notes.
+            let most_entries = shape.most_entries(around, yield_counter)?;
+            let (lists, mut notes) = scratch.split(Scratch::bytes_for::<I>(most_entries));
+            scratch = lists;
+            raster.note_in(notes.take_rest());
+        }
         let entry_count = raster.count(coarse_projection, outlines, faces, yield_counter)?;
         let entries: &mut [I] = scratch.take(entry_count)?;
         raster.fill(coarse_projection, outlines, faces, entries, yield_counter)?;

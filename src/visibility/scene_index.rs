@@ -80,6 +80,16 @@ impl<I: Index> SceneIndex<'_, I> {
         }
     }
 
+    /// Returns the rectangle around the face with this rank on the coarse grid.
+    #[inline(always)] // On a board it is nothing but `Bounds::of`.
+    pub fn bounds_of(&self, rank: usize) -> Bounds {
+        #[cfg(feature = "threads")]
+        if let Some(bounds) = self.bounds.get(rank) {
+            return *bounds;
+        }
+        Bounds::of(&self.coarse_projection, self.outlines.element(self.faces.get(rank).first))
+    }
+
     /// Whether the face with this rank may meet what lies within a rectangle of the coarse grid, as
     /// far as that is known without its corners.
     #[inline(always)] // On a board it is nothing.
@@ -131,6 +141,13 @@ impl<I: Index> SceneIndex<'_, I> {
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
         let at = |corner: &Corner<I>| self.coarse_projection.vertex(corner.vertex());
         let other = self.outlines.element(other.first);
+        if Self::HAS_SHORTCUTS {
+            // Most faces share the vertices themselves.
+            let has = |corner: &&Corner<I>| other.iter().any(|t| t.vertex() == corner.vertex());
+            if self.outlines.element(one.first).iter().filter(has).count() >= 2 {
+                return true;
+            }
+        }
         let shared = |corner: &&Corner<I>| other.iter().any(|there| at(there) == at(corner));
         let corners = self.outlines.element(one.first);
         corners.iter().filter(shared).count() >= 2
