@@ -221,6 +221,7 @@ impl<'a, I: Index> Grid<'a, I> {
     }
 
     /// Calls `visit` with the faces of every cell that touches a rectangle.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     pub fn within(&self, bounds: &Bounds, visit: &mut dyn FnMut(&[I])) {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
@@ -274,6 +275,7 @@ impl<'g, I: Index> EdgeCells<'g, I> {
     ///
     /// The edge lies less than one unit to the right of the line between the coarse points, and
     /// less than one unit above it.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     pub fn visit(&self, visit: &mut dyn FnMut(CellView<'g, I>) -> bool) -> bool {
         let Shape { shift_x, shift_y, far } = self.grid.shape;
         let margin = self.margin;

@@ -282,6 +282,7 @@ impl<'c, I: Index> Raster<'c, I> {
 
     /// Calls `enter` for each face and each cell in which the face may be visible, and records the
     /// faces that cover cells.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     fn visit(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
