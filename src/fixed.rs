@@ -51,11 +51,14 @@ pub fn divide_down(dividend: i128, divisor: i128) -> i128 {
 
 /// Divides, rounding down. The divisor must be positive.
 ///
-/// The quotient is computed bit by bit. The compiler's own 128-bit division takes five times the
-/// flash, and more time if the quotient is short.
+/// Without 64-bit registers the quotient is computed bit by bit. The compiler's own 128-bit
+/// division takes five times the flash there, and more time if the quotient is short.
 #[inline(never)] // The code of a 128-bit division is long.
 pub fn divide(dividend: u128, divisor: u128) -> u128 {
     debug_assert_ne!(divisor, 0);
+    if cfg!(target_pointer_width = "64") {
+        return dividend.checked_div(divisor).unwrap_or(u128::MAX);
+    }
     if let (Ok(dividend), Ok(divisor)) = (u64::try_from(dividend), u64::try_from(divisor)) {
         return u128::from(dividend.checked_div(divisor).unwrap_or(u64::MAX));
     }

@@ -112,7 +112,7 @@ impl EdgeParameter {
 }
 
 impl Ord for EdgeParameter {
-    #[inline(never)] // Its 128-bit arithmetic is long.
+    #[cfg_attr(not(feature = "threads"), inline(never))] // On a board its arithmetic is long.
     fn cmp(&self, other: &Self) -> Ordering {
         let left = u128::from(self.numerator) * u128::from(other.denominator);
         let right = u128::from(other.numerator) * u128::from(self.denominator);

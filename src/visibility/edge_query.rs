@@ -166,11 +166,13 @@ impl<I: Index> EdgeQuery<I> {
     }
 
     /// Marks on `profile` the parts of this edge that `face` hides or that one of its sides
-    /// replaces. The caller has asked [`SceneIndex::may_meet`]. Where `hides` is `false`, all that
-    /// the face hides is hidden by others.
+    /// replaces. `rank` is the rank of the face. The caller has asked [`SceneIndex::may_meet`].
+    /// Where `hides` is `false`, all that the face hides is hidden by others.
+    #[cfg_attr(feature = "threads", inline(never))] // Most faces are passed over before.
     pub fn mark_face(
         &self,
         around: &SceneIndex<'_, I>,
+        rank: usize,
         face: Face,
         hides: bool,
         profile: &mut Profile<'_>,
@@ -211,7 +213,7 @@ impl<I: Index> EdgeQuery<I> {
                 }
             }
             let piece = CrossedPolygon::new(&numbers[..count], &sides);
-            if hides && !(face.is_fan && self.pass(coarse_projection, piece, profile)) {
+            if hides && !(face.is_fan && self.pass(around, rank, piece, profile)) {
                 self.pass_triangles(around, face, profile);
             }
             if piece.sides_on_line() == 0 {
@@ -226,30 +228,32 @@ impl<I: Index> EdgeQuery<I> {
     /// Marks the parts of this edge that a face hides, triangle by triangle.
     fn pass_triangles(&self, around: &SceneIndex<'_, I>, face: Face, profile: &mut Profile<'_>) {
         for triangle in around.triangles(face) {
-            self.pass_triangle(&around.coarse_projection, &triangle, profile);
+            self.pass_triangle(around, &triangle, profile);
         }
     }
 
     /// Marks the part of this edge that one triangle hides.
     fn pass_triangle(
         &self,
-        coarse_projection: &CoarseProjection<'_>,
+        around: &SceneIndex<'_, I>,
         triangle: &[I; 3],
         profile: &mut Profile<'_>,
     ) {
-        let sides = triangle.map_each(|corner| self.side_of(coarse_projection, corner));
-        self.pass(coarse_projection, CrossedPolygon::new(triangle, &sides), profile);
+        let sides = triangle.map_each(|corner| self.side_of(&around.coarse_projection, corner));
+        self.pass(around, usize::MAX, CrossedPolygon::new(triangle, &sides), profile);
     }
 
     /// Marks the parts of this edge that a polygon hides. Returns `false`, and marks nothing, if
     /// the triangles of the face must be tested one by one. For a single triangle it always returns
-    /// `true`.
+    /// `true`. `rank` is the rank of the face if the polygon is all of it, and no rank otherwise.
     fn pass(
         &self,
-        coarse_projection: &CoarseProjection<'_>,
+        around: &SceneIndex<'_, I>,
+        rank: usize,
         piece: CrossedPolygon<'_, I>,
         profile: &mut Profile<'_>,
     ) -> bool {
+        let coarse_projection = &around.coarse_projection;
         let corners = piece.corners;
         let left = piece.crossings(piece.left);
         let right = piece.crossings(piece.left_or_on);
@@ -260,23 +264,28 @@ impl<I: Index> EdgeQuery<I> {
             return false;
         }
         let depth = |number: &I| coarse_projection.vertex(*number).z;
-        let (mut near, mut far) = (i32::MAX, i32::MIN);
-        for z in corners.iter().map(depth) {
-            (near, far) = (near.min(z), far.max(z));
-        }
+        let (near, far, facing) = around.outlook(rank).unwrap_or_else(|| {
+            let (mut near, mut far) = (i32::MAX, i32::MIN);
+            for z in corners.iter().map(depth) {
+                (near, far) = (near.min(z), far.max(z));
+            }
+            (near, far, 0)
+        });
         if near >= self.far {
             return true;
         }
-        let mut facing = 0;
-        for pair in corners[1..].windows(2) {
-            let turn = coarse_projection.side(corners[0], pair[0], pair[1]);
-            if facing * turn < 0 {
-                return false;
-            }
-            facing |= turn;
-        }
+        let mut facing = facing;
         if facing == 0 {
-            return true;
+            for pair in corners[1..].windows(2) {
+                let turn = coarse_projection.side(corners[0], pair[0], pair[1]);
+                if facing * turn < 0 {
+                    return false;
+                }
+                facing |= turn;
+            }
+            if facing == 0 {
+                return true;
+            }
         }
         let on_left = self.passage(coarse_projection, piece, left, facing);
         let on_right = if left == right {
@@ -346,6 +355,7 @@ impl<I: Index> EdgeQuery<I> {
     /// Finds the sides through which the edge enters and leaves a polygon on the page. Returns
     /// `None` if the edge does not meet the polygon. `crossings` are the sides that cross its line.
     /// The sign of `facing` says in which sense the polygon turns: positive is anticlockwise.
+    #[cfg_attr(feature = "threads", inline(always))]
     pub fn passage(
         &self,
         coarse_projection: &CoarseProjection<'_>,

@@ -34,7 +34,7 @@ impl<'a, I: Index> FaceSet<'a, I> {
     /// How many words are recorded.
     const MOST_USED: usize = 64;
     /// A set with fewer words than this is cleared as a whole, because recording takes longer.
-    const MANY_WORDS: usize = 64;
+    const MANY_WORDS: usize = 256;
 
     /// Returns how many words of a set of this many are recorded.
     const fn used(words: usize) -> usize {
@@ -96,11 +96,17 @@ impl<'a, I: Index> FaceSet<'a, I> {
         true
     }
 
-    /// Calls `each` with every rank, in ascending order, until it returns an error.
+    /// Calls `each` with every rank, in ascending order, until it returns an error. No rank is below
+    /// `least`.
     ///
     /// # Errors
     /// What `each` returns.
-    pub fn each<E>(&mut self, each: &mut dyn FnMut(usize) -> Result<(), E>) -> Result<(), E> {
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
+    pub fn each<E>(
+        &mut self,
+        least: usize,
+        each: &mut dyn FnMut(usize) -> Result<(), E>,
+    ) -> Result<(), E> {
         let of_word = |(word, mut bits): (usize, u32),
                        each: &mut dyn FnMut(usize) -> Result<(), E>| {
             while bits != 0 {
@@ -111,14 +117,17 @@ impl<'a, I: Index> FaceSet<'a, I> {
         };
         let Self { words, used, count, .. } = self;
         match Self::recorded(used, *count) {
-            Some(used) => {
+            // Sorting many words takes longer than looking through all.
+            Some(used) if 8 * used.len() < words.len() => {
                 heap_sort_by_key(used, |word| *word);
                 for &word in &*used {
                     of_word((word as usize, words[word as usize]), each)?;
                 }
             }
-            None => {
-                for (word, &bits) in words.iter().enumerate() {
+            _ => {
+                // On a board there are few words.
+                let first = if Self::IS_RECORDED { least / 32 } else { 0 };
+                for (word, &bits) in words.iter().enumerate().skip(first) {
                     of_word((word, bits), each)?;
                 }
             }
@@ -149,7 +158,7 @@ mod tests {
                     assert_eq!(set.insert(rank), expected.insert(rank));
                 }
                 let mut found = Vec::new();
-                set.each(&mut |rank| {
+                set.each(0, &mut |rank| {
                     found.push(rank);
                     Ok::<(), ()>(())
                 })

@@ -20,6 +20,8 @@ pub struct Faces<'a, I: Index> {
     order: &'a mut [I::Pair],
     /// The number of faces that have no area.
     degenerate: u32,
+    /// Whether there is a face that no fan covers.
+    has_ears: bool,
 }
 
 /// One face or bar, as the search needs it.
@@ -46,6 +48,7 @@ impl<'a, I: Index> Faces<'a, I> {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         let mut degenerate = 0;
+        let mut has_ears = false;
         let order: &mut [I::Pair] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
             yield_counter.spend(200 * corners.len())?;
@@ -58,7 +61,10 @@ impl<'a, I: Index> Faces<'a, I> {
                     0
                 }
                 Cut::Fan => 1,
-                Cut::Ears => 2,
+                Cut::Ears => {
+                    has_ears = true;
+                    2
+                }
             };
             *key = I::pair(I::new(depth.min(0x3FFF) << 2 | cut), I::new(first));
         }
@@ -70,7 +76,12 @@ impl<'a, I: Index> Faces<'a, I> {
         } else {
             heap_sort_by_key(order, |key| *key);
         }
-        Ok(Self { order, degenerate })
+        Ok(Self { order, degenerate, has_ears })
+    }
+
+    /// Whether there is a face that no fan covers.
+    pub fn has_ears(&self) -> bool {
+        self.has_ears
     }
 
     /// Returns the number of faces that have no area.

@@ -35,6 +35,12 @@ impl<I: Index> Cell<I> {
         self.0[0]
     }
 
+    /// Empties the list, which then begins and ends at index `begin`.
+    #[inline]
+    pub fn begin_at(&mut self, begin: I) {
+        self.0[0] = begin;
+    }
+
     /// Moves the end of the list by one.
     #[inline]
     pub fn lengthen(&mut self) {
@@ -148,13 +154,21 @@ impl<'a, I: Index> Grid<'a, I> {
             };
             if shape.cells() <= wanted_cells
                 && fits(faces.len())
-                && fits(shape.most_entries(coarse_projection, outlines, faces, yield_counter)?)
+                && fits(shape.most_entries(around, yield_counter)?)
             {
                 break;
             }
             shape.coarsen();
         }
         let mut raster = Raster::new(shape, scratch.take(shape.cells())?);
+        #[cfg(feature = "threads")]
+        if SceneIndex::<I>::HAS_SHORTCUTS {
+            // What the lists do not take serves for the notes.
+            let most_entries = shape.most_entries(around, yield_counter)?;
+            let (lists, mut notes) = scratch.split(Scratch::bytes_for::<I>(most_entries));
+            scratch = lists;
+            raster.note_in(notes.take_rest());
+        }
         let entry_count = raster.count(coarse_projection, outlines, faces, yield_counter)?;
         let entries: &mut [I] = scratch.take(entry_count)?;
         raster.fill(coarse_projection, outlines, faces, entries, yield_counter)?;
@@ -207,6 +221,7 @@ impl<'a, I: Index> Grid<'a, I> {
     }
 
     /// Calls `visit` with the faces of every cell that touches a rectangle.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     pub fn within(&self, bounds: &Bounds, visit: &mut dyn FnMut(&[I])) {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
@@ -260,6 +275,7 @@ impl<'g, I: Index> EdgeCells<'g, I> {
     ///
     /// The edge lies less than one unit to the right of the line between the coarse points, and
     /// less than one unit above it.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     pub fn visit(&self, visit: &mut dyn FnMut(CellView<'g, I>) -> bool) -> bool {
         let Shape { shift_x, shift_y, far } = self.grid.shape;
         let margin = self.margin;

@@ -20,9 +20,10 @@
 //! The search runs in these steps:
 //!
 //! * Choose one side of a face to represent each edge (`edges`, `crease`).
+//! * Sort the faces by depth (`faces`).
 //! * Cut concave faces into triangles (`triangles`).
 //! * Place the vertices on a coarse grid of the page (`coarse_projection`).
-//! * Sort the faces by depth (`faces`) and into the cells of the page (`grid`, `raster`).
+//! * Sort the faces into the cells of the page (`grid`, `raster`).
 //! * Of a fine mesh, find the cells that one sheet of faces covers (`sheet`), where it is known at
 //!   once which edges are visible.
 //! * On a computer, find the solids whose back faces need not be tested against the edges behind
@@ -50,7 +51,8 @@
 //! each entry of the grid and 6 for each cell. Before that, the choice of the edges takes 2 bytes
 //! for each vertex and 2 1/8 for each corner. Each face that no fan of triangles covers takes 4
 //! bytes, and 6 for each of its triangles. With the numbers of a computer most of this is twice as
-//! much, and 8 bytes for each element and 4 for each corner are added (`bounds` and `solids`).
+//! much, and 33 bytes for each element and 4 for each corner are added (`bounds`, `extents`,
+//! `facings` and `solids`).
 //!
 //! # Limits
 //! Refused are vertices out of range, a model that is too large and too little working memory.
@@ -293,8 +295,8 @@ fn find_some<I: Index>(
     Ok(around.report())
 }
 
-/// Finds out what the search needs to know about a scene: chooses the edges, cuts the faces into
-/// triangles, and sorts them by depth.
+/// Finds out what the search needs to know about a scene: chooses the edges, sorts the faces by
+/// depth, and cuts them into triangles.
 fn index<'a, I: Index>(
     scene: &Scene<'a, I>,
     options: Options,
@@ -307,9 +309,13 @@ fn index<'a, I: Index>(
     let creases = (options.crease, scene.unrounded);
     let chosen =
         ChosenSides::choose(outlines, projection, vertices, creases, scratch, yield_counter)?;
-    let ears = Ears::cut(outlines, vertices, scratch, yield_counter)?;
-    let coarse_projection = CoarseProjection::new(scene, scratch, yield_counter)?;
     let faces = Faces::sort(outlines, vertices, scratch, yield_counter)?;
+    let ears = if faces.has_ears() {
+        Ears::cut(outlines, vertices, scratch, yield_counter)?
+    } else {
+        Ears::default()
+    };
+    let coarse_projection = CoarseProjection::new(scene, scratch, yield_counter)?;
     let around = SceneIndex {
         coarse_projection,
         outlines,
@@ -318,6 +324,10 @@ fn index<'a, I: Index>(
         faces,
         #[cfg(feature = "threads")]
         bounds: &[],
+        #[cfg(feature = "threads")]
+        extents: &[],
+        #[cfg(feature = "threads")]
+        facings: &[],
         #[cfg(feature = "threads")]
         solids: Solids::default(),
     };

@@ -120,6 +120,7 @@ impl<'a> Profile<'a> {
     }
 
     /// Changes the marks of the pieces of a part of the edge by `change`.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     pub fn update(&mut self, part: EdgeInterval, change: &dyn Fn(u64) -> u64) {
         if part.is_empty() || part.to.is_some_and(|to| to <= self.memory[0].from) {
             return;

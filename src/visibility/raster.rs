@@ -7,6 +7,7 @@ use super::coarse_projection::{
 use super::edges::Outlines;
 use super::faces::Faces;
 use super::grid::{Cell, coarse_depth};
+use super::scene_index::SceneIndex;
 use super::sheet::CellArea;
 use super::yield_counter::YieldCounter;
 use crate::array::MapEach;
@@ -82,17 +83,15 @@ impl Shape {
     /// Returns an upper bound of the number of entries that the faces have in all cells together.
     pub fn most_entries<I: Index>(
         &self,
-        coarse_projection: &CoarseProjection<'_>,
-        outlines: Outlines<'_, I>,
-        faces: &Faces<'_, I>,
+        around: &SceneIndex<'_, I>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<usize, Aborted> {
         let cells_of = |rank: usize| {
-            let bounds = Bounds::of(coarse_projection, outlines.element(faces.get(rank).first));
+            let bounds = around.bounds_of(rank);
             let [column0, column1, row0, row1] = self.span(&bounds).map_each(usize::from);
             (column1 - column0 + 1) * (row1 - row0 + 1)
         };
-        (0..faces.len()).try_fold(0, |sum, rank| {
+        (0..around.faces.len()).try_fold(0, |sum, rank| {
             yield_counter.spend(200)?;
             Ok(sum + cells_of(rank))
         })
@@ -167,12 +166,50 @@ pub struct Raster<'c, I> {
     columns: usize,
     /// The cells, row by row from the lower left.
     cells: &'c mut [Cell<I>],
+    /// What a computer notes while it counts, to fill the lists without another visit.
+    #[cfg(feature = "threads")]
+    trail: Option<Trail<'c, I>>,
+}
+
+/// The numbers of the cells that the faces enter, face after face. Behind those of each face stands
+/// [`Index::NONE`].
+#[cfg(feature = "threads")]
+struct Trail<'c, I> {
+    /// The memory for the numbers, the first `count` of which are in use.
+    memory: &'c mut [I],
+    /// How many numbers there are; more than `memory` can hold if some are missing.
+    count: usize,
+}
+
+#[cfg(feature = "threads")]
+impl<I: Index> Trail<'_, I> {
+    /// Adds a number.
+    #[inline]
+    fn add(&mut self, number: I) {
+        if let Some(slot) = self.memory.get_mut(self.count) {
+            *slot = number;
+        }
+        self.count += 1;
+    }
 }
 
 impl<'c, I: Index> Raster<'c, I> {
     /// Prepares to sort faces into `cells`, one for each cell of `shape` and all of them zero.
     pub fn new(shape: Shape, cells: &'c mut [Cell<I>]) -> Self {
-        Self { shape, columns: shape.columns(), cells }
+        Self {
+            shape,
+            columns: shape.columns(),
+            cells,
+            #[cfg(feature = "threads")]
+            trail: None,
+        }
+    }
+
+    /// Notes in `memory` which cells the faces enter while they are counted. If it is large enough,
+    /// the lists are then filled without another look at the faces.
+    #[cfg(feature = "threads")]
+    pub fn note_in(&mut self, memory: &'c mut [I]) {
+        self.trail = Some(Trail { memory, count: 0 });
     }
 
     /// Gives the cells back when all faces have been sorted into them.
@@ -193,13 +230,27 @@ impl<'c, I: Index> Raster<'c, I> {
         self.visit(coarse_projection, outlines, faces, yield_counter, &mut |cell, _| {
             cell.lengthen()
         })?;
+        let is_noted = self.has_noted_all();
         let mut begin = I::ZERO;
         for cell in self.cells.iter_mut() {
             let count = cell.end();
-            *cell = Cell::uncovered(begin);
+            if is_noted {
+                cell.begin_at(begin);
+            } else {
+                *cell = Cell::uncovered(begin);
+            }
             begin += count;
         }
         Ok(begin.get())
+    }
+
+    /// Whether there was room to note all cells that the faces enter.
+    #[inline(always)] // On a board it is a constant.
+    fn has_noted_all(&self) -> bool {
+        #[cfg(feature = "threads")]
+        return self.trail.as_ref().is_some_and(|trail| trail.count <= trail.memory.len());
+        #[cfg(not(feature = "threads"))]
+        false
     }
 
     /// Writes the list of each cell. Afterwards `end` is the index at which the list ends.
@@ -211,6 +262,18 @@ impl<'c, I: Index> Raster<'c, I> {
         entries: &mut [I],
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), Aborted> {
+        #[cfg(feature = "threads")]
+        if let Some(noted) = self.trail.take().and_then(|trail| trail.memory.get(..trail.count)) {
+            yield_counter.spend(10 * noted.len())?;
+            for (rank, of_face) in noted.split(|&number| number == I::NONE).enumerate() {
+                for &number in of_face {
+                    let cell = &mut self.cells[number.get()];
+                    entries[cell.end().get()] = I::new(rank);
+                    cell.lengthen();
+                }
+            }
+            return Ok(());
+        }
         self.visit(coarse_projection, outlines, faces, yield_counter, &mut |cell, rank| {
             entries[cell.end().get()] = rank;
             cell.lengthen();
@@ -219,6 +282,7 @@ impl<'c, I: Index> Raster<'c, I> {
 
     /// Calls `enter` for each face and each cell in which the face may be visible, and records the
     /// faces that cover cells.
+    #[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
     fn visit(
         &mut self,
         coarse_projection: &CoarseProjection<'_>,
@@ -253,7 +317,15 @@ impl<'c, I: Index> Raster<'c, I> {
                     *value =
                         side.constant + side.right * i32::from(column0) + side.up * i32::from(row);
                 }
+                #[cfg(feature = "threads")]
+                let mut number = *cells.start();
                 for cell in &mut self.cells[cells] {
+                    #[cfg(feature = "threads")]
+                    let this = I::new(number);
+                    #[cfg(feature = "threads")]
+                    {
+                        number += 1;
+                    }
                     let mut covered = may_cover;
                     let mut outside = near > cell.cover_depth();
                     for (value, side) in values.iter_mut().zip(sides) {
@@ -265,10 +337,18 @@ impl<'c, I: Index> Raster<'c, I> {
                         continue;
                     }
                     enter(cell, I::new(rank));
+                    #[cfg(feature = "threads")]
+                    if let Some(trail) = &mut self.trail {
+                        trail.add(this);
+                    }
                     if covered && far < cell.cover_depth() {
                         cell.cover_with(I::new(rank), far);
                     }
                 }
+            }
+            #[cfg(feature = "threads")]
+            if let Some(trail) = &mut self.trail {
+                trail.add(I::NONE);
             }
         }
         Ok(())

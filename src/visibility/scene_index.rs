@@ -35,6 +35,13 @@ pub struct SceneIndex<'a, I: Index> {
     /// The rectangles around the faces on the coarse grid, by rank.
     #[cfg(feature = "threads")]
     pub bounds: &'a [Bounds],
+    /// The bounding boxes of the faces, by rank.
+    #[cfg(feature = "threads")]
+    pub extents: &'a [Extent],
+    /// The senses in which the faces turn on the page, by rank: what [`Self::facing`] returns, and
+    /// 0 for none.
+    #[cfg(feature = "threads")]
+    pub facings: &'a [i8],
     /// The faces whose solids hide what is behind them without them.
     #[cfg(feature = "threads")]
     pub solids: Solids<'a>,
@@ -42,7 +49,7 @@ pub struct SceneIndex<'a, I: Index> {
 
 #[cfg(feature = "threads")]
 impl<'a, I: Index> SceneIndex<'a, I> {
-    /// Fills `bounds` and `solids` where the numbers are those of a computer.
+    /// Fills `bounds`, `extents`, `facings` and `solids` where the numbers are those of a computer.
     ///
     /// # Errors
     /// Returns an error if the memory is too small or the user cancels.
@@ -52,13 +59,20 @@ impl<'a, I: Index> SceneIndex<'a, I> {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         if Self::HAS_SHORTCUTS {
-            let bounds: &mut [Bounds] = scratch.take(self.faces.len())?;
-            for (rank, bounds) in bounds.iter_mut().enumerate() {
-                let corners = self.outlines.element(self.faces.get(rank).first);
+            let count = self.faces.len();
+            let bounds: &mut [Bounds] = scratch.take(count)?;
+            let extents: &mut [Extent] = scratch.take(count)?;
+            let facings: &mut [i8] = scratch.take(count)?;
+            let slots = bounds.iter_mut().zip(&mut *extents).zip(&mut *facings);
+            for (rank, ((bounds, extent), facing)) in slots.enumerate() {
+                let face = self.faces.get(rank);
+                let corners = self.outlines.element(face.first);
                 *bounds = Bounds::of(&self.coarse_projection, corners);
-                yield_counter.spend(50 * corners.len())?;
+                *extent = self.extent(rank);
+                *facing = self.facing(face).unwrap_or(0) as i8;
+                yield_counter.spend(150 * corners.len())?;
             }
-            self.bounds = bounds;
+            (self.bounds, self.extents, self.facings) = (bounds, extents, facings);
             let depths = scratch.take(self.outlines.corners.len())?;
             self.solids = Solids::find(&self, depths, yield_counter)?;
         }
@@ -67,17 +81,30 @@ impl<'a, I: Index> SceneIndex<'a, I> {
 }
 
 impl<I: Index> SceneIndex<'_, I> {
-    /// Whether `bounds` and `solids` are filled, with which faces are passed over without a look at
-    /// their corners. On a board their memory is worth more as cells.
+    /// Whether `bounds` and what follows it are filled, with which most questions about a face are
+    /// answered without a look at its corners. On a board their memory is worth more as cells.
     pub const HAS_SHORTCUTS: bool = cfg!(feature = "threads") && I::BITS > 16;
 
-    /// Returns the bytes that `bounds` and `solids` take.
+    /// Returns the bytes that `bounds` and what follows it take.
     pub const fn bytes_of_shortcuts(corners: usize, faces: usize) -> usize {
         if Self::HAS_SHORTCUTS {
-            Scratch::bytes_for::<Bounds>(faces) + Scratch::bytes_for::<i32>(corners)
+            Scratch::bytes_for::<Bounds>(faces)
+                + Scratch::bytes_for::<Extent>(faces)
+                + Scratch::bytes_for::<i8>(faces)
+                + Scratch::bytes_for::<i32>(corners)
         } else {
             0
         }
+    }
+
+    /// Returns the rectangle around the face with this rank on the coarse grid.
+    #[inline(always)] // On a board it is nothing but `Bounds::of`.
+    pub fn bounds_of(&self, rank: usize) -> Bounds {
+        #[cfg(feature = "threads")]
+        if let Some(bounds) = self.bounds.get(rank) {
+            return *bounds;
+        }
+        Bounds::of(&self.coarse_projection, self.outlines.element(self.faces.get(rank).first))
     }
 
     /// Whether the face with this rank may meet what lies within a rectangle of the coarse grid, as
@@ -89,6 +116,20 @@ impl<I: Index> SceneIndex<'_, I> {
             return self.bounds.get(_rank).is_none_or(|bounds| bounds.may_meet(_within));
         }
         true
+    }
+
+    /// Returns the nearest and the farthest depth of the face with this rank, and the sense in which
+    /// all its triangles turn on the page: 1 anticlockwise, -1 clockwise. Returns `None` if that is
+    /// not known at once.
+    #[inline(always)] // On a board it is nothing.
+    pub fn outlook(&self, _rank: usize) -> Option<(i32, i32, i32)> {
+        #[cfg(feature = "threads")]
+        if let (Some(extent), Some(&facing @ (1 | -1))) =
+            (self.extents.get(_rank), self.facings.get(_rank))
+        {
+            return Some((extent.near(), extent.far(), facing.into()));
+        }
+        None
     }
 
     /// Whether the other faces on the page hide as much as this one of an edge that is nowhere
@@ -122,6 +163,10 @@ impl<I: Index> SceneIndex<'_, I> {
 
     /// Returns the bounding box of the face with this rank.
     pub fn extent(&self, rank: usize) -> Extent {
+        #[cfg(feature = "threads")]
+        if let Some(extent) = self.extents.get(rank) {
+            return *extent;
+        }
         let corners = self.outlines.element(self.faces.get(rank).first);
         Extent::around(corners.iter().map(|corner| self.coarse_projection.vertex(corner.vertex())))
     }
@@ -131,6 +176,13 @@ impl<I: Index> SceneIndex<'_, I> {
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
         let at = |corner: &Corner<I>| self.coarse_projection.vertex(corner.vertex());
         let other = self.outlines.element(other.first);
+        if Self::HAS_SHORTCUTS {
+            // Most faces share the vertices themselves.
+            let has = |corner: &&Corner<I>| other.iter().any(|t| t.vertex() == corner.vertex());
+            if self.outlines.element(one.first).iter().filter(has).nth(1).is_some() {
+                return true;
+            }
+        }
         let shared = |corner: &&Corner<I>| other.iter().any(|there| at(there) == at(corner));
         let corners = self.outlines.element(one.first);
         corners.iter().filter(shared).count() >= 2

@@ -4,9 +4,11 @@
 use crate::array::MapEach;
 use crate::fixed::{divide_down, product};
 use crate::geometry::{Vertex, plane_side};
+use bytemuck::{Pod, Zeroable};
 
 /// The bounding box of a face in view coordinates.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
 pub struct Extent {
     /// The least x, y and z of the box.
     low: Vertex,
@@ -25,6 +27,17 @@ impl Extent {
             low: Vertex::new(low.x.min(at.x), low.y.min(at.y), low.z.min(at.z)),
             high: Vertex::new(high.x.max(at.x), high.y.max(at.y), high.z.max(at.z)),
         })
+    }
+
+    /// Returns the depth of its nearest point.
+    #[cfg(feature = "threads")]
+    pub fn near(&self) -> i32 {
+        self.low.z
+    }
+
+    /// Returns the depth of its farthest point.
+    pub fn far(&self) -> i32 {
+        self.high.z
     }
 
     /// Whether both boxes have a point in common. If they have none, their faces do not cross.

@@ -12,13 +12,12 @@ use super::edges::sides;
 use super::face_set::FaceSet;
 use super::grid::{Grid, coarse_depth};
 use super::profile::{EdgeInterval, FEWEST_PIECES, Profile, ProfilePiece, mark};
-use super::raster::Bounds;
 use super::scene_index::SceneIndex;
-use super::seams::seam;
+use super::seams::{Extent, seam};
 use super::yield_counter::YieldCounter;
 use super::{Options, Owner, Stretch, StretchSink, VisibilityError};
 use crate::array::MapEach;
-use crate::geometry::{COORDINATE_LIMIT, EdgeParameter, Vertex};
+use crate::geometry::{EdgeParameter, Vertex};
 use crate::index::Index;
 use crate::stage::{Aborted, Scratch};
 use core::ops::Range;
@@ -182,18 +181,23 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         sink: &mut dyn StretchSink<I>,
     ) -> Result<(), VisibilityError> {
         for one in ranks {
-            self.meet(one);
             let extent = self.around.extent(one);
+            self.meet(one, &extent);
             // Most faces near a triangle lie on one side of it.
             let plane = self.around.plane(self.around.faces.get(one));
             let mut met = core::mem::take(&mut self.marks.met);
-            let outcome = met.each(&mut |other| {
-                let may_pass =
-                    plane.as_ref().is_none_or(|plane| self.around.is_on_both_sides(plane, other));
-                if may_pass
-                    && extent.meets(&self.around.extent(other))
-                    && self.owns_pair([one, other])
-                {
+            let outcome = met.each(one, &mut |other| {
+                let is_beside = || extent.meets(&self.around.extent(other));
+                let may_pass = || {
+                    plane.as_ref().is_none_or(|plane| self.around.is_on_both_sides(plane, other))
+                };
+                // Only a computer knows the boxes at once.
+                let may_cross = if SceneIndex::<I>::HAS_SHORTCUTS {
+                    is_beside() && may_pass()
+                } else {
+                    may_pass() && is_beside()
+                };
+                if may_cross && self.owns_pair([one, other]) {
                     self.follow_seams_of(one, other, yield_counter, sink)?;
                 }
                 yield_counter.spend(200).map_err(VisibilityError::from)
@@ -251,16 +255,12 @@ impl<'s, I: Index> StretchFinder<'s, I> {
     }
 
     /// Puts the faces with a higher rank than `one` that may pass through it, so that there is a
-    /// seam, into `met`.
-    fn meet(&mut self, one: usize) {
+    /// seam, into `met`. `extent` is the box around it.
+    fn meet(&mut self, one: usize, extent: &Extent) {
         let Self { around, grid, marks: Marks { met, .. }, .. } = self;
         met.clear();
-        let corners = around.outlines.element(around.faces.get(one).first);
-        let bounds = Bounds::of(&around.coarse_projection, corners);
-        let depths =
-            corners.iter().map(|corner| around.coarse_projection.vertex(corner.vertex()).z);
-        let far = depths.max().unwrap_or(-COORDINATE_LIMIT);
-        grid.within(&bounds, &mut |ranks| {
+        let far = extent.far();
+        grid.within(&around.bounds_of(one), &mut |ranks| {
             // The ranks in a cell ascend.
             let higher = ranks.iter().map(|&rank| rank.get()).skip_while(|&other| other <= one);
             for other in higher.take_while(|&other| !around.faces.begins_behind(other, far)) {
@@ -364,12 +364,13 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let mut spent = yield_counter.spend(1000);
         let mut test_face = |rank: I, is_cover: bool| {
             let rank = rank.get();
-            if seen.insert(rank) && around.may_meet(rank, &edge_query.bounds) {
-                let face = faces_by_rank.get(rank);
-                // Where there is a covering face, the others are not tested.
-                let hides = is_cover || !around.is_spared(face, edge_query.near);
-                edge_query.mark_face(around, face, hides, profile);
+            if !seen.insert(rank) || !around.may_meet(rank, &edge_query.bounds) {
+                return true;
             }
+            let face = faces_by_rank.get(rank);
+            // Where there is a covering face, the others are not tested.
+            let hides = is_cover || !around.is_spared(face, edge_query.near);
+            edge_query.mark_face(around, rank, face, hides, profile);
             spent = spent.and_then(|()| yield_counter.spend(FACE_TEST));
             spent.is_ok() && !profile.is_hidden()
         };
@@ -389,7 +390,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
             // Within the precision of the model, several faces may be equally near, and then it
             // matters which comes first. So they are asked in the order of their ranks, whatever
             // the cells are.
-            seen.each(&mut |rank| {
+            seen.each(0, &mut |rank| {
                 edge_query.touch(around, faces_by_rank.get(rank), rank, profile);
                 yield_counter.spend(FACE_TEST)
             })?;

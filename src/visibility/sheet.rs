@@ -121,13 +121,13 @@ impl<I: Index> SceneIndex<'_, I> {
 
     /// Returns the sense in which all triangles of a face turn on the page: 1 anticlockwise, -1
     /// clockwise. `None` if they do not turn in one sense, or if the face is no fan of triangles.
-    fn facing(&self, face: Face) -> Option<i32> {
+    pub fn facing(&self, face: Face) -> Option<i32> {
         face.is_fan.then(|| self.turn(self.outlines.element(face.first)))?
     }
 
     /// Returns the sense in which all triangles of a fan turn on the page: 1 anticlockwise, -1
     /// clockwise. `None` if they do not turn in one sense.
-    pub fn turn(&self, corners: &[Corner<I>]) -> Option<i32> {
+    fn turn(&self, corners: &[Corner<I>]) -> Option<i32> {
         let (first, others) = corners.split_first()?;
         let mut turns = others.windows(2).map(|pair| match pair {
             [b, c] => self.coarse_projection.side(first.vertex(), b.vertex(), c.vertex()),

@@ -28,9 +28,6 @@ pub struct Solids<'a> {
 
 /// A depth that no edge lies behind.
 const NEVER: i32 = i32::MAX;
-/// What stands, while solids are looked for, at a face whose triangles are a fan and therefore
-/// bounded by its sides. Those of other faces may not be.
-const IS_FAN: i32 = 0;
 
 impl<'a> Solids<'a> {
     /// Finds the faces that need not be tested. There is an item of `depths` for each corner.
@@ -43,17 +40,19 @@ impl<'a> Solids<'a> {
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
         depths.fill(NEVER);
-        for rank in 0..around.faces.len() {
+        // While solids are looked for, the sense in which it turns stands at a face whose triangles
+        // are a fan and therefore bounded by its sides. Those of other faces may not be.
+        for (rank, &facing) in around.facings.iter().enumerate() {
             let face = around.faces.get(rank);
             if let Some(depth) = depths.get_mut(face.first).filter(|_| face.is_fan) {
-                *depth = IS_FAN;
+                *depth = facing.into();
             }
         }
         let (mut begin, mut far) = (0, -COORDINATE_LIMIT);
         let mut open = OpenSides::new();
         for (first, corners) in around.outlines.elements() {
             yield_counter.spend(200 * corners.len())?;
-            let is_fan = depths.get(first) == Some(&IS_FAN);
+            let is_fan = depths.get(first).is_some_and(|&facing| facing != NEVER);
             let end = first + corners.len();
             let is_open = !is_fan
                 || sides(corners).any(|(_, a, b)| {
@@ -61,11 +60,8 @@ impl<'a> Solids<'a> {
                     open.meet([a, b]).is_none()
                 });
             if is_open || open.is_empty() {
-                for (number, element) in around.outlines.elements_in(begin..end) {
-                    if let Some(depth) = depths.get_mut(number) {
-                        let is_spared = !is_open && around.turn(element) == Some(-1);
-                        *depth = if is_spared { far } else { NEVER };
-                    }
+                for depth in depths.get_mut(begin..end).into_iter().flatten() {
+                    *depth = if !is_open && *depth == -1 { far } else { NEVER };
                 }
                 (begin, far) = (end, -COORDINATE_LIMIT);
                 open = OpenSides::new();

@@ -34,7 +34,7 @@ struct Entry<I>([I; 2]);
 
 /// The triangles of all faces that no fan covers. (A fan is all triangles with one common corner;
 /// an ear is a triangle that was cut off at a corner.)
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Ears<'a, I> {
     /// Where the triangles of each face begin, in the order of the model.
     entries: &'a mut [Entry<I>],
@@ -126,6 +126,7 @@ impl<'a, I: Index> Ears<'a, I> {
 /// they point along the normal of the polygon.
 ///
 /// Each area is a sum of at most 2^16 products of a factor within 2^20 and one within 2^21.
+#[cfg_attr(feature = "threads", inline(always))] // So nothing is called through a pointer.
 pub fn areas(polygon: &mut dyn Iterator<Item = Vertex>) -> [i64; 3] {
     let mut areas = [0i64; 3];
     let Some(first) = polygon.next() else {
