@@ -138,9 +138,15 @@ fn settings_are_saved_changed_and_restored() {
     assert_eq!(again, saved);
     let (code, said, _) = run(&["settings", "restore", "machine.toml"]);
     assert_eq!((code, said), (Some(0), "the machine has these settings\n".into()));
-    // The plotter keeps more decimals than it shows.
+    // More than three decimals are saved and restored, too.
     let (code, said, error) = run(&["set", "100=80.0003"]);
     assert_eq!((code, said), (Some(0), "1 setting is changed\n".into()), "{error}");
+    assert_eq!(run(&["settings", "save", "fine.toml"]).0, Some(0));
+    assert_eq!(run(&["set", "100=80"]).0, Some(0));
+    let (code, said, error) = run(&["settings", "restore", "fine.toml"]);
+    assert_eq!((code, said), (Some(0), "1 setting is changed\n".into()), "{error}");
+    let (_, shown, _) = run(&["settings", "show"]);
+    assert!(shown.contains("100 = 80.00031   steps per mm of x\n"), "{shown}");
     // A polargraph and its anchors only fit each other together.
     let anchors = ["set", "230=2", "231=300", "232=100", "233=1200"];
     let (code, said, error) = run(&anchors);
