@@ -38,11 +38,20 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
     // Without a file, a small example is drawn.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
+    plot_file(args, &file, quiet, interrupt).map_err(|error| error.of_file(&file))
+}
+
+fn plot_file(
+    args: &PlotArgs,
+    file: &Path,
+    quiet: bool,
+    interrupt: &AtomicBool,
+) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, None);
     if args.port.is_none() {
-        output::check(&file, &outputs.files())?;
+        output::check(file, &outputs.files())?;
     }
-    let (job, source) = read(&file, &args.view, quiet)?;
+    let (job, source) = read(file, &args.view, quiet)?;
     let settings = &source.settings;
     let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
@@ -52,7 +61,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         if link.obey_keys() && !quiet {
             note_keys();
         }
-        let plot = Plot { args, file: &file, quiet };
+        let plot = Plot { args, file, quiet };
         let rejoined = plot.rejoin(&job, &mut link, interrupt, &mut bar)?;
         let (report, passes) = match rejoined {
             // Nobody knows which pass it was.
@@ -87,7 +96,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         settings: Some(machine::Settings::default()),
         kept: 0,
     };
-    let plot = Plot { args, file: &file, quiet };
+    let plot = Plot { args, file, quiet };
     let drawn =
         Sender::open(board.as_mut(), Timeouts::default(), interrupt).and_then(|mut sender| {
             let drawn = plot.draw(job, &mut sender, &known, &mut bar);

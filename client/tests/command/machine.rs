@@ -110,6 +110,33 @@ fn an_abort_says_that_the_machine_is_locked() {
 }
 
 #[test]
+fn a_refusal_of_a_drawing_names_its_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("points.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n").expect("written");
+    let plotter = Library::new();
+    let port = plotter.device.as_str();
+    let nothing = "there is nothing to draw: no faces, lines or curves as long as a motor step \
+                   (error 120)\n";
+    for (arguments, reason) in [
+        (&["preview", "points.obj"][..], "the plotter refuses the drawing: "),
+        (&["preview", "points.obj", "--board", "pico"], "the plotter refuses the drawing: "),
+        (&["plot", "points.obj", "--port", port], "cannot draw it: "),
+        (&["plot", "points.obj", "--port", port, "--compute", "host"], "cannot draw it: "),
+        (&["tape", "encode", "points.obj"], "cannot draw it: "),
+    ] {
+        let (code, _, error) = plotter.run(folder.path(), arguments);
+        assert!(matches!(code, Some(1 | 4)), "{arguments:?}: {code:?}");
+        assert_eq!(
+            error.lines().last(),
+            Some(format!("penup: points.obj: {reason}{nothing}").trim_end())
+        );
+    }
+    // What is not about the drawing does not name the file.
+    let (_, _, error) = plotter.run(folder.path(), &["set", "100=1"]);
+    assert!(error.starts_with("penup: the plotter refuses the steps per mm"), "{error}");
+}
+
+#[test]
 fn settings_are_saved_changed_and_restored() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
