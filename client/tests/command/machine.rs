@@ -137,6 +137,29 @@ fn a_refusal_of_a_drawing_names_its_file() {
 }
 
 #[test]
+fn a_page_beyond_the_travel_is_told_with_both_sizes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let svg = |width: u32| {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"100mm\" \
+             viewBox=\"0 0 {width} 100\"><path stroke=\"red\" d=\"M5 50H425M5 60H{}\"/></svg>",
+            width - 1
+        )
+    };
+    fs::write(folder.path().join("wide.svg"), svg(600)).expect("written");
+    let plotter = Library::new();
+    for options in [&[][..], &["--compute", "host"]] {
+        let all = [&["plot", "wide.svg", "--port", plotter.device.as_str()][..], options].concat();
+        let (code, _, error) = plotter.run(folder.path(), &all);
+        assert_eq!(code, Some(1), "{error}");
+        let sizes = "the page of 600 x 100 mm is larger than the travel of the machine, which is \
+                     420 x 420 mm\n";
+        assert!(error.contains(&format!("note: wide.svg: {sizes}")), "{error}");
+        assert!(error.contains("penup: wide.svg: cannot draw it: beyond the travel"), "{error}");
+    }
+}
+
+#[test]
 fn settings_are_saved_changed_and_restored() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
