@@ -275,7 +275,7 @@ mod tests {
             let bits = match is_near {
                 // A little above or below the default, which hardly anything conflicts with.
                 true => default + i64::from(*part >> 12) - (1 << 19),
-                false => low + ((high - low) * i64::from(*part) >> 32),
+                false => low + (((high - low) * i64::from(*part)) >> 32),
             };
             let bits = i32::try_from(bits.clamp(low, high)).expect("within the range");
             let value = Value::from_bits(bits);
