@@ -239,6 +239,23 @@ impl fmt::Display for Length {
     }
 }
 
+/// The number of decimals, 3 or 5, with which a value is shown so that it is read back unchanged.
+///
+/// Whatever was set with up to three decimals is shown with three, as other programs expect it.
+///
+/// ```
+/// use penup::fixed::{Decimal, Millimetres, decimals_of};
+/// let value = |text: &str| Decimal::parse(text).unwrap().to_millimetres().unwrap();
+/// assert_eq!(["80", "88.9", "-0.001", "80.0003"].map(|text| decimals_of(value(text))), [3, 3, 3, 5]);
+/// assert_eq!(decimals_of(Millimetres::DELTA), 5);
+/// ```
+pub fn decimals_of(value: Millimetres) -> u32 {
+    // How far 1000 times the value is from a whole number, in units of 2^-16. If this is less than
+    // half a thousand, the value is the nearest one to a multiple of 0.001.
+    let beyond = (value.to_bits() as u16).wrapping_mul(1000);
+    if beyond.min(beyond.wrapping_neg()) < 500 { 3 } else { 5 }
+}
+
 /// How many units with this many decimals, at most 9, there are in 1.
 fn units_in_one(decimals: u32) -> u64 {
     (0..decimals).fold(1, |units, _| units * 10)

@@ -3,6 +3,7 @@
 //! The file is longer than 500 lines, because most of it is one table: each variant with its
 //! message.
 
+use crate::files::name;
 use crate::fit::FitError;
 use crate::interrupt::EXIT_CODE;
 use crate::machine_settings::NoSuchMachine;
@@ -13,6 +14,7 @@ use penup_readers::ReadError;
 use penup_readers::lines::{JobLine, Origin};
 use penup_readers::words::{as_option, explained, for_client};
 use std::io;
+use std::ops::RangeInclusive;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -180,6 +182,14 @@ pub enum Error {
         board: String,
         /// Whether it keeps larger models in its flash.
         keeps: bool,
+    },
+    /// A file cannot be drawn.
+    #[error("{file}: {source}")]
+    OfFile {
+        /// The path as the user wrote it.
+        file: String,
+        /// The reason, which does not name the file.
+        source: Box<Self>,
     },
     /// The emulator ended, or closed its connection, in the middle of the work.
     #[error(
@@ -407,10 +417,34 @@ const NO_PLOTTER: u8 = 3;
 const REFUSED: u8 = 4;
 const BROKEN_OFF: u8 = 5;
 
+/// The numbers of the errors by which a plotter refuses a drawing for a reason of its own, such as
+/// an alarm or a line that was damaged.
+const OF_PLOTTER: [RangeInclusive<u16>; 4] = [1..=14, 100..=101, 141..=141, 160..=169];
+
 impl Error {
+    /// Names `file`, which was to be drawn, if the error is about its drawing and does not name it.
+    #[must_use]
+    pub fn of_file(self, file: &Path) -> Self {
+        let is_of_drawing = match &self {
+            Self::NotDrawn { .. }
+            | Self::TooLarge { .. }
+            | Self::NotStreamed { .. }
+            | Self::BeyondMemory { .. } => true,
+            Self::Refused { line, number, .. } => {
+                line.origin.is_none() && !OF_PLOTTER.iter().any(|range| range.contains(number))
+            }
+            _ => false,
+        };
+        match is_of_drawing {
+            true => Self::OfFile { file: name(file), source: Box::new(self) },
+            false => self,
+        }
+    }
+
     /// The exit code of the process, one of [`EXIT_CODES`].
     pub fn exit_code(&self) -> u8 {
         match self {
+            Self::OfFile { source, .. } => source.exit_code(),
             Self::Interrupted
             | Self::InterruptedUnconfirmed
             | Self::SetupBrokenOff { is_interrupted: true, .. } => EXIT_CODE,

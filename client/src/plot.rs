@@ -18,13 +18,15 @@ use crate::run::{FileJob, Outputs, note, read, summary, write_pictures};
 use crate::sender::{Sender, Stopped, Timeouts};
 use crate::workspace;
 use penup::index::Index;
-use penup::machine;
+use penup::machine::{self, MachineError, Setting};
+use penup::protocol::CommandError;
 use penup_job::picture::Picture;
 use penup_job::protocol::{GO_ON_AT_ORIGIN, Status};
 use penup_job::results::{JobReport, counted_strokes};
 use penup_job::room::Room;
 use penup_job::streamed::{Form, StreamedJob};
 use penup_readers::lines::Lines;
+use penup_readers::page::Page;
 use serde_json::json;
 use std::io::{self, Write as _};
 use std::path::Path;
@@ -38,11 +40,20 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
     // Without a file, a small example is drawn.
     let example = || workspace::root().join("scenes/interpen.obj");
     let file = args.file.clone().unwrap_or_else(example);
+    plot_file(args, &file, quiet, interrupt).map_err(|error| error.of_file(&file))
+}
+
+fn plot_file(
+    args: &PlotArgs,
+    file: &Path,
+    quiet: bool,
+    interrupt: &AtomicBool,
+) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, None);
     if args.port.is_none() {
-        output::check(&file, &outputs.files())?;
+        output::check(file, &outputs.files())?;
     }
-    let (job, source) = read(&file, &args.view, quiet)?;
+    let (job, source) = read(file, &args.view, quiet)?;
     let settings = &source.settings;
     let mut bar = Bar::new(quiet);
     if let Some(device) = &args.port {
@@ -52,7 +63,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         if link.obey_keys() && !quiet {
             note_keys();
         }
-        let plot = Plot { args, file: &file, quiet };
+        let plot = Plot { args, file, page: settings.page, quiet };
         let rejoined = plot.rejoin(&job, &mut link, interrupt, &mut bar)?;
         let (report, passes) = match rejoined {
             // Nobody knows which pass it was.
@@ -87,7 +98,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
         settings: Some(machine::Settings::default()),
         kept: 0,
     };
-    let plot = Plot { args, file: &file, quiet };
+    let plot = Plot { args, file, page: settings.page, quiet };
     let drawn =
         Sender::open(board.as_mut(), Timeouts::default(), interrupt).and_then(|mut sender| {
             let drawn = plot.draw(job, &mut sender, &known, &mut bar);
@@ -108,6 +119,7 @@ pub fn plot(args: &PlotArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outc
 struct Plot<'p> {
     args: &'p PlotArgs,
     file: &'p Path,
+    page: Page,
     quiet: bool,
 }
 
@@ -118,9 +130,28 @@ impl Plot<'_> {
         }
     }
 
-    /// Draws the file with a plotter that is idle, according to what is `known` of it. The memory
-    /// of the job is free again once this computer has taken it.
+    /// Draws the file with a plotter that is idle, according to what is `known` of it. The user is
+    /// told if the page is larger than its travel and the drawing reaches beyond that: the refusal
+    /// tells how far of one point only.
     fn draw(
+        &self,
+        job: FileJob,
+        sender: &mut Sender<'_>,
+        known: &Known,
+        progress: &mut dyn Progress,
+    ) -> Result<Option<JobReport>, Error> {
+        let drawn = self.draw_known(job, sender, known, progress);
+        if let Err(Error::NotDrawn { refusal: CommandError::Machine(error) }) = &drawn
+            && matches!(error, MachineError::BeyondTravel { .. })
+            && let Some(settings) = &known.settings
+        {
+            self.note(beyond(self.page, settings).as_slice());
+        }
+        drawn
+    }
+
+    /// As [`Plot::draw`]. The memory of the job is free again once this computer has taken it.
+    fn draw_known(
         &self,
         job: FileJob,
         sender: &mut Sender<'_>,
@@ -280,6 +311,19 @@ impl Plot<'_> {
         sender.end();
         sent.map(|()| Some(report))
     }
+}
+
+/// Says that the page is larger than the travel of the machine, if it is.
+fn beyond(page: Page, settings: &machine::Settings) -> Option<String> {
+    let travel = [Setting::TravelX, Setting::TravelY].map(|it| settings.get(it).to_num::<f64>());
+    let [width, height] = travel;
+    (page.width > width || page.height > height).then(|| {
+        format!(
+            "the page of {} x {} mm is larger than the travel of the machine, which is {width} x \
+             {height} mm",
+            page.width, page.height
+        )
+    })
 }
 
 /// What the user is told who goes on with a drawing once more.

@@ -104,8 +104,13 @@ impl<I: Index> InMemory<I> {
         self.board.take_flash()
     }
 
+    /// The settings of the machine.
+    pub fn settings(&self) -> &Settings {
+        self.plotter.machine().settings()
+    }
+
     fn steps_per_mm(&self) -> [f64; 2] {
-        self.plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>())
+        self.settings().page_steps().map(|steps| steps.to_num::<f64>())
     }
 
     /// Polls the plotter until it has read every byte and has no more work. A plot that began

@@ -48,10 +48,14 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let quiet = cli.quiet;
     match &cli.command {
         Command::Plot(args) => plot(args, quiet, interrupt),
-        Command::Preview(args) => preview(args, quiet, interrupt),
+        Command::Preview(args) => {
+            preview(args, quiet, interrupt).map_err(|error| error.of_file(&args.file))
+        }
         Command::Page(args) => page::serve(args),
         Command::Fit(args) => fit(args, quiet),
-        Command::Tape(TapeCommand::Encode(args)) => encode_tape(args, quiet, interrupt),
+        Command::Tape(TapeCommand::Encode(args)) => {
+            encode_tape(args, quiet, interrupt).map_err(|error| error.of_file(&args.file))
+        }
         Command::Tape(TapeCommand::Decode { file, .. }) => {
             let text = tape::decode(&files::bytes(file)?).map_err(damaged(file))?;
             let instructions: Vec<&str> = text.lines().collect();

@@ -50,6 +50,12 @@ impl AssignedSetting {
         }
     }
 
+    /// The value as a plotter keeps it, rounded to 2^-16; `None` if it is beyond what a setting can
+    /// be.
+    pub fn kept(&self) -> Option<Value> {
+        Decimal::parse(&self.value).ok()?.to_millimetres().ok()
+    }
+
     /// The name of the setting, if this program knows it.
     pub fn name(&self) -> Option<&'static str> {
         SETTINGS.iter().find(|info| info.number() == self.number).map(|info| info.name)
@@ -95,10 +101,7 @@ pub fn is_grid(settings: &Settings) -> bool {
 
 fn set(settings: &mut Settings, assigned: &AssignedSetting) -> Result<(), SettingError> {
     let setting = Setting::numbered(assigned.number).ok_or(SettingError::Unknown)?;
-    // The value is parsed as a plotter parses it.
-    let value = Decimal::parse(&assigned.value).ok();
-    let value = value.and_then(|value| value.to_millimetres().ok());
-    settings.set(setting, value.ok_or(SettingError::OutOfRange(setting))?)
+    settings.set(setting, assigned.kept().ok_or(SettingError::OutOfRange(setting))?)
 }
 
 #[cfg(test)]

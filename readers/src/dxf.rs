@@ -590,6 +590,13 @@ impl Format for Dxf {
         if drawing.is_of_paper {
             notes.push("paper space is drawn, because there is nothing in model space".to_owned());
         }
+        if pairs.last().is_none_or(|last| (last.code, last.value()) != (0, "EOF")) {
+            notes.push(
+                "the file has no mark of its end (EOF): if it was cut off, a part is missing, so \
+                 copy or save it again"
+                    .to_owned(),
+            );
+        }
         if document.unit.unwrap_or(0) == 0 {
             notes.push("the file does not say its unit: it is taken as mm".to_owned());
         }

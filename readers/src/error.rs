@@ -1,5 +1,6 @@
 //! The errors of reading a file to draw. Each message also tells the user what to do about it.
 
+use crate::format::Format;
 use crate::lines::Origin;
 
 /// The reason why a file is not drawn.
@@ -52,4 +53,32 @@ pub enum ReadError {
         /// The path as the user wrote it.
         file: String,
     },
+}
+
+impl ReadError {
+    /// Says that the file is of `other`, another format than its name says, if it is.
+    pub(crate) fn of_other_format(mut self, other: Option<&dyn Format>) -> Self {
+        let Some(format) = other else { return self };
+        let extension = format.extensions().first().copied().unwrap_or_default();
+        let (article, name) = (article(format.name()), format.name());
+        let advice = format!(
+            "the content is that of {article} {name} file: give it a name that ends in .{extension}"
+        );
+        match &mut self {
+            Self::Line { reason, .. } | Self::Content { reason, .. } => {
+                *reason = format!("{advice} ({reason})");
+                self
+            }
+            Self::NotText { origin, .. } => {
+                Self::Content { file: origin.file.clone(), reason: advice }
+            }
+            _ => self,
+        }
+    }
+}
+
+/// The article before the name of a format.
+fn article(name: &str) -> &'static str {
+    // These are spoken letter by letter, or begin with a vowel.
+    if name.starts_with("HP") || name.starts_with('S') { "an" } else { "a" }
 }

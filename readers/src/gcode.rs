@@ -176,7 +176,7 @@ impl Interpreter {
                 ('G', 170 | 400 | 430 | 490 | 540..=590 | 610 | 640 | 940) => {}
                 ('M', 30 | 40) => self.signals.spindle = Some(true),
                 ('M', 50) => self.signals.spindle = Some(false),
-                ('M', 2800 | 3000) => servo = true,
+                ('M', 2800 | 3000 | 3400) => servo = true,
                 ('M', 20 | 300) => goes_on = false,
                 ('M', 0 | 10 | 60 | 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
                 // Modes of speed and of cycles, and the ends of modes that are refused.
@@ -262,7 +262,9 @@ impl Interpreter {
             Some(value) if is_relative => now + value * unit,
             Some(value) => origin[axis] + value * unit,
         };
-        let extrudes = value('E').is_some_and(|to| self.extruder.advance(to, is_relative));
+        // Beside M, E is no way of the extruder.
+        let pushes = value('E').filter(|_| value('M').is_none());
+        let extrudes = pushes.is_some_and(|to| self.extruder.advance(to, is_relative));
         self.signals.extrudes = extrudes;
         let drills = self.motion == DRILLING;
         if value('Z').is_some() && !drills {

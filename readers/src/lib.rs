@@ -223,9 +223,21 @@ fn read(
     }
     if !format.may_be_binary(&bytes) && foreign::is_binary(&bytes) {
         let origin = Origin { file: name, line: 1, text: String::new() };
-        return Err(ReadError::NotText { origin, kind: format.name() });
+        let error = ReadError::NotText { origin, kind: format.name() };
+        return Err(error.of_other_format(other_format(format, &bytes)));
     }
-    Ok((size, format.read(name, bytes, arrangement)?))
+    let other = other_format(format, &bytes);
+    let contents = format.read(name, bytes, arrangement);
+    Ok((size, contents.map_err(|error| error.of_other_format(other))?))
+}
+
+/// The format that the content of a file is of, if it is not `format`, which its name says.
+fn other_format(format: &dyn Format, bytes: &[u8]) -> Option<&'static dyn Format> {
+    let beginning = bytes.get(..BEGINNING).unwrap_or(bytes);
+    if format.recognises(beginning) {
+        return None;
+    }
+    FORMATS.iter().copied().find(|it| it.recognises(beginning))
 }
 
 /// Whether reading a file called `name` with these `bytes` may take up to 256 MiB of stack, because

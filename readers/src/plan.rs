@@ -19,8 +19,7 @@ pub(crate) type Point = [f64; 2];
 const PER_MM: f64 = 1000.0;
 
 /// The length in mm of the line that is drawn for a dot: more than a motor step.
-#[cfg(any(feature = "dxf", feature = "hpgl", feature = "svg"))]
-const DOT: f64 = 0.02;
+pub(crate) const DOT: f64 = 0.02;
 
 /// The coordinate in mm from which on a plan is moved: less than the largest that plotters take.
 #[cfg(feature = "plans")]
@@ -37,9 +36,22 @@ pub(crate) struct Stroke {
     pub(crate) layer: u32,
     /// The number of the element of the file that it comes from.
     pub(crate) element: u32,
+    /// Whether it is a dot, whose length is the same at any scale, as long as it has two points.
+    pub(crate) is_dot: bool,
 }
 
 impl Stroke {
+    /// Makes a dot so long, in mm. Other strokes stay as they are.
+    pub(crate) fn keep_dot(&mut self, length: f64) {
+        let (true, [from, to]) = (self.is_dot, &mut self.points[..]) else { return };
+        let now = (to[0] - from[0]).hypot(to[1] - from[1]);
+        if now > 0.0 {
+            for axis in 0..2 {
+                to[axis] = from[axis] + (to[axis] - from[axis]) * length / now;
+            }
+        }
+    }
+
     /// Whether the polyline ends where it begins.
     pub(crate) fn is_closed(&self) -> bool {
         self.points.len() > 2 && self.points.first() == self.points.last()
@@ -129,7 +141,7 @@ impl Plan {
             return;
         }
         let element = self.element();
-        self.strokes.push(Stroke { points, pen, layer, element });
+        self.strokes.push(Stroke { points, pen, layer, element, is_dot: false });
     }
 
     /// Draws a dot on a layer, as a line of [`DOT`] to the right, or to the left at the right end
@@ -138,7 +150,11 @@ impl Plan {
     pub(crate) fn draw_dot(&mut self, [x, y]: Point, page: Option<[f64; 2]>, pen: u32, layer: u32) {
         let is_at_end = page.is_some_and(|page| x + DOT > page[0]);
         let beside = if is_at_end { x - DOT } else { x + DOT };
+        let next = self.strokes.len();
         self.draw_on([[x, y], [beside, y]], page, pen, layer);
+        if let Some(dot) = self.strokes.get_mut(next) {
+            dot.is_dot = true;
+        }
     }
 
     /// The name of a layer.

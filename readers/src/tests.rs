@@ -56,6 +56,30 @@ fn files_of_other_programs_are_named_whatever_they_are_called() {
     }
 }
 
+#[cfg(all(feature = "dxf", feature = "gcode", feature = "hpgl", feature = "svg"))]
+#[test]
+fn a_file_under_the_name_of_another_format_is_told_its_own() {
+    let svg: &[u8] = b"<svg xmlns=\"http://www.w3.org/2000/svg\"><path d=\"M0 0L9 9\"/></svg>";
+    let dxf = b"  0\nSECTION\n  2\nENTITIES\n  0\nENDSEC\n  0\nEOF\n";
+    for (name, content, format) in [
+        ("a.stl", svg, "an SVG file: give it a name that ends in .svg (this is no STL file)"),
+        ("a.dxf", svg, "an SVG file: give it a name that ends in .svg (there should be a code"),
+        ("a.plt", svg, "an SVG file: give it a name that ends in .svg ("),
+        ("a.obj", svg, "an SVG file: give it a name that ends in .svg (penup reads"),
+        ("a.svg", dxf, "a DXF file: give it a name that ends in .dxf (this is not a well-formed"),
+        ("a.gcode", dxf, "a DXF file: give it a name that ends in .dxf (\"0\" is no word"),
+        ("a.gcode", b"IN;SP1;PU0,0;PD9,9;", "an HP-GL file: give it a name that ends in .hpgl"),
+        ("a.dxf", b"G21\nG0 X1\nM3\nG1 X2 F9\n", "a G-code file: give it a name that ends in"),
+        ("a.stl", b"v 0 0 0\nv 1 0 0\nl 1 2\n", "a Wavefront OBJ file: give it a name that"),
+    ] {
+        let error = read(name, content).expect_err("refused");
+        assert!(error.contains(&format!("the content is that of {format}")), "{name}: {error}");
+    }
+    // Where the name is right, nothing is said of other formats.
+    let error = read("a.svg", b"<svg><path").expect_err("refused");
+    assert!(!error.contains("content"), "{error}");
+}
+
 /// Random bytes are not shown to the user as if they were a line.
 #[test]
 fn bytes_that_are_no_text_are_refused_as_such() {

@@ -13,6 +13,20 @@ fn every_length_is_distinguished_from_its_neighbours() {
     }
 }
 
+#[test]
+fn a_value_is_read_back_from_the_decimals_that_it_is_shown_with() {
+    for bits in (-70_000..70_000).chain([i32::MIN, i32::MAX, i32::MAX - 1]) {
+        let decimals = decimals_of(Millimetres::from_bits(bits));
+        let shown = BinaryFraction { units: bits.into(), fraction_bits: 16, decimals };
+        assert_eq!(binary(&format!("{shown}"), 16), Ok(i64::from(bits)), "{shown}");
+    }
+    for thousandths in -70_000..70_000 {
+        let text = format!("{thousandths}e-3");
+        let value = Decimal::parse(&text).ok().and_then(|it| it.to_millimetres().ok());
+        assert_eq!(value.map(decimals_of), Some(3), "{text}");
+    }
+}
+
 /// What is beyond counts as zeros, so that no arithmetic overflows.
 #[test]
 fn digits_behind_the_eighteenth_are_left_out() {

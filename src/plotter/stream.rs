@@ -8,7 +8,7 @@ use super::overrides::OverrideChange;
 use super::program::{Context, MachineAction, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
-use crate::fixed::BinaryFraction;
+use crate::fixed::{BinaryFraction, decimals_of};
 use crate::index::Index;
 use crate::machine::{Alarm, MachineError, Setting, State, Target};
 use crate::model::ElementKind;
@@ -262,7 +262,7 @@ impl<I: Index> Inner<'_, I> {
                     let (name, unit) = (info.name, info.unit());
                     let number = u32::from(info.number());
                     let units = value.to_bits().into();
-                    let decimals = if info.whole { 0 } else { 3 };
+                    let decimals = if info.whole { 0 } else { decimals_of(value) };
                     let value = BinaryFraction { units, fraction_bits: 16, decimals };
                     line(format_args!("${number}={value} ({name}, {unit})"));
                 }

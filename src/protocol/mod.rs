@@ -27,9 +27,9 @@ pub use alarm::AlarmEntry;
 pub use alarm::alarm_entries;
 pub use block_error::BlockError;
 pub use command::{Command, HELP};
-#[cfg(feature = "tiles")]
-pub use command_error::StoredModelError;
 pub use command_error::{CommandError, ErrorEntry};
+#[cfg(feature = "tiles")]
+pub use command_error::{Crowd, StoredModelError};
 #[cfg(any(test, feature = "host"))]
 pub use command_error::{error_entries, error_samples};
 pub use escape::{Escape, EscapedText};

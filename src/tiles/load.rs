@@ -4,7 +4,6 @@
 
 use super::page::{GridPoint, Rectangle};
 use super::{LOOK, Listed, ModelSource, PLACE, Tiles};
-use crate::array::MapEach;
 use crate::geometry::Vertex;
 use crate::index::Index;
 use crate::model::{Corner, Element, Elements, PenWriter, Position};
@@ -133,8 +132,8 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
     /// Loads a part of the model. `listed` may spare a pass over the model.
     ///
     /// # Errors
-    /// [`VisibilityError::Scratch`] or [`VisibilityError::TooManyCorners`] if the part is too
-    /// large, [`VisibilityError::Aborted`].
+    /// [`VisibilityError::Scratch`], [`VisibilityError::TooManyCorners`] or
+    /// [`VisibilityError::TooManyVertices`] if the part is too large, [`VisibilityError::Aborted`].
     pub(super) fn load<'a>(
         &self,
         reach: Reach,
@@ -204,8 +203,7 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         })?;
         let limit = <Corner<u16>>::VERTEX_NUMBER_LIMIT;
         if numbers.len() > limit {
-            let [needed, available] = [numbers.len(), limit].map_each(Scratch::bytes_for::<Vertex>);
-            return Err(OutOfScratch { needed, available }.into());
+            return Err(VisibilityError::TooManyVertices { count: numbers.len(), limit });
         }
         let corners: &mut [Corner<u16>] = scratch.take(corner_count)?;
         let mut pens = PenWriter::new(scratch, changes)?;

@@ -444,5 +444,10 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
 
 /// Whether a smaller part of the model may do where this error came.
 fn is_too_large(error: VisibilityError) -> bool {
-    matches!(error, VisibilityError::Scratch(_) | VisibilityError::TooManyCorners(_))
+    matches!(
+        error,
+        VisibilityError::Scratch(_)
+            | VisibilityError::TooManyCorners(_)
+            | VisibilityError::TooManyVertices { .. }
+    )
 }

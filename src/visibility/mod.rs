@@ -187,6 +187,13 @@ pub enum VisibilityError {
     Aborted,
     /// The elements together have more corners than can be numbered. The value is the limit.
     TooManyCorners(usize),
+    /// The elements together have more vertices than can be numbered.
+    TooManyVertices {
+        /// How many they have.
+        count: usize,
+        /// How many can be numbered.
+        limit: usize,
+    },
     /// An element refers to a vertex that does not exist. The value is the number of that vertex.
     UnknownVertex(u32),
     /// A coordinate is beyond [`COORDINATE_LIMIT`], or, in perspective, a vertex is not in front of

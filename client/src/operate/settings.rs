@@ -19,11 +19,11 @@ use std::sync::atomic::AtomicBool;
 /// How often the settings are read while no two answers agree.
 const MOST_READINGS: u32 = 10;
 
-/// How far the shown value of a setting may be from what it was set to: the plotter rounds to 2^-16
-/// and shows three decimals.
+/// How far a value that is shown with three decimals may be from what it was set to. Older firmware
+/// shows so many, and every one rounds to 2^-16.
 const SHOWN: f64 = 0.0006;
 
-/// Sets settings of the machine. All are sent: the plotter shows three decimals of a setting and
+/// Sets settings of the machine. All are sent: older firmware shows three decimals of a setting and
 /// keeps more, so one that it shows may be another.
 ///
 /// # Errors
@@ -105,14 +105,17 @@ pub(super) fn as_json(settings: &[AssignedSetting]) -> Value {
     json!({ "settings": pairs.collect::<Map<_, _>>() })
 }
 
-/// The value of a setting that the plotter shows.
-fn shown(all: &[AssignedSetting], it: &AssignedSetting) -> Option<f64> {
-    all.iter().find(|now| now.number == it.number)?.value.parse().ok()
+/// The setting of the same number that the plotter shows.
+fn shown<'a>(all: &'a [AssignedSetting], it: &AssignedSetting) -> Option<&'a AssignedSetting> {
+    all.iter().find(|now| now.number == it.number)
 }
 
 /// Those of the `wanted` settings that are not what the plotter shows.
 fn differing(shown_now: &[AssignedSetting], wanted: &[AssignedSetting]) -> Vec<AssignedSetting> {
-    let differs = |it: &&AssignedSetting| shown(shown_now, it) != it.value.parse().ok();
+    let differs = |it: &&AssignedSetting| {
+        let now = shown(shown_now, it).and_then(AssignedSetting::kept);
+        now.is_none() || now != it.kept()
+    };
     wanted.iter().filter(differs).cloned().collect()
 }
 
@@ -147,13 +150,23 @@ fn assign(sender: &mut Sender<'_>, wanted: &[AssignedSetting]) -> Result<(), Err
         }
     }
     let after = read(sender)?;
-    let has_taken = |it: &&AssignedSetting| match (shown(&after, it), it.value.parse::<f64>()) {
-        (Some(now), Ok(wanted)) => (now - wanted).abs() <= SHOWN,
-        _ => false,
-    };
+    let has_taken =
+        |wanted: &&AssignedSetting| shown(&after, wanted).is_some_and(|now| is_of(now, wanted));
     match wanted.iter().find(|it| !has_taken(it)) {
         Some(setting) => Err(Error::NotSet { number: setting.number }),
         None => Ok(()),
+    }
+}
+
+/// Whether the plotter shows `now` where it has the value that is `wanted`.
+fn is_of(now: &AssignedSetting, wanted: &AssignedSetting) -> bool {
+    let has_decimals = now.value.split_once('.').is_some_and(|(_, decimals)| decimals.len() > 3);
+    match (now.kept(), wanted.kept()) {
+        (Some(now), Some(wanted)) if now == wanted => true,
+        (Some(now), Some(wanted)) => {
+            !has_decimals && (now.to_num::<f64>() - wanted.to_num::<f64>()).abs() <= SHOWN
+        }
+        _ => false,
     }
 }
 
@@ -201,10 +214,17 @@ pub(super) fn agreed<T: PartialEq>(
 
 #[cfg(test)]
 mod tests {
-    use super::{assign, change};
+    use super::super::settings_file::SavedSettings;
+    use super::{assign, change, is_of, read};
     use crate::fake::{FakePlotter, Fault};
-    use crate::machine_settings::AssignedSetting;
+    use crate::link::Link;
+    use crate::machine_settings::{AssignedSetting, simulated};
+    use crate::preview::InMemory;
     use crate::sender::{Sender, Timeouts};
+    use penup::machine::{SETTINGS, Setting, Settings, Value};
+    use penup_job::room::Room;
+    use proptest::collection::vec;
+    use proptest::prelude::*;
     use std::sync::atomic::AtomicBool;
 
     /// What the plotter is sent that shows `$100=80.000`.
@@ -228,5 +248,71 @@ mod tests {
         // It may have been 80.0003 before.
         assert_eq!(sent("80", false), ["$100=80"]);
         assert!(sent("80", true).is_empty());
+    }
+
+    #[test]
+    fn a_value_with_more_than_three_decimals_is_shown_exactly() {
+        let of = |value: &str| AssignedSetting { number: 100, value: value.to_owned() };
+        for (now, wanted, is_wanted) in [
+            ("80.000", "80", true),
+            // Older firmware shows three decimals of any value.
+            ("80.000", "80.0003", true),
+            ("80.00031", "80.0003", true),
+            ("80.00031", "80.0004", false),
+            ("80.001", "80", false),
+        ] {
+            assert_eq!(is_of(&of(now), &of(wanted)), is_wanted, "{now} {wanted}");
+        }
+    }
+
+    /// A machine with a value of each setting, at this part of its range, that is `near` from its
+    /// least to its greatest. What conflicts with the others keeps its default.
+    fn machine(parts: &[(u32, bool)]) -> Settings {
+        let mut settings = Settings::default();
+        for (info, (part, is_near)) in SETTINGS.iter().zip(parts) {
+            let [low, high] = [info.least, info.greatest].map(|end| i64::from(end.to_bits()));
+            let default = i64::from(info.default.to_bits());
+            let bits = match is_near {
+                // A little above or below the default, which hardly anything conflicts with.
+                true => default + i64::from(*part >> 12) - (1 << 19),
+                false => low + (((high - low) * i64::from(*part)) >> 32),
+            };
+            let bits = i32::try_from(bits.clamp(low, high)).expect("within the range");
+            let value = Value::from_bits(bits);
+            let value = if info.whole { value.floor() } else { value };
+            let _ = settings.set(info.setting, value);
+        }
+        settings
+    }
+
+    fn with_sender<R>(plotter: &mut dyn Link, act: impl FnOnce(&mut Sender<'_>) -> R) -> R {
+        let interrupt = AtomicBool::new(false);
+        let (mut sender, _) =
+            Sender::open_for_orders(plotter, Timeouts::simulated(), &interrupt).expect("opened");
+        let result = act(&mut sender);
+        sender.end();
+        result
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(64))]
+
+        /// What is saved and restored is the same to the last bit, on another machine and in a
+        /// preview.
+        #[test]
+        fn settings_that_are_saved_are_restored_without_a_loss(
+            parts in vec((any::<u32>(), any::<bool>()), SETTINGS.len()),
+        ) {
+            let mut settings = machine(&parts);
+            let mut plotter = InMemory::<u16>::new(Room::usual(), settings);
+            let saved = with_sender(&mut plotter, read).expect("read");
+            let text = SavedSettings { settings: saved }.to_toml("penup");
+            let saved = SavedSettings::parse(&text).expect("settings").settings;
+            let mut other = InMemory::<u16>::new(Room::usual(), Settings::default());
+            with_sender(&mut other, |sender| change(sender, &saved)).expect("restored");
+            prop_assert_eq!(other.settings(), &settings);
+            settings.set(Setting::Homing, Value::ZERO).expect("a switch");
+            prop_assert_eq!(simulated(&saved), Ok(settings));
+        }
     }
 }

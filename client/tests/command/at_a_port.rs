@@ -124,7 +124,7 @@ fn a_model_that_the_plotter_cannot_hold_is_not_sent() {
     let command = ["plot", "cube.obj", "--compute", "board", "--port", &plotter.device];
     let (code, _, stderr) = penup(folder.path(), &command);
     assert_eq!(code, Some(1));
-    let reason = "penup: the model has 8 vertices, and this plotter takes 7\n";
+    let reason = "penup: cube.obj: the model has 8 vertices, and this plotter takes 7\n";
     assert!(stderr.starts_with(reason), "{stderr}");
     assert_eq!(plotter.unplug().lines, [""; 0]);
 }

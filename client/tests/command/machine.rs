@@ -110,6 +110,56 @@ fn an_abort_says_that_the_machine_is_locked() {
 }
 
 #[test]
+fn a_refusal_of_a_drawing_names_its_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("points.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\n").expect("written");
+    let plotter = Library::new();
+    let port = plotter.device.as_str();
+    let nothing = "there is nothing to draw: no faces, lines or curves as long as a motor step \
+                   (error 120)\n";
+    for (arguments, reason) in [
+        (&["preview", "points.obj"][..], "the plotter refuses the drawing: "),
+        (&["preview", "points.obj", "--board", "pico"], "the plotter refuses the drawing: "),
+        (&["plot", "points.obj", "--port", port], "cannot draw it: "),
+        (&["plot", "points.obj", "--port", port, "--compute", "host"], "cannot draw it: "),
+        (&["tape", "encode", "points.obj"], "cannot draw it: "),
+    ] {
+        let (code, _, error) = plotter.run(folder.path(), arguments);
+        assert!(matches!(code, Some(1 | 4)), "{arguments:?}: {code:?}");
+        assert_eq!(
+            error.lines().last(),
+            Some(format!("penup: points.obj: {reason}{nothing}").trim_end())
+        );
+    }
+    // What is not about the drawing does not name the file.
+    let (_, _, error) = plotter.run(folder.path(), &["set", "100=1"]);
+    assert!(error.starts_with("penup: the plotter refuses the steps per mm"), "{error}");
+}
+
+#[test]
+fn a_page_beyond_the_travel_is_told_with_both_sizes() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let svg = |width: u32| {
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}mm\" height=\"100mm\" \
+             viewBox=\"0 0 {width} 100\"><path stroke=\"red\" d=\"M5 50H425M5 60H{}\"/></svg>",
+            width - 1
+        )
+    };
+    fs::write(folder.path().join("wide.svg"), svg(600)).expect("written");
+    let plotter = Library::new();
+    for options in [&[][..], &["--compute", "host"]] {
+        let all = [&["plot", "wide.svg", "--port", plotter.device.as_str()][..], options].concat();
+        let (code, _, error) = plotter.run(folder.path(), &all);
+        assert_eq!(code, Some(1), "{error}");
+        let sizes = "the page of 600 x 100 mm is larger than the travel of the machine, which is \
+                     420 x 420 mm\n";
+        assert!(error.contains(&format!("note: wide.svg: {sizes}")), "{error}");
+        assert!(error.contains("penup: wide.svg: cannot draw it: beyond the travel"), "{error}");
+    }
+}
+
+#[test]
 fn settings_are_saved_changed_and_restored() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
@@ -138,9 +188,15 @@ fn settings_are_saved_changed_and_restored() {
     assert_eq!(again, saved);
     let (code, said, _) = run(&["settings", "restore", "machine.toml"]);
     assert_eq!((code, said), (Some(0), "the machine has these settings\n".into()));
-    // The plotter keeps more decimals than it shows.
+    // More than three decimals are saved and restored, too.
     let (code, said, error) = run(&["set", "100=80.0003"]);
     assert_eq!((code, said), (Some(0), "1 setting is changed\n".into()), "{error}");
+    assert_eq!(run(&["settings", "save", "fine.toml"]).0, Some(0));
+    assert_eq!(run(&["set", "100=80"]).0, Some(0));
+    let (code, said, error) = run(&["settings", "restore", "fine.toml"]);
+    assert_eq!((code, said), (Some(0), "1 setting is changed\n".into()), "{error}");
+    let (_, shown, _) = run(&["settings", "show"]);
+    assert!(shown.contains("100 = 80.00031   steps per mm of x\n"), "{shown}");
     // A polargraph and its anchors only fit each other together.
     let anchors = ["set", "230=2", "231=300", "232=100", "233=1200"];
     let (code, said, error) = run(&anchors);

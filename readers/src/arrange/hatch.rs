@@ -37,7 +37,7 @@ pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
             let parts = within.cut(&line, &mut budget).map_err(|_| {
                 "the clip paths of the drawing have too many sides for --hatch".to_owned()
             })?;
-            let stroke = |points| Stroke { points, pen, layer, element };
+            let stroke = |points| Stroke { points, pen, layer, element, is_dot: false };
             plan.strokes.extend(parts.into_iter().map(stroke));
         }
     }

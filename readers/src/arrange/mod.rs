@@ -26,7 +26,7 @@ pub use table::{PLAN_OPTIONS, PlanOption};
 use crate::files::Files;
 use crate::fonts::Fonts;
 use crate::page::{A4, Page};
-use crate::plan::{Plan, Point};
+use crate::plan::{DOT, Plan, Point};
 use penup::drawing::Title;
 use penup::fixed::Millimetres;
 
@@ -217,6 +217,15 @@ impl Arrangement {
         if !self.layer_order.is_empty() {
             notes.push(layers::reorder(plan, &self.layer_order)?);
         }
+        if self.fit.is_some()
+            && !self.scales_to_page()
+            && let Some(map) = self.map_to(sheet, margin, plan.bounds())
+        {
+            // The plotter scales the plan. A dot would become shorter than a step of the motors.
+            let factor = map([1.0, 0.0])[0] - map([0.0; 2])[0];
+            let length = DOT / factor.min(1.0);
+            plan.strokes.iter_mut().for_each(|stroke| stroke.keep_dot(length));
+        }
         if plan.is_empty() {
             let options = PLAN_OPTIONS.iter().filter(|option| (option.is_set)(self));
             let options: Vec<String> = options.map(|it| format!("--{}", it.name)).collect();
@@ -276,12 +285,13 @@ pub fn sine_cosine(degrees: f64) -> (f64, f64) {
     }
 }
 
-/// Applies `map` to every point of the plan.
+/// Applies `map` to every point of the plan. Dots keep their length.
 fn transform(plan: &mut Plan, map: impl Fn(Point) -> Point) {
     let strokes = plan.strokes.iter_mut().flat_map(|stroke| &mut stroke.points);
     let areas = plan.areas.iter_mut().flatten();
     let outlines = areas.flat_map(|area| area.outlines.iter_mut().flatten());
     strokes.chain(outlines).for_each(|point| *point = map(*point));
+    plan.strokes.iter_mut().for_each(|stroke| stroke.keep_dot(DOT));
 }
 
 #[cfg(test)]

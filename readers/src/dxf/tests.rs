@@ -211,6 +211,20 @@ fn what_is_not_drawn_is_counted() {
     assert!(said[1].ends_with(&format!("(the first in line {line})")), "{said:?}");
 }
 
+/// The rest of a file that was cut off is missing without a trace.
+#[test]
+fn a_file_without_its_end_is_told() {
+    let line = "0 LINE 8 0 10 1 20 2 11 3 21 4";
+    let whole = dxf("4", "", &format!("{line} {line} {line}"));
+    let is_told = |text: &str| {
+        notes("a.dxf", text.as_bytes()).iter().any(|note| note.contains("no mark of its end"))
+    };
+    assert!(!is_told(&whole));
+    let third = whole.match_indices("LINE\r\n").nth(2).expect("three lines").0;
+    let cut = whole.get(..third - "0\r\n".len()).expect("the file before the third line");
+    assert!(is_told(cut));
+}
+
 #[test]
 fn damaged_files_are_refused_with_their_line() {
     let spline = "0 SPLINE 71 3 40 0 40 1 10 0 20 0 10 1 20 1";

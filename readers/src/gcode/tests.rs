@@ -39,6 +39,7 @@ fn the_pen_is_found_in_every_dialect() {
         ("servo by S", "M3 S30", "M3 S90", "G0"),
         ("servo by S, the other way", "M3 S90", "M3 S30", "G1"),
         ("servo of Marlin", "M280 P0 S10", "M280 P0 S60", "G0"),
+        ("servo of Repetier", "M340 P3 S2350", "M340 P3 S1500", "G0"),
         ("MakerBot's servo", "M300 S50", "M300 S30", "G1"),
         ("height", "G0 Z5", "G1 Z0", "G0"),
         ("height by feeds", "G1 Z3", "G1 Z-1", "G1"),
@@ -51,6 +52,17 @@ fn the_pen_is_found_in_every_dialect() {
     // A spindle that runs all the time lifts nothing; the height does.
     let routed = format!("M3 S12000\n{}M5\n", program("G0 Z5", "G1 Z-1", "G0"));
     assert_eq!(strokes(&routed), expected);
+}
+
+/// Some pen plotters are told their size by words beside M, among them E.
+#[test]
+fn a_size_beside_m_is_no_extrusion() {
+    let program = "M4 X840 E0.5 S6400 P80\nG21\nG90\nG0 X10 Y10\nM340 P3 S1500\nG1 X20\nG1 Y20\n\
+                   M340 P3 S2350\nG0 X30 Y5\nM340 P3 S1500\nG1 X40\nM340 P3 S2350\n";
+    let expected =
+        vec![vec![[10.0, 10.0], [20.0, 10.0], [20.0, 20.0]], vec![[30.0, 5.0], [40.0, 5.0]]];
+    assert_eq!(strokes(program), expected);
+    assert!(notes("a.gcode", program.as_bytes()).iter().all(|note| !note.contains("3D printer")));
 }
 
 /// LightBurn switches the laser on once, by M4 or M3, without a power, and travels by G0.

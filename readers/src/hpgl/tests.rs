@@ -1,6 +1,9 @@
 //! Tests of reading HP-GL.
 
+use crate::lines::{JobLine, Lines as _};
+use crate::page::Page;
 use crate::tests::{notes, sent};
+use crate::{Arrangement, SourceFile, Turn};
 
 fn lines(text: &str) -> Vec<String> {
     sent("a.plt", text.as_bytes()).expect("HP-GL")
@@ -79,6 +82,31 @@ fn dots_are_drawn_as_very_short_lines() {
     }
     // Where a line goes on there is no dot.
     assert_eq!(lines("PU40,40;PD;PD80,40;PU;")[1..], ["v 1 1 0", "v 2 1 0", "l 1 2"]);
+}
+
+/// A dot that is scaled with the drawing would be shorter than a step of the motors.
+#[test]
+fn dots_keep_their_length_on_the_paper() {
+    let dots = b"IN;SP1;PU0,0;PD;PU40000,0;PD;PU0,40000;PD;PU;";
+    let lengths = |arrangement: &Arrangement| -> Vec<f64> {
+        let file = SourceFile::arranged("a.plt".to_owned(), dots.to_vec(), arrangement);
+        let file = file.expect("read");
+        let numbers = |line: JobLine| -> Option<f64> {
+            line.sent.strip_prefix("v ")?.split(' ').next()?.parse().ok()
+        };
+        let x: Vec<f64> = file.in_order().filter_map(numbers).collect();
+        x.chunks(2).map(|ends| ((ends[1] - ends[0]) * 1000.0).round() / 1000.0).collect()
+    };
+    let mut scaled = Arrangement::default();
+    assert_eq!(lengths(&scaled), [0.02; 3]);
+    for factor in ["0.1", "10"] {
+        scaled.set("scale", factor).expect("a factor");
+        assert_eq!(lengths(&scaled), [0.02; 3]);
+    }
+    // The plotter scales a square of a metre to a tenth of that.
+    let page = Page { width: 110.0, height: 210.0 };
+    let fitted = Arrangement::on(Some(page), Turn::AsItIs, Some(5.0)).fitted("", 5.0);
+    assert_eq!(lengths(&fitted), [0.2; 3]);
 }
 
 #[test]

@@ -6,6 +6,7 @@
 use super::{PER_MM, Stroke};
 use crate::lines::{JobLine, Lines, Origin};
 use penup::protocol::LINE_LIMIT;
+use std::cell::Cell;
 use std::collections::HashMap;
 use std::fmt::Write as _;
 
@@ -71,13 +72,16 @@ pub(crate) struct PlanLines {
     count: usize,
     /// Where every line begins whose number is a multiple of [`STRIDE`], and its element.
     marks: Vec<(usize, u32)>,
+    /// The number of the line behind the last one that was asked for, where the text goes on
+    /// there, and the element. Most lines are asked for in order.
+    next: Cell<Option<(usize, usize, u32)>>,
 }
 
 impl PlanLines {
     /// Begins to write the lines of a plan with these elements.
     pub(super) fn writer(file: String, elements: Elements) -> PlanWriter {
         let (text, marks) = (String::new(), Vec::new());
-        let lines = Self { file, elements, text, count: 0, marks };
+        let lines = Self { file, elements, text, count: 0, marks, next: Cell::new(None) };
         PlanWriter { lines, element: None, pen: None, vertices: Vertices::default() }
     }
 
@@ -106,8 +110,15 @@ impl Lines for PlanLines {
     }
 
     fn line(&self, index: usize) -> Option<JobLine> {
-        let mark = *self.marks.get(index / STRIDE)?;
-        self.from(mark).nth(index % STRIDE).map(|line| self.job_line(line))
+        let (mark, skipped) = match self.next.get() {
+            Some((next, at, element)) if next == index => ((at, element), 0),
+            _ => (*self.marks.get(index / STRIDE)?, index % STRIDE),
+        };
+        let (line, element) = self.from(mark).nth(skipped)?;
+        // The line lies in the text, so the difference of their addresses is where it begins.
+        let begin = line.as_ptr().addr() - self.text.as_ptr().addr();
+        self.next.set(Some((index + 1, begin + line.len() + 1, element)));
+        Some(self.job_line((line, element)))
     }
 
     fn in_order(&self) -> Box<dyn Iterator<Item = JobLine> + '_> {

@@ -158,6 +158,9 @@ fn refused(error: VisibilityError, corners: usize) -> CommandError {
         VisibilityError::TooManyCorners(limit) => {
             CommandError::Model(ModelError::TooManyCorners { limit, needed: corners })
         }
+        VisibilityError::TooManyVertices { limit, .. } => {
+            CommandError::Model(ModelError::TooManyVertices { limit })
+        }
         // The model and the view exclude the first two errors; the caller handles the third.
         VisibilityError::UnknownVertex(_)
         | VisibilityError::OutOfRange(_)

@@ -9,8 +9,8 @@ use crate::order::{self, Leg};
 use crate::plotter::Unobserved;
 use crate::plotter::job::{Collector, Job, PageSink, fit, move_to_front};
 use crate::plotter::options::{HiddenLines, PlotOptions};
-use crate::protocol::{CommandError, StoredModelError};
-use crate::stage::{Cancel, Scratch, Stage};
+use crate::protocol::{CommandError, Crowd, StoredModelError};
+use crate::stage::{Cancel, OutOfScratch, Scratch, Stage};
 use crate::tiles::{ProjectedStored, Tiles, ViewParameters};
 use crate::view::View;
 use crate::visibility::{SinkFull, Stretch, StretchSink, VisibilityError};
@@ -70,7 +70,7 @@ pub(super) fn prepare(
     let [mut least, mut greatest] = map.extent(&bounds, &options.page, steps);
     let around = [least.x, greatest.x, least.y];
     let has_title = options.title().is_some();
-    each_title_line(options, around, steps, &mut |ends| {
+    each_title_line(options, around, steps, 0, &mut |ends| {
         for end in ends {
             least = PagePoint { x: least.x.min(end.x), y: least.y.min(end.y) };
             greatest = PagePoint { x: greatest.x.max(end.x), y: greatest.y.max(end.y) };
@@ -91,18 +91,20 @@ pub(super) fn prepare(
 }
 
 /// Calls `each` with the lines of the title, if there is one, as it stands below a drawing with
-/// these edges: left, right and bottom.
+/// these edges: left, right and bottom. `room` is the number of bytes in which they are kept.
 fn each_title_line(
     options: &PlotOptions,
     around: [i32; 3],
     steps: StepsPerMillimetre,
+    room: usize,
     each: &mut dyn FnMut([PagePoint; 2]) -> Result<(), SinkFull>,
 ) -> Result<(), CommandError> {
     let Some(title) = options.title() else { return Ok(()) };
     let placed = options.page.place_title(&title, around, steps);
     let [left, baseline] = placed.map_err(CommandError::Page)?;
     let drawn = title.draw(left, baseline, steps, each);
-    drawn.map_err(|SinkFull| StoredModelError::TooDense.into())
+    let missing = OutOfScratch { needed: room + size_of::<PackedLine>(), available: room };
+    drawn.map_err(|SinkFull| too_dense(missing))
 }
 
 /// A part that has been computed, and the index of the first word of the working memory that it
@@ -130,8 +132,10 @@ pub(super) fn next_part<I: Index>(
             find_lines(model, search, words, cancel)?
         } else if search.has_title && search.pen == 0 {
             search.has_title = false;
-            let mut collector = Collector::new(words.get_mut(begin..).unwrap_or(&mut []));
-            each_title_line(&search.options, search.around, steps, &mut |[from, to]| {
+            let words = words.get_mut(begin..).unwrap_or(&mut []);
+            let room = size_of_val(words);
+            let mut collector = Collector::new(words);
+            each_title_line(&search.options, search.around, steps, room, &mut |[from, to]| {
                 collector.line(PackedLine::new(from, to, LineType::Full, 0))
             })?;
             collector.count
@@ -163,9 +167,13 @@ fn find_lines(
 ) -> Result<usize, CommandError> {
     cancel.enter(Stage::Visibility);
     let DrawingSearch { view, map, options, tiles: paused, pen, .. } = search;
-    let too_dense = CommandError::Stored(StoredModelError::TooDense);
     let room = words.len() / LINE_SHARE;
-    let (index, rest) = words.split_at_mut_checked(paused.index_words()).ok_or(too_dense)?;
+    let missing = OutOfScratch {
+        needed: paused.index_words() * size_of::<u64>(),
+        available: size_of_val(words),
+    };
+    let no_index = || too_dense(missing);
+    let (index, rest) = words.split_at_mut_checked(paused.index_words()).ok_or_else(no_index)?;
     let lines_at = rest.len().saturating_sub(room);
     let (scratch, lines) = rest.split_at_mut(lines_at);
     let source = ProjectedStored::new(model, view);
@@ -177,7 +185,7 @@ fn find_lines(
     let mut sink = PassSink { sink, pen: *pen };
     loop {
         let mut tiles =
-            Tiles::go_on(&source, parameters, visibility, *paused, index).ok_or(too_dense)?;
+            Tiles::go_on(&source, parameters, visibility, *paused, index).ok_or_else(no_index)?;
         let before = sink.sink.collector.count;
         let outcome = tiles.follow_next(Scratch::new(&mut *scratch), cancel, &mut sink);
         *paused = tiles.pause();
@@ -191,7 +199,7 @@ fn find_lines(
                     break;
                 }
                 if !paused.divide() {
-                    return Err(too_dense);
+                    return Err(too_dense(collector.missing()));
                 }
             }
             Err(error) => return Err(refused(error)),
@@ -262,13 +270,29 @@ impl StretchSink<u32> for PassSink<'_> {
     }
 }
 
+/// The error that what meets in one place takes more memory than there is.
+fn too_dense(missing: OutOfScratch) -> CommandError {
+    let OutOfScratch { needed, available } = missing;
+    crowded(Crowd { needed, room: available, unit: "bytes" })
+}
+
+fn crowded(crowd: Crowd) -> CommandError {
+    StoredModelError::TooDense(crowd).into()
+}
+
 /// Converts an error of the hidden-line removal to the reply.
 fn refused(error: VisibilityError) -> CommandError {
     match error {
         VisibilityError::Aborted => CommandError::Aborted,
-        VisibilityError::Scratch(_)
-        | VisibilityError::TooManyCorners(_)
-        | VisibilityError::SinkFull => StoredModelError::TooDense.into(),
+        VisibilityError::Scratch(missing) => too_dense(missing),
+        VisibilityError::TooManyCorners(room) => {
+            crowded(Crowd { needed: room + 1, room, unit: "corners" })
+        }
+        VisibilityError::TooManyVertices { count, limit } => {
+            crowded(Crowd { needed: count, room: limit, unit: "vertices" })
+        }
+        // The caller handles it.
+        VisibilityError::SinkFull => too_dense(OutOfScratch { needed: 1, available: 0 }),
         // A model in flash that is sound causes neither error.
         VisibilityError::UnknownVertex(_) | VisibilityError::OutOfRange(_) => {
             StoredModelError::Damaged.into()

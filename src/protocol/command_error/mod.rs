@@ -19,7 +19,7 @@ mod samples;
 pub use samples::{error_entries, error_samples};
 
 #[cfg(feature = "tiles")]
-pub use of_stored::StoredModelError;
+pub use of_stored::{Crowd, StoredModelError};
 
 use super::BlockError;
 use crate::convex::SolidError;

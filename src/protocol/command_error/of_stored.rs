@@ -20,7 +20,18 @@ pub enum StoredModelError {
     /// The flash no longer holds what was written.
     Damaged,
     /// A point or an edge has more faces about it than fit in the working memory.
-    TooDense,
+    TooDense(Crowd),
+}
+
+/// What the faces need that meet in one place, and what there is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Crowd {
+    /// How much is needed; if that is not known, a little more than there is room for.
+    pub needed: usize,
+    /// How much there is room for.
+    pub room: usize,
+    /// What is counted, in the plural.
+    pub unit: &'static str,
 }
 
 /// Passes to `row` the row of an error about a model in flash.
@@ -60,12 +71,12 @@ pub(super) fn explain_stored(refusal: StoredModelError, row: Row<'_>) {
             error(196, "the model in flash is damaged"),
             format_args!("the flash no longer holds what was sent: $clear, and send it again"),
         ),
-        StoredModelError::TooDense => row(
-            error(197, "too many faces in one place").client(
-                "too many faces meet in one place for the plotter's memory: let this computer \
-                 compute it, by `--compute host`",
+        StoredModelError::TooDense(Crowd { needed, room, unit }) => row(
+            error(197, "too many faces in one place"),
+            format_args!(
+                "{needed} {unit} are needed in one place where there is room for {room}: leave \
+                 out faces there, or let a computer compute it (penup plot --compute host)"
             ),
-            format_args!("too many faces meet in one place for the memory to work in"),
         ),
     }
 }

@@ -1,8 +1,8 @@
 //! The errors as a list, for the host: the documents and the client's words are made from it.
 
-#[cfg(feature = "tiles")]
-use super::StoredModelError;
 use super::{CommandError, ErrorEntry};
+#[cfg(feature = "tiles")]
+use super::{Crowd, StoredModelError};
 use crate::convex::SolidError;
 use crate::curve::CurveError;
 use crate::drawing::PageError;
@@ -128,7 +128,7 @@ pub fn error_samples() -> Vec<CommandError> {
         Drawing,
         NotWritten,
         Damaged,
-        TooDense,
+        TooDense(Crowd { needed: 5000, room: 4096, unit: "bytes" }),
     );
     let block = every_variant!(BlockError:
         Negative(b'F'),
