@@ -17,8 +17,8 @@ use crate::boards::pico::critical;
 use crate::boards::pico::registers::{DMA, Get, PIO0, Put};
 
 /// The greatest number of words in a block that is sent as planned. They are examined in some 750
-/// cycles, 45 for each of them. If they must be braked after all, that time comes on top, and the queue
-/// of the state machine must last for both: 1,770 cycles at the greatest rate.
+/// cycles, 45 for each of them. If they must be braked after all, that time comes on top, and the
+/// queue of the state machine must last for both: 1,770 cycles at the greatest rate.
 const CALM_WORDS: u32 = 8;
 /// The greatest number of words in a block that is braked, which takes some 100 cycles per word.
 /// The queue of the state machine is as long, and it lasts 2000 cycles at 500,000 steps per second.
