@@ -319,10 +319,11 @@ pub struct PassesArgs {
 }
 
 /// What the help of `penup preview` says besides the options.
-const PREVIEW_ENDS: &str = "The machine is the default one, or that of --machine and --set. A page larger than the travel \
-     of the default machine is previewed with a note, on a machine that holds it; say the travel \
-     of yours by --machine FILE, or by --set 130=MM --set 131=MM. `penup plot` draws on the \
-     machine that is there, and refuses what its travel does not hold.";
+const PREVIEW_ENDS: &str = "\
+The machine is the default one, or that of --machine and --set. A page larger than the travel of \
+the default machine is previewed with a note, on a machine that holds it; say the travel of yours \
+by --machine FILE, or by --set 130=MM --set 131=MM. `penup plot` draws on the machine that is \
+there, and refuses what its travel does not hold.";
 
 /// Options of `penup preview`.
 #[derive(Debug, Args)]

@@ -29,6 +29,10 @@ const MOST_PIECES: usize = 24;
 /// The average number of instructions for testing an edge against one face.
 const FACE_TEST: usize = 1000;
 
+/// The number of instructions for passing over a face that was tested in another cell already, or
+/// that lies beside the edge.
+const FACE_PASSED_OVER: usize = 50;
+
 /// What a [`StretchFinder`] notes about the edge, the seam or the face that it is working on.
 pub struct Marks<'m, I> {
     /// The faces against which the current edge has been tested.
@@ -365,7 +369,8 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let mut test_face = |rank: I, is_cover: bool| {
             let rank = rank.get();
             if !seen.insert(rank) || !around.may_meet(rank, &edge_query.bounds) {
-                return true;
+                spent = spent.and_then(|()| yield_counter.spend(FACE_PASSED_OVER));
+                return spent.is_ok();
             }
             let face = faces_by_rank.get(rank);
             // Where there is a covering face, the others are not tested.
