@@ -317,15 +317,8 @@ impl<'c, I: Index> Raster<'c, I> {
                     *value =
                         side.constant + side.right * i32::from(column0) + side.up * i32::from(row);
                 }
-                #[cfg(feature = "threads")]
-                let mut number = *cells.start();
-                for cell in &mut self.cells[cells] {
-                    #[cfg(feature = "threads")]
-                    let this = I::new(number);
-                    #[cfg(feature = "threads")]
-                    {
-                        number += 1;
-                    }
+                let first = *cells.start();
+                for (_number, cell) in (first..).zip(&mut self.cells[cells]) {
                     let mut covered = may_cover;
                     let mut outside = near > cell.cover_depth();
                     for (value, side) in values.iter_mut().zip(sides) {
@@ -339,7 +332,7 @@ impl<'c, I: Index> Raster<'c, I> {
                     enter(cell, I::new(rank));
                     #[cfg(feature = "threads")]
                     if let Some(trail) = &mut self.trail {
-                        trail.add(this);
+                        trail.add(I::new(_number));
                     }
                     if covered && far < cell.cover_depth() {
                         cell.cover_with(I::new(rank), far);

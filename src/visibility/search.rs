@@ -195,12 +195,10 @@ impl<'s, I: Index> StretchFinder<'s, I> {
                 let may_pass = || {
                     plane.as_ref().is_none_or(|plane| self.around.is_on_both_sides(plane, other))
                 };
-                // Only a computer knows the boxes at once.
-                let may_cross = if SceneIndex::<I>::HAS_SHORTCUTS {
-                    is_beside() && may_pass()
-                } else {
-                    may_pass() && is_beside()
-                };
+                // Only a computer knows the boxes at once, and asks for them first.
+                let knows_boxes = SceneIndex::<I>::HAS_SHORTCUTS;
+                let may_cross =
+                    (!knows_boxes || is_beside()) && may_pass() && (knows_boxes || is_beside());
                 if may_cross && self.owns_pair([one, other]) {
                     self.follow_seams_of(one, other, yield_counter, sink)?;
                 }
