@@ -26,12 +26,10 @@ use core::ops::Range;
 /// several parts.
 const MOST_PIECES: usize = 24;
 
-/// The average number of instructions for testing an edge against one face.
+/// The average number of instructions for testing an edge against one face. A face that is passed
+/// over, because it was tested in another cell or lies beside the edge, counts as much, so that the
+/// main loop of a board fills the queue of steps often enough.
 const FACE_TEST: usize = 1000;
-
-/// The number of instructions for passing over a face that was tested in another cell already, or
-/// that lies beside the edge.
-const FACE_PASSED_OVER: usize = 50;
 
 /// What a [`StretchFinder`] notes about the edge, the seam or the face that it is working on.
 pub struct Marks<'m, I> {
@@ -367,7 +365,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let mut test_face = |rank: I, is_cover: bool| {
             let rank = rank.get();
             if !seen.insert(rank) || !around.may_meet(rank, &edge_query.bounds) {
-                spent = spent.and_then(|()| yield_counter.spend(FACE_PASSED_OVER));
+                spent = spent.and_then(|()| yield_counter.spend(FACE_TEST));
                 return spent.is_ok();
             }
             let face = faces_by_rank.get(rank);
