@@ -118,9 +118,9 @@ impl<I: Index> SceneIndex<'_, I> {
         true
     }
 
-    /// Returns the nearest and the farthest depth of the face with this rank, and the sense in which
-    /// all its triangles turn on the page: 1 anticlockwise, -1 clockwise. Returns `None` if that is
-    /// not known at once.
+    /// Returns the nearest and the farthest depth of the face with this rank, and the sense in
+    /// which all its triangles turn on the page: 1 anticlockwise, -1 clockwise. Returns `None` if
+    /// that is not known at once.
     #[inline(always)] // On a board it is nothing.
     pub fn outlook(&self, _rank: usize) -> Option<(i32, i32, i32)> {
         #[cfg(feature = "threads")]
