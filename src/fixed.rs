@@ -246,7 +246,8 @@ impl fmt::Display for Length {
 /// ```
 /// use penup::fixed::{Decimal, Millimetres, decimals_of};
 /// let value = |text: &str| Decimal::parse(text).unwrap().to_millimetres().unwrap();
-/// assert_eq!(["80", "88.9", "-0.001", "80.0003"].map(|text| decimals_of(value(text))), [3, 3, 3, 5]);
+/// let decimals = ["80", "88.9", "-0.001", "80.0003"].map(|text| decimals_of(value(text)));
+/// assert_eq!(decimals, [3, 3, 3, 5]);
 /// assert_eq!(decimals_of(Millimetres::DELTA), 5);
 /// ```
 pub fn decimals_of(value: Millimetres) -> u32 {

@@ -96,8 +96,8 @@ impl<'a, I: Index> FaceSet<'a, I> {
         true
     }
 
-    /// Calls `each` with every rank, in ascending order, until it returns an error. No rank is
-    /// below `least`.
+    /// Calls `each` with every rank, in ascending order, until it returns an error. The
+    /// set must hold no rank below `least`.
     ///
     /// # Errors
     /// What `each` returns.
