@@ -142,6 +142,7 @@ fn without_comments(text: &str) -> String {
 fn words(text: &str) -> Result<Vec<(char, f64)>, RefusalText> {
     let letters: Vec<char> = text.chars().filter(|letter| !letter.is_whitespace()).collect();
     let mut words = Vec::new();
+    let mut without_number = Vec::new();
     let mut rest = letters.as_slice();
     while let [letter, after @ ..] = rest {
         let is_number = |letter: &char| letter.is_ascii_digit() || "+-.".contains(*letter);
@@ -151,11 +152,20 @@ fn words(text: &str) -> Result<Vec<(char, f64)>, RefusalText> {
         if !letter.is_ascii_alphabetic() {
             return Err(format!("\"{letter}\" is no word of G-code"));
         }
-        // Marlin's commands may have letters without a number.
+        if number.is_empty() {
+            without_number.push(letter.to_ascii_uppercase());
+        }
         let value = if number.is_empty() { Ok(0.0) } else { number.parse() };
         let value = value.map_err(|_| format!("\"{letter}{number}\" is no number"))?;
         words.push((letter.to_ascii_uppercase(), value));
         rest = next;
     }
-    Ok(words)
+    // Marlin's commands may have letters without a number, such as `G28 X`. A move may not.
+    let is_move = words.iter().any(|&(letter, code)| letter == 'G' && (0.0..4.0).contains(&code))
+        || !words.iter().any(|(letter, _)| matches!(letter, 'G' | 'M'));
+    let lacks = |letter: &&char| is_move || matches!(letter, 'G' | 'M');
+    match without_number.iter().find(lacks) {
+        Some(letter) => Err(format!("\"{letter}\" has no number")),
+        None => Ok(words),
+    }
 }
