@@ -207,7 +207,7 @@ pub const LM3S6965: BoardRow = BoardRow {
         corners: 3000,
         words: 4208,
         ports: 1,
-        blocks: 16,
+        blocks: 15,
         steps: 619,
     },
     scene: Scene { vertices: 1000, corners: 3000, faces: 750, lines: 820, odd_points: 400 },

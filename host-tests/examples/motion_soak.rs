@@ -100,6 +100,8 @@ fn main() -> ExitCode {
         Worst::new("orders with a limit on jerk", "beside a rest", 1.05),
         Worst::new("orders without one", "beside a rest", 1.05),
         Worst::new("orders, the main loop late by up to 20 ms", "beside a rest", 1.05),
+        Worst::new("orders and feeds with a limit on jerk", "beside a rest", 1.05),
+        Worst::new("orders and feeds without one", "beside a rest", 1.05),
     ];
     for seed in first..first + count {
         let mut random = Random::new(seed);
@@ -133,17 +135,24 @@ fn main() -> ExitCode {
                 .collect();
             let aborts = random.once_in(2);
             let turn_ticks = 5_000 + random.below(45_000);
-            let orders = Orders { orders, aborts, turn_ticks };
+            let orders = Orders { orders, aborts, turn_ticks, feeds: Vec::new() };
             let acceleration = number(&mut random, 50.0, 5000.0);
             let jerk = number(&mut random, 500.0, 100_000.0);
             let case = Case { speed: 50.0, acceleration, jerk, deviation: 0.05 };
             let without = Case { jerk: 0.0, ..case };
             // What the queue holds in 20 ms, and the stop besides.
             let late = Orders { turn_ticks: 5_000 + random.below(495_000), ..orders.clone() };
+            let count = random.between(1, 5);
+            let feeds = (0..count).map(|_| random.between(30, 3999) as u16).collect();
+            let fed = Orders { feeds, ..orders.clone() };
             let slow = Case { speed: 20.0, acceleration: acceleration.max(500.0), ..without };
-            for (kind, orders, case) in
-                [(4, &orders, case), (5, &orders, without), (6, &late, slow)]
-            {
+            for (kind, orders, case) in [
+                (4, &orders, case),
+                (5, &orders, without),
+                (6, &late, slow),
+                (7, &fed, case),
+                (8, &fed, without),
+            ] {
                 let measured = catch_unwind(|| {
                     let ratios = orders.measure(case);
                     [ratios.acceleration, ratios.jerk, ratios.rest]

@@ -157,6 +157,9 @@ pub struct Orders {
     pub aborts: bool,
     /// The time of one turn of the main loop, in ticks.
     pub turn_ticks: u64,
+    /// The feeds of the lines in turn, in mm/min, if lines are sent one by one. Otherwise the job
+    /// is stored, and has none.
+    pub feeds: Vec<u16>,
 }
 
 impl Orders {
@@ -168,15 +171,17 @@ impl Orders {
     pub fn measure(&self, case: Case) -> Ratios {
         let settings = case.settings();
         let targets = job();
-        let mut path = TargetList::new(&targets);
+        let is_stored = self.feeds.is_empty();
+        let mut path = TargetList::new(if is_stored { &targets } else { &[] });
         let mut started = false;
+        let mut unsent = targets.iter().zip(self.feeds.iter().cycle()).peekable();
         let mut orders = self.orders.clone();
         orders.sort_unstable();
         let last = orders.last().map_or(0, |&(due, ..)| due);
         let mut waiting = orders.iter().peekable();
         let mut first = path.clone();
         let trace = pin_machine::run(settings, &mut path, self.turn_ticks, &mut |turn| {
-            if !started {
+            if is_stored && !started {
                 started = true;
                 turn.machine.start(&mut first).expect("within the travel");
             }
@@ -189,13 +194,21 @@ impl Orders {
             }
             if self.aborts && turn.now >= last {
                 turn.machine.abort();
+                unsent.by_ref().for_each(drop);
+            }
+            while let Some((target, feed)) = unsent.peek()
+                && turn.machine.has_room()
+                && turn.machine.draw_to(**target, Some(Value::from_num(**feed))).is_ok()
+            {
+                unsent.next();
             }
             if turn.machine.state() == (State::Hold { stopped: true }) && turn.machine.is_stopped()
             {
                 assert_eq!(turn.machine.planned_position(), turn.pins);
                 turn.machine.resume();
             }
-            turn.machine.state() != State::Idle || !turn.machine.is_stopped()
+            let is_sent = unsent.peek().is_none();
+            !is_sent || turn.machine.state() != State::Idle || !turn.machine.is_stopped()
         });
         let drawn = event_checker::check_pins(&trace, &settings);
         assert_eq!(drawn.pen, 0, "the pen is not raised");

@@ -273,17 +273,18 @@ fn straight_lines_take_the_time_of_the_exact_curve() {
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, ..ProptestConfig::default() })]
     #[test]
-    fn holds_overrides_and_aborts_keep_the_limits_too(
+    fn holds_overrides_feeds_and_aborts_keep_the_limits_too(
         orders in prop::collection::vec((0u64..150_000_000, 0u8..3, 10u8..200), 1..6),
         aborts: bool,
         // If the main loop is later than 2 ms, the machine may have to brake, and harder than the
         // limits if the queue is too short.
         turn_ticks in 5_000u64..50_000,
-        jerk in 500.0f64..100_000.0,
+        feeds in prop::collection::vec(30u16..4000, 0..6),
+        jerk in prop_oneof![1 => Just(0.0), 3 => 500.0f64..100_000.0],
         acceleration in 50.0f64..5000.0,
     ) {
         let case = Case { speed: 50.0, acceleration, jerk, deviation: 0.05 };
-        let ratios = Orders { orders, aborts, turn_ticks }.measure(case);
+        let ratios = Orders { orders, aborts, turn_ticks, feeds }.measure(case);
         prop_assert!(ratios.acceleration <= 1.05, "{ratios:?}");
         prop_assert!(ratios.jerk <= 1.1, "{ratios:?}");
         prop_assert!(ratios.rest <= 1.05, "{ratios:?}");
@@ -322,6 +323,26 @@ fn a_hold_keeps_the_acceleration_up_to_the_last_step() {
             let runs = event_checker::check_pins(&trace, &settings).runs;
             let ratio = event_checker::acceleration_ratio(&runs, &targets, &settings);
             assert!(ratio <= 1.03, "{acceleration} {jerk} {shift}: {ratio}");
+        }
+    }
+}
+
+/// A lower override makes the feeds of the lines just ahead too low to be reached in time. Then the
+/// machine braked to rest, and ended there with up to 2.6 times the jerk.
+#[test]
+fn feeds_that_an_override_makes_late_are_braked_for_without_a_kink() {
+    let (acceleration, jerk) = (1667.6, 46_611.0);
+    let case = Case { speed: 50.0, acceleration, jerk, deviation: 0.05 };
+    for feeds in [vec![3247, 2697], vec![3247], vec![2697], vec![600, 3000, 1200]] {
+        for due in (60_000_000..80_000_000).step_by(499_999) {
+            let orders = Orders {
+                orders: vec![(due, 0, 24)],
+                aborts: false,
+                turn_ticks: 42_800,
+                feeds: feeds.clone(),
+            };
+            let ratios = orders.measure(case);
+            assert!(ratios.jerk <= 1.1 && ratios.acceleration <= 1.05, "{orders:?}: {ratios:?}");
         }
     }
 }

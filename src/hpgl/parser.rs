@@ -248,9 +248,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
             }
             b"VS" => {
                 let speed = numbers.first().copied().unwrap_or(0);
-                // Less than 0.3 cm/s is not held with every acceleration.
-                let is_held = (UNIT / 10 * 3..=128 * UNIT).contains(&speed);
-                if speed != 0 && !is_held {
+                if speed != 0 && !(UNIT / 1000..=128 * UNIT).contains(&speed) {
                     return Err(bad);
                 }
                 self.speed = speed;

@@ -13,7 +13,7 @@
 
 use super::{Machine, Setting};
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{Move, PathLength, PushError};
+use crate::motion::{Move, PushError, SpeedLimit};
 
 /// Where each motor will be within its backlash (the steps that it loses when it reverses) once all
 /// planned moves are made.
@@ -91,7 +91,7 @@ impl Machine<'_> {
         &mut self,
         segment: &Move<'_>,
         ink: Option<LineType>,
-        limit: PathLength,
+        limit: SpeedLimit,
     ) -> Result<bool, PushError> {
         #[cfg(feature = "spread-backlash")]
         let from = self.runner.motor_steps_end();

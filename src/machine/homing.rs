@@ -9,7 +9,7 @@ use super::kinematics::{HomingSpace, Kinematics};
 use super::state::Activity;
 use super::{Alarm, Machine, MachineError, Setting, Target, Tool};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
-use crate::motion::{Move, PathLength, PushError};
+use crate::motion::{Move, PushError, SpeedLimit};
 
 /// One of the two axes of the page, as a limit switch belongs to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -297,7 +297,7 @@ impl Machine<'_> {
         }
         self.activity = Activity::Home(homing);
         let pushed = match properties.homing_space {
-            HomingSpace::Page => self.push(Target { point, ink: None }, PathLength::MAX).map(drop),
+            HomingSpace::Page => self.push(Target { point, ink: None }, SpeedLimit::NONE).map(drop),
             HomingSpace::Motors => self.push_motor(point),
         };
         if pushed.is_err() {
@@ -317,8 +317,8 @@ impl Machine<'_> {
         let chord = self.runner.chord(dx, dy).ok_or(PushError::TooLong)?;
         let belt = Move::whole(motors, page, &chord);
         // The first call may only take up the backlash; then the move itself follows.
-        if !self.push_motors(&belt, None, PathLength::MAX)? {
-            self.push_motors(&belt, None, PathLength::MAX)?;
+        if !self.push_motors(&belt, None, SpeedLimit::NONE)? {
+            self.push_motors(&belt, None, SpeedLimit::NONE)?;
         }
         Ok(())
     }

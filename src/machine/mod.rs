@@ -66,7 +66,7 @@ use stroke_points::StrokeRest;
 use tool::Tool;
 
 use crate::drawing::PagePoint;
-use crate::motion::{Block, PathLength, Runner};
+use crate::motion::{Block, Runner, SpeedLimit};
 
 /// The plotter as the main loop sees it: a state machine that turns jobs and commands into step
 /// events.
@@ -121,7 +121,7 @@ impl<'m> Machine<'m> {
     /// A machine at rest at the page's origin with the pen raised. If the settings require homing,
     /// it starts in the alarm [`Alarm::NotHomed`].
     ///
-    /// `blocks` is the memory of the look-ahead, at 48 bytes per block, or 52 with the
+    /// `blocks` is the memory of the look-ahead, at 52 bytes per block, or 56 with the
     /// feature `spread-backlash`. It needs at least one
     /// block; 100 or more work well. `ahead_ticks` is how far the queue is planned ahead of the
     /// pins. The machine plans further ahead if it could otherwise not stop in time when the main
@@ -229,9 +229,9 @@ impl<'m> Machine<'m> {
         }
     }
 
-    /// Scales the speeds to `percent` of the settings, with immediate effect. The value is clamped
-    /// to 10 to 200. Neither speed is raised above the greater of the two speeds in the settings,
-    /// those with the pen down and up.
+    /// Scales the feeds, and the speeds of the settings, to `percent`, with immediate effect. The
+    /// value is clamped to 10 to 200. No speed is raised above the greater of the two in the
+    /// settings, those with the pen down and up.
     pub fn set_override(&mut self, percent: u8) {
         self.percent = percent.clamp(10, 200);
         if !matches!(self.activity, Activity::Home(_)) {
@@ -257,7 +257,7 @@ impl<'m> Machine<'m> {
             self.steady = Steady::default();
             self.pen = pen;
             source = Source::Path;
-            match self.push(first, PathLength::MAX) {
+            match self.push(first, SpeedLimit::NONE) {
                 Ok(length) => self.pass_point(first, length),
                 Err(_) => {
                     self.abort();

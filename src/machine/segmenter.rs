@@ -2,7 +2,7 @@
 
 use super::{CutPositions, Machine, SegmentEnd, Target};
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{Chord, Move, PathLength, PushError};
+use crate::motion::{Chord, Move, PathLength, PushError, SpeedLimit};
 use crate::step::Pattern;
 
 /// The remaining part of a move that is being cut into segments.
@@ -20,8 +20,8 @@ pub(super) struct Segmenter {
     pub(super) dot: u32,
     /// The line type of the move; `None` with the pen up.
     pub(super) ink: Option<LineType>,
-    /// The limit of the speed, given as a stopping distance.
-    pub(super) limit: PathLength,
+    /// The limit of the speed.
+    pub(super) limit: SpeedLimit,
 }
 
 impl Segmenter {
@@ -39,8 +39,7 @@ impl Segmenter {
 
 impl Machine<'_> {
     /// Plans a move, cut into segments that are straight for the motors too, and returns its
-    /// length. `limit` bounds its speed: it is the distance within which the machine could stop
-    /// from it.
+    /// length. `limit` bounds its speed.
     ///
     /// # Errors
     /// See [`PushError`]. On an error nothing is appended.
@@ -48,7 +47,7 @@ impl Machine<'_> {
     pub(super) fn push(
         &mut self,
         target: Target,
-        limit: PathLength,
+        limit: SpeedLimit,
     ) -> Result<PathLength, PushError> {
         let Target { point: to, ink } = target;
         if !self.has_room() {

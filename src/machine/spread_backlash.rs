@@ -17,7 +17,7 @@
 
 use super::{Machine, Segmenter, Setting};
 use crate::drawing::{LineType, PagePoint};
-use crate::motion::{BacklashTakeUp, Move, PathLength};
+use crate::motion::{BacklashTakeUp, Move, PathLength, SpeedLimit};
 
 /// The state of taking up backlash while the pen draws.
 #[derive(Debug, Clone, Copy, Default)]
@@ -323,7 +323,8 @@ impl Machine<'_> {
             return false;
         }
         let page = self.runner.page_end();
-        let pushed = self.push_with_backlash(due, page, PathLength::ZERO, false, PathLength::MAX);
+        let limit = SpeedLimit::NONE;
+        let pushed = self.push_with_backlash(due, page, PathLength::ZERO, false, limit);
         if pushed {
             self.count_backlash(spread, due);
         }
@@ -338,7 +339,7 @@ impl Machine<'_> {
         page: PagePoint,
         drawn: PathLength,
         reverses: bool,
-        limit: PathLength,
+        limit: SpeedLimit,
     ) -> bool {
         // The kinematics that can take up backlash this way are linear, so a displacement is
         // converted like a position.

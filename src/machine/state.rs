@@ -71,12 +71,8 @@ pub enum MachineError {
         /// The index of the target, counted from 0.
         target: u32,
     },
-    /// A move is so slow that it would not be held within 10 %: see
-    /// [`Limits::least_feed`](crate::motion::Limits::least_feed).
-    TooSlow {
-        /// The least speed that is held, in mm/min.
-        least: i32,
-    },
+    /// A move is slower than [`SpeedLimit::LEAST_FEED`](crate::motion::SpeedLimit::LEAST_FEED).
+    TooSlow,
 }
 
 /// What the machine is doing: a [`State`] with the data that only this state needs.

@@ -5,7 +5,7 @@
 //! every this many moves.
 
 use super::{Machine, Path, Setting, Target};
-use crate::motion::{PathLength, SteadySpeed};
+use crate::motion::{SpeedLimit, SteadySpeed};
 
 /// The most moves of a line that are looked at together. On the Pico that takes some 20 ms, in
 /// which the machine draws what was planned before.
@@ -16,17 +16,16 @@ const MOST_MOVES: u32 = 1000;
 pub(super) struct Steady {
     /// How many moves of it have not been read yet.
     moves: u32,
-    /// The speed of this line, as a stopping distance.
-    limit: PathLength,
+    /// The speed of this line.
+    limit: SpeedLimit,
 }
 
 impl Machine<'_> {
-    /// Returns the limit of the speed, as a stopping distance, for the move to `target`, which was
-    /// read from `path` last.
-    pub(super) fn steady_limit(&mut self, path: &mut dyn Path, target: Target) -> PathLength {
+    /// Returns the limit of the speed for the move to `target`, which was read from `path` last.
+    pub(super) fn steady_limit(&mut self, path: &mut dyn Path, target: Target) -> SpeedLimit {
         if target.ink.is_none() || !self.settings.is_on(Setting::SteadySpeed) {
             self.steady.moves = 0;
-            return PathLength::MAX;
+            return SpeedLimit::NONE;
         }
         if self.steady.moves == 0 {
             self.steady = self.line_ahead(path, target);

@@ -3,7 +3,7 @@
 use super::state::{Activity, Source};
 use super::{JobSize, Machine, MachineError, Setting, Switches, Target, Value};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
-use crate::motion::{EventQueue, PathLength, PushError};
+use crate::motion::{EventQueue, PushError, SpeedLimit};
 
 impl Machine<'_> {
     /// Appends a move at a speed of at most `feed` mm/min. The first such move begins a job, which
@@ -52,20 +52,13 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Checks that a `feed` in mm/min is held within 10 %. One that is no lower than
-    /// both speeds in the settings limits nothing and is never refused.
+    /// Checks that a `feed` in mm/min is one that can be held.
     ///
     /// # Errors
     /// [`MachineError::TooSlow`].
     pub fn check_feed(&self, feed: Option<Value>) -> Result<(), MachineError> {
-        let limits = self.runner.limits();
-        let least = limits.least_feed();
-        match feed {
-            Some(feed) if feed < least && feed < limits.greatest_rate() => {
-                Err(MachineError::TooSlow { least: least.to_num() })
-            }
-            _ => Ok(()),
-        }
+        let is_too_slow = feed.is_some_and(|feed| feed < SpeedLimit::LEAST_FEED);
+        if is_too_slow { Err(MachineError::TooSlow) } else { Ok(()) }
     }
 
     /// Cancels the jog, if there is one.
@@ -186,7 +179,7 @@ impl Machine<'_> {
     /// Adds a straight move to the end of the path that is being drawn, at a speed of at most
     /// `feed` mm/min (`None` for no such limit). Returns its length in units of 2^-18 mm.
     fn append(&mut self, target: Target, feed: Option<Value>) -> Result<u64, MachineError> {
-        let limit = feed.map_or(PathLength::MAX, |feed| self.runner.limits().feed(feed));
+        let limit = feed.map_or(SpeedLimit::NONE, SpeedLimit::of_feed);
         match self.push(target, limit) {
             Ok(length) => Ok(length.to_bits().into()),
             Err(PushError::Full) => Err(self.refusal()),

@@ -3,7 +3,7 @@
 use super::*;
 use crate::drawing::{LineType, PagePoint};
 use crate::motion::event::tests::Events;
-use crate::motion::{Block, EventKind, TICKS_PER_SECOND};
+use crate::motion::{Block, EventKind, EventQueue, SpeedLimit, StepEvent, TICKS_PER_SECOND};
 use crate::step::Line;
 use core::f64::consts::TAU;
 use std::vec::Vec;
@@ -310,8 +310,22 @@ fn the_planned_position_leaves_out_the_backlash_that_is_taken_up_on_the_way() {
     }
 }
 
+/// Hands over all events of the moves that wait, and returns the times of the steps, in ticks.
+fn times_of_steps(machine: &mut Machine<'_>) -> Vec<u64> {
+    let mut events = Events::default();
+    machine.fill(&mut TargetList::new(&[]), &mut events);
+    let (mut ticks, mut steps) = (0u64, Vec::new());
+    for event in &events.0 {
+        if event.step() != (0, 0) {
+            steps.push(ticks);
+        }
+        ticks += u64::from(event.ticks());
+    }
+    steps
+}
+
 #[test]
-fn a_low_feed_is_held_within_10_percent_or_refused() {
+fn every_feed_is_held() {
     for (acceleration, jerk) in
         [(10.0, 0.0), (800.0, 0.0), (32_000.0, 0.0), (800.0, 15.0), (800.0, 1000.0), (5000.0, 0.1)]
     {
@@ -319,40 +333,99 @@ fn a_low_feed_is_held_within_10_percent_or_refused() {
         let mut blocks = std::vec![Block::EMPTY; 32];
         let pins = PulserState::new();
         let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
-        let least = machine.runner.limits().least_feed();
         let end = PagePoint { x: 400, y: 300 };
-        // A limit on jerk changes the speed by whole units.
-        let units = (70.0 * 60.0 / 1800.0f64).max(acceleration * 0.005);
-        let lower = if jerk > 0.0 { units } else { 0.0 };
-        let refusal = Err(MachineError::TooSlow { least: least.to_num() });
-        for too_slow in [Value::DELTA, least / 2, least - Value::DELTA] {
-            assert_eq!(machine.jog(end, Some(too_slow)), refusal);
+        for too_slow in [Value::DELTA, SpeedLimit::LEAST_FEED - Value::DELTA] {
+            assert_eq!(machine.jog(end, Some(too_slow)), Err(MachineError::TooSlow));
             let target = Target { point: end, ink: Some(LineType::Full) };
-            assert_eq!(machine.draw_to(target, Some(too_slow)), refusal);
+            assert_eq!(machine.draw_to(target, Some(too_slow)), Err(MachineError::TooSlow));
             assert_eq!((machine.state(), machine.end()), (State::Idle, PagePoint::default()));
         }
-        for number in 0..6 {
-            let feed = least + least * number * 7 / 10;
-            let at = PagePoint { x: 400 * (number % 2), y: 300 * (number % 2) };
-            let to = PagePoint { x: 400 - at.x, y: 300 - at.y };
-            let mut events = Events::default();
-            machine.jog(to, Some(feed)).expect("fast enough");
-            machine.fill(&mut TargetList::new(&[]), &mut events);
-            let (mut ticks, mut steps) = (0u64, Vec::new());
-            for event in &events.0 {
+        let feeds = [0.1, 0.33, 1.0, 2.0, 4.9, 7.0, 10.0, 24.0, 60.0, 160.0];
+        let mut end = PagePoint::default();
+        for feed in feeds {
+            // 1 or 5 mm.
+            let length = if feed < 10.0 { 20 } else { 100 };
+            end = PagePoint { x: end.x + 4 * length, y: end.y + 3 * length };
+            let to = end;
+            machine.jog(to, Some(Value::from_num(feed))).expect("fast enough");
+            let steps = times_of_steps(&mut machine);
+            // The ramps at the ends take less than these steps.
+            let (first, last) = (20, steps.len() - 20);
+            let minutes = (steps[last] - steps[first]) as f64 / f64::from(TICKS_PER_SECOND) / 60.0;
+            let mm = f64::from(length) / 20.0 * (last - first) as f64 / steps.len() as f64;
+            let off = mm / minutes / feed - 1.0;
+            assert!(off.abs() < 0.01, "{acceleration}, {jerk}: F{feed} is off by {off}");
+        }
+    }
+}
+
+/// A queue that takes only so many events at once, so that a test can act in between.
+#[derive(Default)]
+struct FewAtOnce {
+    events: Vec<StepEvent>,
+    room: usize,
+}
+
+impl EventQueue for FewAtOnce {
+    fn room(&self) -> usize {
+        self.room
+    }
+
+    fn push(&mut self, event: StepEvent) -> Result<(), StepEvent> {
+        self.room -= 1;
+        self.events.push(event);
+        Ok(())
+    }
+}
+
+#[test]
+fn the_override_scales_the_feeds_of_moves_that_wait() {
+    for (acceleration, jerk) in [(900.0, 0.0), (2000.0, 100.0), (2000.0, 1000.0)] {
+        let settings = settings([70.0, acceleration, jerk, 0.05]);
+        let mut blocks = std::vec![Block::EMPTY; 32];
+        let pins = PulserState::new();
+        let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
+        // Each line goes on in the direction of the one before it, but at another feed.
+        let feeds = [600.0, 1200.0, 300.0, 2000.0, 600.0, 4000.0];
+        for (number, feed) in (1..).zip(feeds) {
+            let point = PagePoint { x: 3000 * number, y: 0 };
+            let target = Target { point, ink: Some(LineType::Full) };
+            machine.draw_to(target, Some(Value::from_num(feed))).expect("room");
+        }
+        // The override changes while the first line is drawn.
+        let (mut events, mut percents) = (FewAtOnce::default(), [50, 200, 10, 150].into_iter());
+        let (mut path, mut percent) = (TargetList::new(&[]), 100.0);
+        let (mut at, mut ticks, mut seen) = (0, 0u64, 0);
+        let mut steps = Vec::new();
+        while machine.state() == State::Run {
+            events.room = 40;
+            machine.fill(&mut path, &mut events);
+            for event in &events.events[seen..] {
                 if event.step() != (0, 0) {
-                    steps.push(ticks);
+                    at += event.step().0;
+                    steps.push((at, ticks, percent));
                 }
                 ticks += u64::from(event.ticks());
             }
-            // The ramps at the ends take less than a step.
-            let (first, last) = (10, steps.len() - 10);
-            let minutes = (steps[last] - steps[first]) as f64 / f64::from(TICKS_PER_SECOND) / 60.0;
-            let mm = 5.0 * (last - first) as f64 / steps.len() as f64;
-            let off = mm / minutes / feed.to_num::<f64>() - 1.0;
-            let most = if feed < least * 3 { 0.1 } else { 0.012 };
-            let range = -most - lower / feed.to_num::<f64>()..most;
-            assert!(range.contains(&off), "{acceleration}, {jerk}: F{feed} is off by {off}");
+            seen = events.events.len();
+            // In the first line, in the second one, and so on.
+            if at > 3000 * (4 - percents.len() as i32) + 1000
+                && let Some(next) = percents.next()
+            {
+                machine.set_override(next);
+                percent = f64::from(next);
+            }
+        }
+        // In the last third of each line the speed is even again.
+        for (number, feed) in (0..).zip(feeds) {
+            let within = |at: i32| (3000 * number + 2000..3000 * number + 2500).contains(&at);
+            let part: Vec<_> = steps.iter().filter(|(at, ..)| within(*at)).collect();
+            let [(from, begin, percent), .., (to, end, _)] = part[..] else { panic!("no steps") };
+            let minutes = (end - begin) as f64 / f64::from(TICKS_PER_SECOND) / 60.0;
+            let speed = f64::from(to - from) / STEPS / minutes;
+            let asked = (feed * percent / 100.0).min(4200.0);
+            let off = speed / asked - 1.0;
+            assert!(off.abs() < 0.01, "{acceleration}, {jerk}: F{feed} at {percent} %: {off}");
         }
     }
 }

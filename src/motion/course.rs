@@ -3,7 +3,7 @@
 use super::emitter::Train;
 use super::lookahead::{BlockKind, Chord, MOST_CHORDS};
 use super::profile::Slice;
-use super::{Block, PathLength};
+use super::{Block, PathLength, SpeedLimit};
 #[cfg(feature = "input-shaping")]
 use crate::array::MapEach;
 use crate::drawing::LineType;
@@ -22,6 +22,7 @@ pub(super) struct BlockCursor {
     #[cfg(feature = "spread-backlash")]
     extra: PathLength,
     pub(super) curve_limit: PathLength,
+    pub(super) speed_limit: SpeedLimit,
     /// The length of a move, in units of 2^-32 mm.
     pub(super) move_length: u64,
     /// The number of moves of the block.
@@ -82,6 +83,7 @@ impl BlockCursor {
             #[cfg(feature = "spread-backlash")]
             extra: block.extra,
             curve_limit: block.curve_limit,
+            speed_limit: block.speed_limit,
             move_length,
             moves,
             moves_done: 0,

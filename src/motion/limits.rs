@@ -339,23 +339,6 @@ impl Limits {
         PathLength::from_bits(u32::try_from(bits).unwrap_or(u32::MAX))
     }
 
-    /// The stopping distance by which a block is limited to a speed in mm/min. It is rounded, and
-    /// at least the smallest value above 0: see [`Limits::least_feed`].
-    pub fn feed(&self, mm_per_min: Millimetres) -> PathLength {
-        let speed = slice_speed(mm_per_min.max(Millimetres::DELTA)).unwrap_or(SliceSpeed::DELTA);
-        // Units of 2^-19 mm first.
-        let bits = self.fine_stopping_distance(speed) >> 13;
-        let bits = u32::try_from(bits.div_ceil(2)).unwrap_or(u32::MAX);
-        PathLength::from_bits(bits).max(PathLength::DELTA)
-    }
-
-    /// The least speed, in whole mm/min, from which on [`Limits::feed`] is within 10 % of every
-    /// speed. A stopping distance of 3 units or more is no more than half a unit off, which makes
-    /// 9 % of the speed; from three times that speed on it is 1 %. Programs do ask for 10 mm/min.
-    pub fn least_feed(&self) -> Millimetres {
-        mm_per_min(self.speed(const { PathLength::from_bits(3) })).ceil()
-    }
-
     /// The length of a move by (`dx`, `dy`) steps, each within ±2^22; `None` beyond 16 m.
     pub fn length(&self, dx: i32, dy: i32) -> Option<PathLength> {
         let [step_x, step_y] = self.step_length;
@@ -391,7 +374,7 @@ pub(super) fn hypotenuse(x: u64, y: u64) -> u64 {
 }
 
 /// Converts mm/min to mm per slice, at most 0.09.
-fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
+pub(super) fn slice_speed(mm_per_min: Millimetres) -> Result<SliceSpeed, LimitsError> {
     if mm_per_min <= 0 {
         return Err(LimitsError::Speed);
     }
@@ -487,38 +470,9 @@ pub(crate) mod tests {
 
     #[test]
     fn speeds_are_told_as_they_were_set() {
-        let limits = Limits::new(&settings()).expect("valid");
         for set in [5.0, 60.0, 3000.0, 12_345.5, 32_000.0] {
             let told = mm_per_min(slice_speed(Millimetres::from_num(set)).expect("a speed"));
             assert!((told.to_num::<f64>() - set).abs() < 1e-3 * set + 0.01, "{told} {set}");
-        }
-        // 50 mm/s: 2500 mm²/s² are shed by 200 mm/s² in 6.25 mm.
-        let feed = limits.feed(Millimetres::from_num(3000)).to_num::<f64>();
-        assert!((feed - 6.25).abs() < 1e-3, "{feed}");
-        assert!(limits.feed(Millimetres::ZERO) > 0);
-    }
-
-    #[test]
-    fn feeds_from_the_least_on_are_held_within_10_percent() {
-        for acceleration in [10, 11, 47, 200, 800, 801, 5000, 32_767] {
-            let acceleration_mm_per_s2 = Millimetres::from_num(acceleration);
-            let settings = MotionSettings { acceleration_mm_per_s2, ..settings() };
-            let limits = Limits::new(&settings).expect("valid");
-            let held = |feed| mm_per_min(limits.speed(limits.feed(feed))).to_num::<f64>();
-            let error = |feed: Millimetres| held(feed) / feed.to_num::<f64>() - 1.0;
-            let least = limits.least_feed();
-            let feeds = |from: Millimetres| {
-                (0..40_000)
-                    .map(move |number| from.saturating_add(Millimetres::from_bits(number * 97)))
-            };
-            for feed in feeds(least) {
-                let error = error(feed);
-                let most = if feed < least * 3 { 0.1 } else { 0.01 };
-                assert!(error.abs() < most, "{acceleration}: {feed} is off by {error}");
-            }
-            // It is no less useful than it must be: lower speeds are further off.
-            let too_low = feeds(least / 4).take_while(|feed| *feed < least);
-            assert!(too_low.map(error).any(|error| error.abs() > 0.1), "{acceleration}: {least}");
         }
     }
 }

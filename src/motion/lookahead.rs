@@ -1,13 +1,14 @@
 //! The blocks that are known but not yet begun, and the speed with which the first of them may be
 //! entered.
 
+use super::speed_limit::{CornerLimit, FeedOverride, SpeedLimit};
 use super::{Limits, PathLength};
 use crate::drawing::LineType;
 
-/// A straight move that waits, or up to six short ones that are planned as one. It takes 48 bytes,
-/// or 52 with the feature `spread-backlash`.
+/// A straight move that waits, or up to six short ones that are planned as one. It takes 52 bytes,
+/// or 56 with the feature `spread-backlash`.
 ///
-/// The LM3S6965 lends 16 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
+/// The LM3S6965 lends 15 of them and the Pico 128 (`src/board_table.rs`). Short moves are joined as
 /// far as the stopping distance requires it (`Lookahead::join`). If the blocks cannot hold that
 /// distance, the machine is slower, but never wrong.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -20,6 +21,11 @@ pub struct Block {
     pub(super) entry_limit: PathLength,
     /// The greatest stopping distance within the block, which may be part of a curve.
     pub(super) curve_limit: PathLength,
+    /// The feed, or another limit that belongs to the block.
+    pub(super) speed_limit: SpeedLimit,
+    /// What the corner at its beginning allows. `entry_limit` is derived from it again when the
+    /// override changes. [`Lookahead::push`] sets it.
+    pub(super) corner: CornerLimit,
     pub(super) ink: Option<LineType>,
     /// See [`Move`](super::Move).
     pub(super) offsets: [i16; 2],
@@ -84,6 +90,8 @@ impl Block {
         length: PathLength::ZERO,
         entry_limit: PathLength::ZERO,
         curve_limit: PathLength::MAX,
+        speed_limit: SpeedLimit::NONE,
+        corner: CornerLimit::STOP,
         ink: None,
         offsets: [0; 2],
         kind: BlockKind::Line,
@@ -124,6 +132,8 @@ pub struct Lookahead<'m> {
     blocks: &'m mut [Block],
     first: usize,
     count: usize,
+    /// How the feeds of the blocks are scaled.
+    feed_override: FeedOverride,
     /// The total length of all blocks, in units of 2^-18 mm.
     length: u64,
     /// The total length of the last blocks, which later points may show to be part of a bend.
@@ -150,6 +160,7 @@ impl<'m> Lookahead<'m> {
             blocks,
             first: 0,
             count: 0,
+            feed_override: FeedOverride::NONE,
             length: 0,
             open: PathLength::ZERO,
             joined: 0,
@@ -188,12 +199,39 @@ impl<'m> Lookahead<'m> {
         self.find_lowest();
     }
 
+    /// Scales the feeds of all blocks, and determines anew how fast each may be entered. It is
+    /// called seldom, so it goes through all of them.
+    #[inline(never)]
+    pub(super) fn set_override(&mut self, feed_override: FeedOverride) {
+        self.feed_override = feed_override;
+        let mut behind = PathLength::MAX;
+        for index in (0..self.count).rev() {
+            let at = self.wrapped(index);
+            let Some(block) = self.blocks.get_mut(at) else {
+                continue;
+            };
+            let feed = feed_override.stopping_distance(block.speed_limit);
+            block.entry_limit = block.corner.limit().min(feed);
+            if self.passes_limits_on {
+                let allowed = block.curve_limit.min(behind.saturating_add(block.length));
+                block.entry_limit = block.entry_limit.min(allowed);
+                behind = block.entry_limit;
+            }
+        }
+        self.find_lowest();
+    }
+
+    /// The greatest stopping distance within a block.
+    pub(super) fn limit_within(&self, block: &Block) -> PathLength {
+        block.curve_limit.min(self.feed_override.stopping_distance(block.speed_limit))
+    }
+
     /// Whether less than half of the memory is in use.
     pub(super) fn is_short(&self) -> bool {
         2 * self.count < self.blocks.len()
     }
 
-    /// Appends a block.
+    /// Appends a block. Its `entry_limit` is that of its corner.
     ///
     /// # Errors
     /// Hands the block back if the ring is full.
@@ -212,8 +250,12 @@ impl<'m> Lookahead<'m> {
         slot.dx = block.dx;
         slot.dy = block.dy;
         slot.length = block.length;
-        slot.entry_limit = block.entry_limit;
+        slot.speed_limit = block.speed_limit;
+        slot.corner = CornerLimit::new(block.entry_limit);
+        let feed = self.feed_override.stopping_distance(block.speed_limit);
+        slot.entry_limit = block.entry_limit.min(feed);
         slot.curve_limit = block.curve_limit;
+        let limit = slot.limit();
         slot.ink = block.ink;
         slot.offsets = block.offsets;
         slot.kind = block.kind;
@@ -227,8 +269,8 @@ impl<'m> Lookahead<'m> {
         self.length += u64::from(block.length.to_bits());
         self.open = self.open.saturating_add(block.length);
         if !self.passes_limits_on {
-            self.note(self.count - 1, block.limit());
-        } else if block.limit() < PathLength::MAX {
+            self.note(self.count - 1, limit);
+        } else if limit < PathLength::MAX {
             self.limit_curve(1, 1, block.curve_limit);
         }
         Ok(())

@@ -43,6 +43,7 @@ mod shaper;
 #[cfg(feature = "input-shaping")]
 mod shaping;
 mod smooth;
+mod speed_limit;
 mod steady;
 
 pub use brake::{Brake, BrakeOrders, BrakeRule, StepBrake, StepDistances, StepLength};
@@ -59,6 +60,7 @@ pub use runner::{BacklashTakeUp, Reversal};
 pub use runner::{Chord, Move, PenPositions, Progress, PushError, RunLengths, Runner};
 #[cfg(feature = "input-shaping")]
 pub use shaping::{Resonance, ShaperKind, Shaping};
+pub use speed_limit::SpeedLimit;
 pub use steady::SteadySpeed;
 
 /// The unit of time of every step event: 40 ns. A divisor of both boards' clocks.

@@ -36,9 +36,10 @@ use super::profile::{FRACTION_BITS, PathSpeed, Profile, Slice};
 #[cfg(feature = "input-shaping")]
 use super::shaper::Shaper;
 use super::smooth::{Interval, PathLimits, State};
+use super::speed_limit::FeedOverride;
 use super::{
     Block, BrakeRule, Emitter, EventQueue, Limits, Lookahead, PathLength, SLICE_TICKS, SliceSpeed,
-    StepEvent,
+    SpeedLimit, StepEvent,
 };
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::Millimetres;
@@ -90,6 +91,9 @@ pub struct Runner<'m> {
     travel: PathSpeed,
     /// The last speed limit of a curve, cached because many blocks in a row have the same.
     curve: PathSpeed,
+    /// The last limit of a block, and the speed that it allows, cached for the same reason.
+    speed_limit: (SpeedLimit, PathSpeed),
+    feed_override: FeedOverride,
     /// The time up to which events are planned, in sixteenths of ticks; wraps.
     now: u32,
     /// Whether the pen is down. `None` while it moves, and after an emergency stop, when it may
@@ -120,8 +124,8 @@ pub struct Runner<'m> {
     other_chord: Option<Chord>,
     /// The last long move of the path that goes on.
     long: Option<LongMove>,
-    /// The stopping distance of the speed limit of the last block appended.
-    last_limit: PathLength,
+    /// The speed limit of the last move appended.
+    last_limit: SpeedLimit,
     run: RunLengths,
     /// Whether the last block begun is inked.
     in_stroke: bool,
@@ -159,6 +163,8 @@ impl<'m> Runner<'m> {
             draw: PathSpeed::REST,
             travel: PathSpeed::REST,
             curve: PathSpeed::REST,
+            speed_limit: (SpeedLimit::NONE, PathSpeed::REST),
+            feed_override: FeedOverride::NONE,
             now: 0,
             // A motor holds the pen at the height at which it happened to be switched on.
             pen_is_down: pen.lift.is_none().then_some(false),
@@ -178,7 +184,7 @@ impl<'m> Runner<'m> {
             last: None,
             other_chord: None,
             long: None,
-            last_limit: PathLength::ZERO,
+            last_limit: SpeedLimit::NONE,
             run: RunLengths::default(),
             in_stroke: false,
             waiting_top_speed: SliceSpeed::ZERO,
@@ -244,11 +250,15 @@ impl<'m> Runner<'m> {
         self.lookahead.capacity() - self.lookahead.len()
     }
 
-    /// Scales both speeds to `percent` (10 to 200) at once, and the speed with the pen up to
-    /// `travel_percent` (1 to 100) of the result. Neither exceeds the greater of the two speeds
-    /// that are set.
+    /// Scales both speeds and all feeds to `percent` (10 to 200) at once, and the speed with the
+    /// pen up to `travel_percent` (1 to 100) of the result. None exceeds the greater of the two
+    /// speeds that are set.
     pub fn set_override(&mut self, percent: u8, travel_percent: u8) {
-        let percent = u64::from(percent.clamp(10, 200));
+        let percent = percent.clamp(10, 200);
+        self.feed_override = FeedOverride::new(&self.limits, percent);
+        self.lookahead.set_override(self.feed_override);
+        self.speed_limit = (SpeedLimit::NONE, PathSpeed::REST);
+        let percent = u64::from(percent);
         let travel_percent = percent * u64::from(travel_percent.clamp(1, 100)) / 100;
         let greatest = self.limits.draw_speed.max(self.limits.travel_speed);
         let scaled = |speed: SliceSpeed, percent: u64| {

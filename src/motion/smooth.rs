@@ -400,6 +400,15 @@ impl Interval {
     }
 }
 
+/// What a plan does about a limit that came too late to be kept.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Late {
+    /// It keeps every limit.
+    MustBeKept,
+    /// It passes such a limit too fast, and settles below it.
+    MayBePassed,
+}
+
 /// The limits on the path ahead that a plan has to keep.
 #[derive(Debug)]
 pub(super) struct PathLimits<'a, 'm> {
@@ -410,8 +419,10 @@ pub(super) struct PathLimits<'a, 'm> {
     pub(super) top: SliceSpeed,
     /// The distance to the end of the current piece, in units of 2^-32 mm.
     pub(super) room: u64,
-    /// The greatest stopping distance until there.
+    /// The greatest stopping distance that bends allow until there.
     pub(super) curve_limit: PathLength,
+    /// Whether `top` is valid only until there, because blocks have limits of their own.
+    pub(super) top_ends: bool,
     /// The blocks after that; `None` if the path ends there at rest.
     pub(super) beyond: Option<&'a Lookahead<'m>>,
 }
@@ -430,22 +441,25 @@ impl PathLimits<'_, '_> {
         let hardest = if from.ramp > -jerk.longest { -MOST_GROWTH } else { 0 };
         let mut least = hardest;
         let room = (jerk.longest - from.ramp).checked_div(slices.into()).unwrap_or(0);
-        let mut most = MOST_GROWTH.min(room);
-        if self.allows(from, most, slices) {
-            least = most;
-        }
-        while most - least > 1 {
-            let middle = (least + most) >> 1;
-            if self.allows(from, middle, slices) {
-                least = middle;
-            } else {
-                most = middle;
+        let greatest = MOST_GROWTH.min(room);
+        // If not even the hardest braking keeps a limit that came too late, braking ends as soon
+        // as it leads below that limit. Otherwise it would continue to rest and end with a jerk.
+        for late in [Late::MustBeKept, Late::MayBePassed] {
+            let mut most = greatest;
+            if self.allows(from, most, slices, late) {
+                least = most;
             }
-        }
-        // This also ends braking at the longest ramp, which would otherwise continue to rest and
-        // end with a jerk.
-        if least == hardest && from.ramp < -MOST_GROWTH * i32::from(slices) && self.is_slow(from) {
-            least = MOST_GROWTH;
+            while most - least > 1 {
+                let middle = (least + most) >> 1;
+                if self.allows(from, middle, slices, late) {
+                    least = middle;
+                } else {
+                    most = middle;
+                }
+            }
+            if least > hardest || self.allows(from, hardest, slices, late) {
+                break;
+            }
         }
         // A little less is chosen where that makes the next interval longer.
         if is_uneven
@@ -456,32 +470,52 @@ impl PathLimits<'_, '_> {
         }
         if from.speed == 0 && least <= 0 {
             let distance = jerk.gained_distance(0, 1, slices).unsigned_abs();
-            let speed = distance.checked_div(slices.into()).unwrap_or(0).max(1) as u32;
+            let speed = distance.checked_div(slices.into()).unwrap_or(0) as u32;
+            let speed = speed.min(self.top.to_bits()).max(1);
             return Interval::new(jerk, State { speed, ramp: 0 }, 0, slices);
         }
         // At the greatest speed, which nothing ahead can raise, the interval is as long as
         // possible.
         if from.ramp == 0 && least == 0 && self.settled(from, 1, slices).is_none() {
-            while slices < LONGEST_CRUISE && self.allows(from, 0, 2 * slices) {
+            if let Some(interval) = self.nearer_to_top(from, slices) {
+                return interval;
+            }
+            let goes_on = |slices: u16| {
+                let distance = u64::from(from.speed) * u64::from(slices);
+                !self.top_ends || distance <= self.room
+            };
+            while slices < LONGEST_CRUISE
+                && goes_on(2 * slices)
+                && self.allows(from, 0, 2 * slices, Late::MustBeKept)
+            {
                 slices *= 2;
             }
         }
         Interval::new(jerk, from, least, slices)
     }
 
-    /// Whether a limit came too late to be kept, and braking that ends now leads below it. The
-    /// known path must be much longer than a stop takes, so that its end is not what requires
-    /// braking.
+    /// The next interval if the speed is more than 1/128 below the greatest one, although no whole
+    /// interval may begin to accelerate. That happens at low speeds, which the least growth of the
+    /// acceleration changes by some mm/min.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
-    fn is_slow(&self, from: State) -> bool {
-        self.beyond.is_some_and(|blocks| {
-            let lowest = blocks.lowest_limit().min(self.curve_limit);
-            let left = blocks.stopping_distance_at((self.room + blocks.known()) >> 14, self.limits);
-            self.top > 0
-                && lowest > 0
-                && square(self.jerk.settled(from)) <= self.limits.squared_speed(lowest)
-                && self.jerk.braking_distance(from, 0) >> 14 < left - left / 8
-        })
+    fn nearer_to_top(&self, from: State, slices: u16) -> Option<Interval> {
+        let top = self.top.to_bits();
+        if top.saturating_sub(from.speed) <= top >> 7 {
+            return None;
+        }
+        // How the speed changes within one step is not seen.
+        let exact = State { speed: top, ramp: 0 };
+        let step = u64::from(self.limits.least_move.to_bits());
+        if u64::from(top) * u64::from(slices) <= step
+            && self.allows(exact, 0, slices, Late::MustBeKept)
+        {
+            return Some(Interval::new(self.jerk, exact, 0, slices));
+        }
+        let mut shorter = slices / 2;
+        while shorter > 0 && !self.allows(from, 1, shorter, Late::MustBeKept) {
+            shorter /= 2;
+        }
+        (shorter > 0).then(|| Interval::new(self.jerk, from, 1, shorter))
     }
 
     /// Returns the state after an interval of this growth, and the speed once the ramp has ended;
@@ -495,7 +529,7 @@ impl PathLimits<'_, '_> {
     }
 
     /// Whether all limits are kept within an interval of this growth, and can be kept after it.
-    fn allows(&self, from: State, growth: i32, slices: u16) -> bool {
+    fn allows(&self, from: State, growth: i32, slices: u16, late: Late) -> bool {
         let jerk = self.jerk;
         let Some((after, settled)) = self.settled(from, growth, slices) else {
             return false;
@@ -506,17 +540,25 @@ impl PathLimits<'_, '_> {
         let fastest = settled.max(after.speed.into());
         let exceeds =
             |speed: u64, limit: PathLength| speed * speed > self.limits.squared_speed(limit);
+        let ends_below = |settled: u64, limit: PathLength| {
+            after.ramp <= 0 && !exceeds(settled - settled / 128, limit)
+        };
+        let is_late = |place: u64, speed: u32| {
+            late == Late::MayBePassed
+                && from.speed > speed
+                && jerk.braking_distance(from, speed) > place
+        };
         let passes = |place: u64, limit: PathLength| {
             // The speed as if it were linear in the distance, which is too high where braking
             // fades.
             let change = i64::from(after.speed) - i64::from(from.speed);
             let part = change * (place >> 12).cast_signed() / (distance >> 12).max(1).cast_signed();
             let speed = (i64::from(from.speed) + part).unsigned_abs();
-            let settled = jerk.settled(from);
+            let limit_speed = self.limits.speed(limit).to_bits();
             !exceeds(speed, limit)
-                || (after.ramp <= 0
-                    && !exceeds(settled - settled / 128, limit)
-                    && jerk.braking_distance(from, self.limits.speed(limit).to_bits()) <= place)
+                || (ends_below(jerk.settled(from), limit)
+                    && (jerk.braking_distance(from, limit_speed) <= place
+                        || is_late(place, limit_speed)))
         };
         let stop = jerk.braking_distance(after, 0);
         if let Some(blocks) = self.beyond {
@@ -525,8 +567,10 @@ impl PathLimits<'_, '_> {
                 return false;
             }
         }
-        // None of the tested speeds exceeds this limit or a higher one.
-        let harmless = self.limits.least_limit(fastest.max(from.speed.into()));
+        // None of the tested speeds exceeds this limit or a higher one. A machine that is faster
+        // than the greatest speed brakes to that, and so keeps what is not below it.
+        let fastest_tested = fastest.max(from.speed.into()).min(self.top.to_bits().into());
+        let harmless = self.limits.least_limit(fastest_tested);
         let (enough, mut lowest) = (distance.saturating_add(stop), PathLength::MAX);
         let (mut begin, mut end, mut curve_limit) = (0, self.room, self.curve_limit);
         if let Some(blocks) = self.beyond
@@ -554,13 +598,15 @@ impl PathLimits<'_, '_> {
                 // A limit after a lower one has no effect.
                 if limit < lowest && exceeds(fastest, limit) {
                     lowest = limit;
-                    let limit = self.limits.speed(limit).to_bits();
-                    if end - distance < jerk.braking_distance(after, limit) {
+                    let speed = self.limits.speed(limit).to_bits();
+                    if end - distance < jerk.braking_distance(after, speed)
+                        && !(ends_below(settled, limit) && is_late(end, speed))
+                    {
                         return false;
                     }
                 }
             }
-            curve_limit = block.curve_limit;
+            curve_limit = self.beyond.map_or(block.curve_limit, |ring| ring.limit_within(block));
             (begin, end) = (end, end + (u64::from(block.length.to_bits()) << 14));
         }
         if begin <= distance && exceeds(settled, curve_limit) {

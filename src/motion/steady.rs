@@ -3,7 +3,7 @@
 use super::curvature::Curvature;
 use super::junction::{Corner, Heading, bends_apart, corner};
 use super::long_move::LongMove;
-use super::{Limits, Lookahead, PathLength};
+use super::{Limits, Lookahead, PathLength, SpeedLimit};
 use crate::drawing::PagePoint;
 
 /// Determines the greatest constant speed for a stretch of the path without sharp corners, before
@@ -78,8 +78,13 @@ impl<'l> SteadySpeed<'l> {
         true
     }
 
-    /// Returns the greatest stopping distance that every bend of the stretch allows; more than 0.
-    pub fn limit(mut self) -> PathLength {
+    /// Returns the greatest speed that every bend of the stretch allows; more than 0.
+    pub fn limit(self) -> SpeedLimit {
+        SpeedLimit::constant(self.stopping_distance())
+    }
+
+    /// The greatest stopping distance that every bend of the stretch allows; more than 0.
+    fn stopping_distance(mut self) -> PathLength {
         self.curvature.restart(self.limits, self.at, &mut self.bends);
         self.lowest.min(self.bends.take_lowered()).max(PathLength::DELTA)
     }
@@ -100,7 +105,7 @@ mod tests {
         }
         assert!(!stretch.add(PagePoint { x: 100, y: 300 }), "it turns back");
         assert_eq!(stretch.moves(), 20);
-        assert!(stretch.limit() < PathLength::MAX);
+        assert!(stretch.stopping_distance() < PathLength::MAX);
     }
 
     /// The end of the first line, of the short move behind it, and of the second line, which turns
@@ -132,7 +137,7 @@ mod tests {
         let limit = |points: &[PagePoint]| {
             let mut stretch = SteadySpeed::new(&limits, PagePoint { x: 0, y: 0 });
             assert!(points.iter().all(|point| stretch.add(*point)));
-            stretch.limit()
+            stretch.stopping_distance()
         };
         let [corner, _, end] = corner_with_a_short_move(30.0, 0);
         let open = limit(&[corner, end]).to_num::<f64>();

@@ -10,7 +10,7 @@ use penup::fixed::Millimetres;
 use penup::machine::{Alarm, Setting, SettingError, Settings, State, Target, TargetList, Value};
 use penup::motion::{
     Block, Limits, LimitsError, MotionSettings, Move, PathLength, PenOverlap, PenPositions,
-    Progress, Runner,
+    Progress, Runner, SpeedLimit,
 };
 use penup_host_tests::event_checker::{self, Drawn, Standstill};
 use penup_host_tests::pin_machine::{self, Recorder};
@@ -262,7 +262,7 @@ fn a_travel_that_becomes_faster_does_not_stand_on_the_way() {
         let (motors, from) = (PagePoint { x, y: 0 }, runner.end());
         let chord = runner.chord(x - from.x, 0).expect("short");
         let piece = Move::whole(motors, motors, &chord);
-        runner.push(&piece, ink.then_some(LineType::Full), PathLength::MAX).expect("room");
+        runner.push(&piece, ink.then_some(LineType::Full), SpeedLimit::NONE).expect("room");
     }
     let mut events = Recorder(Vec::new());
     runner.set_override(100, 20);

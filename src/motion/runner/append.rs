@@ -89,8 +89,8 @@ impl Runner<'_> {
         Some(Chord { displacement, length, heading })
     }
 
-    /// Appends a move whose speed is limited by a stopping distance ([`Limits::feed`]). Lengths,
-    /// corners and bends are measured on the page. A move without length is skipped.
+    /// Appends a move whose speed is limited by `speed_limit`, and by corners and bends. These and
+    /// lengths are measured on the page. A move without length is skipped.
     ///
     /// # Errors
     /// See [`PushError`]; nothing is appended then.
@@ -98,7 +98,7 @@ impl Runner<'_> {
         &mut self,
         piece: &Move<'_>,
         ink: Option<LineType>,
-        limit: PathLength,
+        speed_limit: SpeedLimit,
     ) -> Result<(), PushError> {
         let Move { motors, offsets, page, mut chord, mut length, is_gap } = *piece;
         let own;
@@ -146,7 +146,6 @@ impl Runner<'_> {
         if corner.is_sharp || bends_apart {
             self.curvature.restart(&self.limits, self.page_end, &mut self.lookahead);
         }
-        let (entry_limit, curve_limit) = (corner.limit, limit);
         let kind = if is_gap { BlockKind::Gap } else { BlockKind::Line };
         #[cfg(feature = "spread-backlash")]
         let (kind, extra) = core::mem::take(&mut self.backlash_take_up).of_block(kind);
@@ -154,8 +153,8 @@ impl Runner<'_> {
             dx,
             dy,
             length,
-            entry_limit,
-            curve_limit,
+            entry_limit: corner.limit,
+            speed_limit,
             ink,
             offsets,
             kind,
@@ -165,12 +164,12 @@ impl Runner<'_> {
         };
         // The speed is checked only between blocks, so moves are joined only if nothing limits it
         // there.
-        let is_free = corner.limit >= self.limits.top && limit == self.last_limit;
+        let is_free = corner.limit >= self.limits.top && speed_limit == self.last_limit;
         let is_joined = is_free && self.lookahead.join(&block, goes_on, &self.limits);
         if !is_joined && self.lookahead.push(block).is_err() {
             return Err(PushError::Full);
         }
-        self.last_limit = limit;
+        self.last_limit = speed_limit;
         if self.limits.centripetal {
             self.curvature.extend(&self.limits, page, &mut self.lookahead);
         }

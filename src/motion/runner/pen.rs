@@ -213,7 +213,7 @@ impl Runner<'_> {
             return Ok(());
         };
         let since = self.emitter.pen(next, time, queue)?;
-        let top = self.timing.travel_top(self.travel);
+        let top = self.current_top(false);
         self.timing.lowering = Some(Lowering { since, top });
         self.timing.until_lowered =
             (next != height).then(|| u64::from(self.pen.ramp_ticks) << FRACTION_BITS);

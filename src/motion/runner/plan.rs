@@ -71,6 +71,28 @@ impl Runner<'_> {
         if inked { self.draw } else { self.travel }
     }
 
+    /// The greatest speed that the limit of the current block allows, if it is below `top`, which
+    /// is that of the machine.
+    fn within_speed_limit(&mut self, top: PathSpeed) -> PathSpeed {
+        let limit = self.course.as_ref().map_or(SpeedLimit::NONE, |course| course.speed_limit);
+        if limit == SpeedLimit::NONE {
+            return top;
+        }
+        if self.speed_limit.0 != limit {
+            self.speed_limit = (limit, self.feed_override.speed(&self.limits, limit));
+        }
+        let (_, speed) = self.speed_limit;
+        if speed.speed < top.speed { speed } else { top }
+    }
+
+    /// The greatest speed of the current piece, which is `inked` or a travel.
+    pub(super) fn current_top(&mut self, inked: bool) -> PathSpeed {
+        if !inked && self.timing.is_lowering() {
+            return self.timing.travel_top(self.travel);
+        }
+        self.within_speed_limit(self.top(inked))
+    }
+
     /// Plans again from the commit point on. A stop goes on, and so does a plan that
     /// [must end](Plan::must_end), and a travel on which the pen was told to go down.
     pub(super) fn replan(&mut self) {
@@ -160,7 +182,7 @@ impl Runner<'_> {
             return Ok(Progress::More);
         }
         let is_shaped = self.is_shaped();
-        let Some(course) = &mut self.course else {
+        let Some(course) = &self.course else {
             return Ok(Progress::More);
         };
         let at_rest = self.committed == Committed::REST;
@@ -197,7 +219,11 @@ impl Runner<'_> {
             let units = self.brake.step_length(course.move_length);
             queue.set_step_length(units, self.emitter.has_stepped())?;
         }
-        let top = if inked { self.draw } else { self.timing.travel_top(self.travel) };
+        let top = self.current_top(inked);
+        let top_ends = top.speed < self.top(inked).speed;
+        let Some(course) = &mut self.course else {
+            return Ok(Progress::More);
+        };
         let stopping = self.stopping && !self.timing.is_lowering();
         let Committed { speed: entry, ramp } = self.committed;
         if let Some(jerk) = self.limits.jerk {
@@ -208,6 +234,7 @@ impl Runner<'_> {
                 top: top.speed,
                 room: course.room(),
                 curve_limit: course.curve_limit,
+                top_ends,
                 beyond: course.is_last_piece().then_some(&self.lookahead),
             };
             if stopping {

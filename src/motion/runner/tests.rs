@@ -21,7 +21,7 @@ pub(super) const PEN: PenPositions = PenPositions {
 pub(super) fn push(runner: &mut Runner<'_>, [x, y]: [i32; 2], ink: Option<LineType>) {
     let (motors, from) = (PagePoint { x, y }, runner.end());
     let chord = runner.chord(x - from.x, y - from.y).expect("short");
-    runner.push(&Move::whole(motors, motors, &chord), ink, PathLength::MAX).expect("room");
+    runner.push(&Move::whole(motors, motors, &chord), ink, SpeedLimit::NONE).expect("room");
 }
 
 /// Runs all that is known, and returns the ticks of all events so far.

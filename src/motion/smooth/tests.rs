@@ -96,8 +96,15 @@ fn at_the_top_the_speed_stays_for_long_intervals() {
         while room > 0 {
             let jerk = limits.jerk.expect("a limit");
             let (top, curve_limit) = (limits.draw_speed, PathLength::MAX);
-            let path_limits =
-                PathLimits { limits: &limits, jerk, top, room, curve_limit, beyond: None };
+            let path_limits = PathLimits {
+                limits: &limits,
+                jerk,
+                top,
+                room,
+                curve_limit,
+                top_ends: false,
+                beyond: None,
+            };
             let mut interval = path_limits.next(state);
             while let Some(slice) = interval.next_slice(room, Slice::MOST) {
                 room -= u64::from(slice.distance);

@@ -344,12 +344,8 @@ pub(super) fn explain_machine(refusal: &MachineError, row: Row<'_>) {
         MachineError::MoveTooLong { .. } => {
             row(error(152, "move too long"), format_args!("a single move is at most 16 m long"))
         }
-        MachineError::TooSlow { least } => row(
-            error(22, ""),
-            format_args!(
-                "the move is too slow to be exact: with this acceleration, the least speed is \
-                 {least} mm/min"
-            ),
-        ),
+        MachineError::TooSlow => {
+            row(error(22, ""), format_args!("the least speed of a move is 0.1 mm/min"))
+        }
     }
 }

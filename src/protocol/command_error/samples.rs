@@ -197,7 +197,7 @@ pub fn error_samples() -> Vec<CommandError> {
         State(State::Idle),
         BeyondTravel { target: 1, x: one, y: one },
         MoveTooLong { target: 1 },
-        TooSlow { least: 9 },
+        TooSlow,
     );
     let settings = every_variant!(SettingError:
         Unknown,
