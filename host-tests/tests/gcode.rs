@@ -240,9 +240,9 @@ fn a_limit_and_the_emergency_stop_are_alarms() {
 
 #[test]
 fn speeds_change_while_it_draws() {
-    let seconds = |bytes: &[u8]| {
+    let seconds_of = |program: &str, bytes: &[u8]| {
         let mut bench = bench();
-        bench.say("M3\nG1 X100\n");
+        bench.say(program);
         bench.work(300);
         for byte in bytes {
             bench.board.receive(&[*byte]);
@@ -251,6 +251,7 @@ fn speeds_change_while_it_draws() {
         bench.finish();
         bench.board.trace().now() as f64 / 25e6
     };
+    let seconds = |bytes: &[u8]| seconds_of("M3\nG1 X100\n", bytes);
     let plain = seconds(&[]);
     // 93 mm at 45 mm/s instead of 50.
     let slow = seconds(&[0x92]);
@@ -259,6 +260,13 @@ fn speeds_change_while_it_draws() {
     assert!((reset - plain).abs() < 0.01, "{reset} {plain}");
     let fast = seconds(&[0x91]);
     assert!((0.1..0.25).contains(&(plain - fast)), "{fast} {plain}");
+    // F is scaled, too, also that of the line that waits. Some 7.3 s are left.
+    let seconds = |bytes: &[u8]| seconds_of("M3\nG1 X50 F1200\nG1 X100 F600\n", bytes);
+    let plain = seconds(&[]);
+    let slow = seconds(&[0x92; 5]);
+    assert!((6.9..7.7).contains(&(slow - plain)), "{slow} {plain}");
+    let fast = seconds(&[0x91; 10]);
+    assert!((3.4..3.9).contains(&(plain - fast)), "{fast} {plain}");
     let mut bench = bench();
     bench.board.receive(&[0x93]);
     bench.work(1);
