@@ -87,7 +87,7 @@ impl Machine<'_> {
     pub(super) fn take_settings(&mut self) {
         let limits = self.settings.limits(self.pins.queue());
         self.runner.set_limits(limits, Tool::positions(&self.settings));
-        self.runner.set_override(self.percent, self.rapid_percent);
+        self.apply_override();
     }
 
     /// Passes the pulse width, the pin inversion, the height of the raised pen and the rule for

@@ -168,6 +168,8 @@ impl Machine<'_> {
         }
         self.steady = Steady::default();
         self.activity = Activity::Run(source);
+        // Jogs have no override.
+        self.apply_override();
     }
 
     /// Keeps the queue of step events filled. It reads targets while there is room for more planned

@@ -234,9 +234,16 @@ impl<'m> Machine<'m> {
     /// settings, those with the pen down and up.
     pub fn set_override(&mut self, percent: u8) {
         self.percent = percent.clamp(10, 200);
-        if !matches!(self.activity, Activity::Home(_)) {
-            self.runner.set_override(self.percent, self.rapid_percent);
-        }
+        self.apply_override();
+    }
+
+    /// Passes the overrides to the motion planner. Homing and jogs have none.
+    fn apply_override(&mut self) {
+        let (percent, rapid_percent) = match self.activity {
+            Activity::Home(_) | Activity::Jog => (100, 100),
+            _ => (self.percent, self.rapid_percent),
+        };
+        self.runner.set_override(percent, rapid_percent);
     }
 
     /// Scales the speed of moves with the pen up further, to `percent`, with immediate effect. The

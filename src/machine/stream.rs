@@ -38,7 +38,8 @@ impl Machine<'_> {
         Ok(())
     }
 
-    /// Jogs: moves to `point` with the pen raised, at a speed of at most `feed` mm/min.
+    /// Jogs: moves to `point` with the pen raised, at a speed of at most `feed` mm/min, which no
+    /// override scales.
     ///
     /// # Errors
     /// See [`MachineError`]. If [`Machine::has_room`] is false, the error is
@@ -48,7 +49,10 @@ impl Machine<'_> {
         self.check_travel(0, point)?;
         self.check_feed(feed)?;
         self.append(Target { point, ink: None }, feed)?;
-        self.activity = Activity::Jog;
+        if let Activity::Idle = self.activity {
+            self.activity = Activity::Jog;
+            self.apply_override();
+        }
         Ok(())
     }
 

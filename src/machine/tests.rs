@@ -429,3 +429,27 @@ fn the_override_scales_the_feeds_of_moves_that_wait() {
         }
     }
 }
+
+#[test]
+fn jogs_have_no_override() {
+    let settings = settings([70.0, 2000.0, 0.0, 0.05]);
+    let mut blocks = std::vec![Block::EMPTY; 32];
+    let pins = PulserState::new();
+    let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
+    let feed = Some(Value::from_num(600));
+    let speed = |steps: &[u64]| {
+        let (first, last) = (100, steps.len() - 100);
+        let minutes = (steps[last] - steps[first]) as f64 / f64::from(TICKS_PER_SECOND) / 60.0;
+        (last - first) as f64 / STEPS / minutes
+    };
+    machine.set_override(50);
+    machine.jog(PagePoint { x: 1000, y: 0 }, feed).expect("idle");
+    machine.set_override(30);
+    let jogged = speed(&times_of_steps(&mut machine));
+    assert!((jogged / 600.0 - 1.0).abs() < 0.01, "{jogged}");
+    let target = Target { point: PagePoint { x: 2000, y: 0 }, ink: None };
+    machine.draw_to(target, feed).expect("idle");
+    let moved = speed(&times_of_steps(&mut machine));
+    assert!((moved / 180.0 - 1.0).abs() < 0.01, "{moved}");
+    assert_eq!(machine.percent(), 30);
+}
