@@ -97,8 +97,8 @@ impl Runner<'_> {
     /// Returns the length of the travels after the current piece until the machine is at rest, in
     /// units of 2^-18 mm, and how long it then takes until a stroke begins, because motors may have
     /// backlash to take up. `None` if no stroke is known, or if the machine may be slower in
-    /// between.
-    fn distance_to_stroke(&self) -> Option<(u64, u64)> {
+    /// between than now, where its greatest speed is `top`.
+    fn distance_to_stroke(&self, top: PathSpeed) -> Option<(u64, u64)> {
         if self.course.as_ref().is_some_and(|course| !course.is_last_piece()) {
             return Some((0, 0));
         }
@@ -108,7 +108,7 @@ impl Runner<'_> {
             if block.ink.is_some() && block.kind == BlockKind::Line {
                 return Some((distance, time));
             }
-            let is_slower = is_smooth && block.limit() < self.travel.stopping_distance;
+            let is_slower = is_smooth && block.limit() < top.stopping_distance;
             if is_slower || (time > 0 && block.kind != BlockKind::Backlash) {
                 return None;
             }
@@ -125,8 +125,9 @@ impl Runner<'_> {
 
     /// Returns the greatest time until the current travel is at rest where a stroke begins,
     /// according to the plan that was just made; `None` if it is unknown.
-    fn time_to_stroke(&self) -> Option<u64> {
-        let (distance, later) = self.distance_to_stroke()?;
+    fn time_to_stroke(&mut self) -> Option<u64> {
+        let top = self.current_top(false);
+        let (distance, later) = self.distance_to_stroke(top)?;
         let time = match self.plan.as_ref()? {
             Plan::Profile { profile, .. } => {
                 let exit = profile.exit();
@@ -139,7 +140,7 @@ impl Runner<'_> {
             }
             Plan::Interval(interval) => {
                 let room = self.course.as_ref()?.room();
-                interval.time_to_rest(room.saturating_add(distance << 14), self.travel.speed)
+                interval.time_to_rest(room.saturating_add(distance << 14), top.speed)
             }
         };
         Some(time.saturating_add(later))
