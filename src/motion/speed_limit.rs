@@ -122,7 +122,7 @@ pub(super) struct FeedOverride {
 }
 
 impl FeedOverride {
-    /// Nothing is scaled, and feeds limit nothing. It is in force until there are limits.
+    /// Nothing is scaled. It is in force until the limits are known, and where no block has a feed.
     pub(super) const NONE: Self = Self { percent: 100, factor: u64::MAX };
 
     /// An override of `percent`.
