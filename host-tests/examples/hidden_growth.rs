@@ -1,6 +1,7 @@
 //! Times of the search for hidden lines as meshes grow, with the numbers of a computer:
-//! `hidden_growth [KIND FACES [seams]]`, KIND being `icosphere` or `terrain`. Without arguments,
-//! both kinds from 5,000 to 1.3 million faces, without and with seams, each on one core and on all.
+//! `hidden_growth [KIND FACES [seams] [all-cores]]`, KIND being `icosphere` or `terrain`. Without
+//! arguments, both kinds from 5,000 to 1.3 million faces, without and with seams, each on one core
+//! and on all.
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*find_stretches*'` counts the instructions of one.
 
@@ -59,7 +60,9 @@ fn run(kind: &str, faces: usize, with_seams: bool, on_all_cores: bool) {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     if let [kind, faces, rest @ ..] = &arguments[..] {
-        run(kind, faces.parse().expect("a number of faces"), !rest.is_empty(), false);
+        let has = |option: &str| rest.iter().any(|given| given == option);
+        let faces = faces.parse().expect("a number of faces");
+        run(kind, faces, has("seams"), has("all-cores"));
         return;
     }
     for kind in ["icosphere", "terrain"] {

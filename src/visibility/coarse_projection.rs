@@ -435,6 +435,13 @@ impl<'a> CoarseProjection<'a> {
         self.mapping.error_bound(self.unrounded.error_bound())
     }
 
+    /// Returns how far on the coarse grid a point moves at most when its view coordinates are
+    /// rounded.
+    #[cfg(feature = "threads")]
+    pub fn rounding_error(&self) -> u16 {
+        self.mapping.error_bound(1) as u16 // It is at most 2^14 + 1.
+    }
+
     /// Returns an axis of the page along which p and q differ, and the sign of their difference.
     ///
     /// Returns `None` if the eye sees both points at the same position.

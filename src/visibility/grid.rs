@@ -90,13 +90,14 @@ pub struct Grid<'a, I> {
     entries: &'a mut [I],
 }
 
-/// The faces that a certain edge meets in one cell, so that it must be tested against them.
+/// What a certain edge or face meets in one cell.
 pub struct CellView<'g, I> {
-    /// The rank of the face that covers the whole cell, if that face is nearer than the whole edge.
+    /// The rank of the face that covers the whole cell, if that face is nearer than all of it.
     pub cover: Option<I>,
-    /// Whether that face or the sheet in the cell is nearer than the whole edge.
+    /// Whether that face or the sheet in the cell is nearer than all of it.
     pub hides: bool,
-    /// Whether the edge, if it is a side of a face, is part of the sheet in the cell.
+    /// Whether it is part of the sheet in the cell, if it is a face or a side of a face, and is in
+    /// the cell: every face there that begins nearer than the sheet ends is part of it.
     pub shows: bool,
     /// The ranks of the faces on the cell, nearest first.
     pub faces: &'g [I],
@@ -196,7 +197,7 @@ impl<'a, I: Index> Grid<'a, I> {
                 continue;
             }
             let area = self.shape.area(cell % self.columns, cell / self.columns);
-            let ranks = self.view(cell, 0, 0).faces;
+            let ranks = self.view(cell, 0).faces;
             if let Some(far) = around.sheet(&area, ranks) {
                 self.cells[cell].cover_with(I::NONE, coarse_depth(far + 1));
             }
@@ -205,9 +206,9 @@ impl<'a, I: Index> Grid<'a, I> {
         Ok(())
     }
 
-    /// Returns the faces that an edge meets in a cell if no point of the edge is nearer than the
-    /// coarse depth `near`.
-    fn view(&self, cell: usize, near: u16, far: u16) -> CellView<'_, I> {
+    /// Returns what an edge or a face meets in a cell if no point of it is nearer than the coarse
+    /// depth `near`.
+    fn view(&self, cell: usize, near: u16) -> CellView<'_, I> {
         let begin = cell.checked_sub(1).map_or(I::ZERO, |before| self.cells[before].end());
         let cell = self.cells[cell];
         let hides = cell.cover_depth() < near;
@@ -215,7 +216,7 @@ impl<'a, I: Index> Grid<'a, I> {
         CellView {
             cover: (hides && !is_sheet).then_some(cell.cover()),
             hides,
-            shows: is_sheet && far < cell.cover_depth(),
+            shows: is_sheet && near < cell.cover_depth(),
             faces: &self.entries[begin.get()..cell.end().get()],
         }
     }
@@ -226,9 +227,25 @@ impl<'a, I: Index> Grid<'a, I> {
         let [column0, column1, row0, row1] = self.shape.span(bounds).map_each(usize::from);
         for row in row0..=row1 {
             for column in column0..=column1 {
-                visit(self.view(row * self.columns + column, 0, 0).faces);
+                visit(self.view(row * self.columns + column, 0).faces);
             }
         }
+    }
+
+    /// Whether each cell that touches a rectangle is as `is` asks, for a face that begins at the
+    /// coarse depth `near`. The rectangle may reach beyond the grid.
+    #[cfg(feature = "threads")]
+    pub fn are_all(
+        &self,
+        bounds: &Bounds,
+        near: u16,
+        is: impl Fn(&CellView<'_, I>) -> bool,
+    ) -> bool {
+        let bounds = Bounds { low: bounds.low, high: bounds.high.low(self.shape.far) };
+        let [column0, column1, row0, row1] = self.shape.span(&bounds).map_each(usize::from);
+        let mut cells = (row0..=row1)
+            .flat_map(|row| (column0..=column1).map(move |column| row * self.columns + column));
+        cells.all(|cell| is(&self.view(cell, near)))
     }
 
     /// Returns the cells on the path of an edge from `p` to `q`, and those that are at most
@@ -238,7 +255,7 @@ impl<'a, I: Index> Grid<'a, I> {
         &self,
         p: CoarsePoint,
         q: CoarsePoint,
-        [near, far]: [u16; 2],
+        near: u16,
         margin: i32,
     ) -> EdgeCells<'_, I> {
         // The rounded ends of a seam may lie beyond the last cell.
@@ -247,7 +264,7 @@ impl<'a, I: Index> Grid<'a, I> {
         let dx = i32::from(high.x) - i32::from(low.x);
         let dy = i32::from(high.y) - i32::from(low.y);
         let slope = if dy > 0 { (dx << 16) / dy } else { 0 };
-        EdgeCells { grid: self, near, far, margin, low, high, slope }
+        EdgeCells { grid: self, near, margin, low, high, slope }
     }
 }
 
@@ -258,8 +275,6 @@ pub struct EdgeCells<'g, I> {
     grid: &'g Grid<'g, I>,
     /// The coarse depth of the nearest point of the edge.
     near: u16,
-    /// The depth of its farther end, on the scale of [`coarse_depth`].
-    far: u16,
     /// How far beside the edge cells are visited, too, in units of the coarse grid.
     margin: i32,
     /// The lower end of the edge, which is not above `high`.
@@ -297,7 +312,7 @@ impl<'g, I: Index> EdgeCells<'g, I> {
             }
             let first = row as usize * self.grid.columns;
             for column in (from >> shift_x)..=(to >> shift_x) {
-                if !visit(self.grid.view(first + column as usize, self.near, self.far)) {
+                if !visit(self.grid.view(first + column as usize, self.near)) {
                     return false;
                 }
             }

@@ -118,6 +118,16 @@ impl Bounds {
         !self.high.is_before(other.low) && !other.high.is_before(self.low)
     }
 
+    /// Returns the rectangle whose sides lie this far outside its own.
+    #[cfg(feature = "threads")]
+    pub fn grown(&self, by: u16) -> Self {
+        let Self { low, high } = *self;
+        Self {
+            low: CoarsePoint { x: low.x.saturating_sub(by), y: low.y.saturating_sub(by) },
+            high: CoarsePoint { x: high.x.saturating_add(by), y: high.y.saturating_add(by) },
+        }
+    }
+
     /// Returns the rectangle around the given corners.
     pub fn of<I: Index>(coarse_projection: &CoarseProjection<'_>, corners: &[Corner<I>]) -> Self {
         let mut bounds = Self::NOWHERE;

@@ -155,6 +155,7 @@ impl<I: Index> SceneIndex<'_, I> {
 #[cfg(test)]
 mod tests {
     use crate::geometry::{Projection, Vertex};
+    use crate::index::Index;
     use crate::model::{Corner, Elements};
     use crate::stage::{NeverCancel, Scratch, SinkFull};
     use crate::visibility::grid::Grid;
@@ -259,10 +260,11 @@ mod tests {
             }
         }
 
-        fn corners(&self) -> Vec<Corner<u32>> {
+        fn corners<I: Index>(&self) -> Vec<Corner<I>> {
             let corners = self.elements.iter().flat_map(|element| {
                 let (is_bar, last) = (element.len() == 2, element.len() - 1);
-                element.iter().enumerate().map(move |(n, &to)| Corner::new(to, is_bar, n == last))
+                let corner = move |(n, &to)| Corner::new(I::new(to as usize), is_bar, n == last);
+                element.iter().enumerate().map(corner)
             });
             corners.collect()
         }
@@ -270,16 +272,31 @@ mod tests {
 
     struct Stretches(Vec<Stretch<u32>>);
 
-    impl StretchSink<u32> for Stretches {
-        fn stretch(&mut self, stretch: Stretch<u32>) -> Result<(), SinkFull> {
-            self.0.push(stretch);
+    impl<I: Index> StretchSink<I> for Stretches {
+        fn stretch(&mut self, stretch: Stretch<I>) -> Result<(), SinkFull> {
+            let Stretch { edge, ends, from, to, visible, pen } = stretch;
+            let edge = edge.map(|(p, q)| (p.into(), q.into()));
+            self.0.push(Stretch { edge, ends, from, to, visible, pen });
             Ok(())
         }
     }
 
+    fn scene<'a, I: Index>(
+        vertices: &'a [Vertex],
+        corners: &'a [Corner<I>],
+        projection: Projection,
+    ) -> Scene<'a, I> {
+        let elements = Elements::new(corners);
+        Scene { vertices, elements, projection, unrounded: Unrounded::UNKNOWN }
+    }
+
     /// Returns the stretches of a scene, and in how many cells a sheet was found. Sheets are looked
     /// for only in a part of a scene.
-    fn find(scene: &Scene<'_, u32>, options: Options, is_part: bool) -> (Vec<Stretch<u32>>, usize) {
+    fn find<I: Index>(
+        scene: &Scene<'_, I>,
+        options: Options,
+        is_part: bool,
+    ) -> (Vec<Stretch<u32>>, usize) {
         let mut words = std::vec![0u64; 1 << 14];
         let mut scratch = Scratch::new(&mut words);
         let mut never_cancel = NeverCancel;
@@ -312,13 +329,11 @@ mod tests {
             for at in (0..count * (count - 1)).filter(|at| at % count != count - 1) {
                 let at = first + at;
                 let face = [at, at + 1, at + 1 + count, at + count];
-                corners.extend((0..4).map(|n| Corner::new(face[n], false, n == 3)));
+                corners.extend((0..4).map(|n| Corner::<u32>::new(face[n], false, n == 3)));
             }
         }
         for projection in [Projection::Perspective, Projection::Parallel] {
-            let elements = Elements::new(&corners);
-            let unrounded = Unrounded::UNKNOWN;
-            let scene = Scene { vertices: &vertices, elements, projection, unrounded };
+            let scene = scene(&vertices, &corners, projection);
             let (expected, _) = find(&scene, Options::default(), false);
             let (found, sheets) = find(&scene, Options::default(), true);
             assert!(sheets > 100, "{sheets}");
@@ -328,28 +343,33 @@ mod tests {
 
     #[test]
     fn sheets_change_no_stretch() {
-        let mut sheets = 0;
+        let (mut sheets, mut seams) = (0, 0);
         for seed in 0..if cfg!(miri) { 1 } else { 240 } {
             let balls = Balls::new(seed);
-            let corners = balls.corners();
-            let scene = Scene {
-                vertices: &balls.vertices,
-                elements: Elements::new(&corners),
-                projection: [Projection::Perspective, Projection::Parallel][seed as usize / 2 % 2],
-                unrounded: Unrounded::UNKNOWN,
-            };
+            let projection = [Projection::Perspective, Projection::Parallel][seed as usize / 2 % 2];
             let options = Options {
                 with_hidden: seed.is_multiple_of(2),
                 with_seams: true,
                 merged_blocks: seed % 5 == 1,
                 crease: (seed % 7 == 2).then_some(Crease { cosine: 31_000, depth_stretch: (1, 1) }),
             };
+            // Boards know no boxes of faces, so each seam is looked for there.
+            let (corners, wide_corners) = (balls.corners::<u16>(), balls.corners::<u32>());
+            let scene = scene(&balls.vertices, &corners, projection);
+            let wide_scene = self::scene(&balls.vertices, &wide_corners, projection);
             let (expected, none) = find(&scene, options, false);
-            let (found, some) = find(&scene, options, true);
             assert_eq!(none, 0, "a whole scene of few faces");
-            assert!(found == expected, "{seed}: {} and {}", found.len(), expected.len());
-            sheets += some;
+            let found = [
+                find(&scene, options, true),
+                find(&wide_scene, options, false),
+                find(&wide_scene, options, true),
+            ];
+            for (found, _) in &found {
+                assert!(*found == expected, "{seed}: {} and {}", found.len(), expected.len());
+            }
+            seams += expected.iter().filter(|stretch| stretch.edge.is_none()).count();
+            sheets += found[2].1;
         }
-        assert!(sheets > 2000, "{sheets}");
+        assert!(sheets > 2000 && seams > 2000, "{sheets} and {seams}");
     }
 }
