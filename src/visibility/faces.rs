@@ -1,14 +1,16 @@
 //! Sorts the faces by the depth of their nearest point, so that the search can stop at the first
 //! face that is too far away. The position of a face in this order is called its rank.
 
-use super::VisibilityError;
 use super::edges::{Outlines, is_bar};
 use super::triangles::{Cut, cut_of};
 use super::yield_counter::YieldCounter;
+use super::{Cores, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::{COORDINATE_LIMIT, Vertex};
 use crate::index::Index;
 use crate::stage::{Scratch, heap_sort_by_key};
+#[cfg(feature = "threads")]
+use rayon::slice::ParallelSliceMut;
 
 /// The elements, nearest first. The position of an element in this order is its rank.
 ///
@@ -44,6 +46,7 @@ impl<'a, I: Index> Faces<'a, I> {
     pub fn sort(
         outlines: Outlines<'_, I>,
         vertices: &[Vertex],
+        cores: Cores,
         scratch: &mut Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
@@ -71,10 +74,12 @@ impl<'a, I: Index> Faces<'a, I> {
         // The sort itself does not check for cancelling. It takes some 500 instructions for each of
         // 2000 faces.
         yield_counter.spend(500 * order.len())?;
-        if cfg!(feature = "threads") {
-            order.sort_unstable(); // This is faster; its code is too large for a board or the page.
-        } else {
-            heap_sort_by_key(order, |key| *key);
+        match cores {
+            // This is faster; its code is too large for a board or the page.
+            Cores::One if cfg!(feature = "threads") => order.sort_unstable(),
+            Cores::One => heap_sort_by_key(order, |key| *key),
+            #[cfg(feature = "threads")]
+            Cores::All => order.par_sort_unstable(),
         }
         Ok(Self { order, degenerate, has_ears })
     }

@@ -6,16 +6,20 @@
 //! hide there is hidden already. An edge that lies behind the covering face of every cell on its
 //! path is hidden without a further test.
 
-use super::VisibilityError;
 use super::coarse_projection::CoarsePoint;
 use super::raster::{Bounds, Raster, Shape};
 use super::scene_index::SceneIndex;
 use super::yield_counter::YieldCounter;
+use super::{Cores, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::COORDINATE_LIMIT;
 use crate::index::Index;
 use crate::stage::Scratch;
 use bytemuck::{Pod, Zeroable};
+#[cfg(feature = "threads")]
+use rayon::iter::{IntoParallelIterator, ParallelIterator};
+#[cfg(feature = "threads")]
+use std::vec::Vec;
 
 /// One cell of the page: where the list of its faces ends, which begins where that of the previous
 /// cell ends, and its covering face.
@@ -134,6 +138,7 @@ impl<'a, I: Index> Grid<'a, I> {
     pub fn new(
         around: &SceneIndex<'_, I>,
         is_part: bool,
+        cores: Cores,
         mut scratch: Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
@@ -175,7 +180,7 @@ impl<'a, I: Index> Grid<'a, I> {
         raster.fill(coarse_projection, outlines, faces, entries, yield_counter)?;
         let mut grid = Self { shape, columns: shape.columns(), cells: raster.cells(), entries };
         if with_sheets {
-            grid.find_sheets(around, yield_counter)?;
+            grid.find_sheets(around, cores, yield_counter)?;
         }
         Ok(grid)
     }
@@ -190,20 +195,40 @@ impl<'a, I: Index> Grid<'a, I> {
     fn find_sheets(
         &mut self,
         around: &SceneIndex<'_, I>,
+        cores: Cores,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<(), VisibilityError> {
-        for cell in 0..self.cells.len() {
-            if self.cells[cell].cover_depth() != NO_COVER {
-                continue;
+        match cores {
+            Cores::One => {
+                for cell in 0..self.cells.len() {
+                    if let Some(depth) = self.sheet_depth(around, cell) {
+                        self.cells[cell].cover_with(I::NONE, depth);
+                    }
+                    yield_counter.spend(500)?;
+                }
             }
-            let area = self.shape.area(cell % self.columns, cell / self.columns);
-            let ranks = self.view(cell, 0).faces;
-            if let Some(far) = around.sheet(&area, ranks) {
-                self.cells[cell].cover_with(I::NONE, coarse_depth(far + 1));
+            #[cfg(feature = "threads")]
+            Cores::All => {
+                let depth = |cell| Some((cell, self.sheet_depth(around, cell)?));
+                let found: Vec<_> =
+                    (0..self.cells.len()).into_par_iter().filter_map(depth).collect();
+                for (cell, depth) in found {
+                    self.cells[cell].cover_with(I::NONE, depth);
+                }
             }
-            yield_counter.spend(500)?;
         }
         Ok(())
+    }
+
+    /// Returns the coarse depth of the sheet in a cell that no single face covers, one unit behind
+    /// its farthest point.
+    fn sheet_depth(&self, around: &SceneIndex<'_, I>, cell: usize) -> Option<u16> {
+        if self.cells[cell].cover_depth() != NO_COVER {
+            return None;
+        }
+        let area = self.shape.area(cell % self.columns, cell / self.columns);
+        let far = around.sheet(&area, self.view(cell, 0).faces)?;
+        Some(coarse_depth(far + 1))
     }
 
     /// Returns what an edge or a face meets in a cell if no point of it is nearer than the coarse

@@ -261,6 +261,16 @@ pub fn find_stretches<I: Index>(
     find_some(scene, options, scratch, cancel, Owner::default(), sink)
 }
 
+/// The cores on which a scene is made ready. The result is the same.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cores {
+    /// The core that calls.
+    One,
+    /// All cores of a computer.
+    #[cfg(feature = "threads")]
+    All,
+}
+
 /// Which edges and seams are followed; all of them with `None`.
 #[cfg(feature = "tiles")]
 type Owner<'o, I> = Option<&'o mut dyn Ownership<I>>;
@@ -281,14 +291,14 @@ fn find_some<I: Index>(
 ) -> Result<Report, VisibilityError> {
     let mut scratch = scratch; // It lives no longer than the scene.
     let yield_counter = &mut YieldCounter::new(cancel);
-    let around = &index(scene, options, &mut scratch, yield_counter)?;
+    let around = &index(scene, options, Cores::One, &mut scratch, yield_counter)?;
     let faces = around.faces.len();
     let marks = Marks::new(faces, StretchFinder::<I>::least_bytes(faces), &mut scratch)?;
     #[cfg(feature = "tiles")]
     let is_part = owner.is_some();
     #[cfg(not(feature = "tiles"))]
     let is_part = false;
-    let grid = &Grid::new(around, is_part, scratch, yield_counter)?;
+    let grid = &Grid::new(around, is_part, Cores::One, scratch, yield_counter)?;
     #[cfg(feature = "tiles")]
     let owner: Owner<'_, I> = match owner {
         Some(owner) => Some(&mut *owner), // It lives no longer than the scene.
@@ -307,6 +317,7 @@ fn find_some<I: Index>(
 fn index<'a, I: Index>(
     scene: &Scene<'a, I>,
     options: Options,
+    cores: Cores,
     scratch: &mut Scratch<'a>,
     yield_counter: &mut YieldCounter<'_>,
 ) -> Result<SceneIndex<'a, I>, VisibilityError> {
@@ -316,7 +327,7 @@ fn index<'a, I: Index>(
     let creases = (options.crease, scene.unrounded);
     let chosen =
         ChosenSides::choose(outlines, projection, vertices, creases, scratch, yield_counter)?;
-    let faces = Faces::sort(outlines, vertices, scratch, yield_counter)?;
+    let faces = Faces::sort(outlines, vertices, cores, scratch, yield_counter)?;
     let ears = if faces.has_ears() {
         Ears::cut(outlines, vertices, scratch, yield_counter)?
     } else {
@@ -339,7 +350,7 @@ fn index<'a, I: Index>(
         solids: Solids::default(),
     };
     #[cfg(feature = "threads")]
-    let around = around.with_shortcuts(scratch, yield_counter)?;
+    let around = around.with_shortcuts(cores, scratch, yield_counter)?;
     Ok(around)
 }
 

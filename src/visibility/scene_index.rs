@@ -1,8 +1,6 @@
 //! What the search for visible stretches knows about a scene, and what it asks of its faces.
 
 use super::Report;
-#[cfg(feature = "threads")]
-use super::VisibilityError;
 use super::coarse_projection::CoarseProjection;
 use super::edges::{ChosenSides, Outlines};
 use super::faces::{Face, Faces};
@@ -13,11 +11,15 @@ use super::solids::Solids;
 use super::triangles::Ears;
 #[cfg(feature = "threads")]
 use super::yield_counter::YieldCounter;
+#[cfg(feature = "threads")]
+use super::{Cores, VisibilityError};
 use crate::array::MapEach;
 use crate::geometry::Plane;
 use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::Scratch;
+#[cfg(feature = "threads")]
+use rayon::iter::{IndexedParallelIterator, IntoParallelRefMutIterator, ParallelIterator};
 
 /// Everything that the search for visible stretches needs to know about a scene.
 pub struct SceneIndex<'a, I: Index> {
@@ -55,6 +57,7 @@ impl<'a, I: Index> SceneIndex<'a, I> {
     /// Returns an error if the memory is too small or the user cancels.
     pub fn with_shortcuts(
         mut self,
+        cores: Cores,
         scratch: &mut Scratch<'a>,
         yield_counter: &mut YieldCounter<'_>,
     ) -> Result<Self, VisibilityError> {
@@ -63,14 +66,25 @@ impl<'a, I: Index> SceneIndex<'a, I> {
             let bounds: &mut [Bounds] = scratch.take(count)?;
             let extents: &mut [Extent] = scratch.take(count)?;
             let facings: &mut [i8] = scratch.take(count)?;
-            let slots = bounds.iter_mut().zip(&mut *extents).zip(&mut *facings);
-            for (rank, ((bounds, extent), facing)) in slots.enumerate() {
+            let of_face = |rank: usize| {
                 let face = self.faces.get(rank);
-                let corners = self.outlines.element(face.first);
-                *bounds = Bounds::of(&self.coarse_projection, corners);
-                *extent = self.extent(rank);
-                *facing = self.facing(face).unwrap_or(0) as i8;
-                yield_counter.spend(150 * corners.len())?;
+                let bounds = Bounds::of(&self.coarse_projection, self.outlines.element(face.first));
+                (bounds, self.extent(rank), self.facing(face).unwrap_or(0) as i8)
+            };
+            match cores {
+                Cores::One => {
+                    let slots = bounds.iter_mut().zip(&mut *extents).zip(&mut *facings);
+                    for (rank, ((bounds, extent), facing)) in slots.enumerate() {
+                        (*bounds, *extent, *facing) = of_face(rank);
+                        yield_counter.spend(450)?;
+                    }
+                }
+                Cores::All => {
+                    let slots = bounds.par_iter_mut().zip(&mut *extents).zip(&mut *facings);
+                    slots.enumerate().for_each(|(rank, ((bounds, extent), facing))| {
+                        (*bounds, *extent, *facing) = of_face(rank);
+                    });
+                }
             }
             (self.bounds, self.extents, self.facings) = (bounds, extents, facings);
             let depths = scratch.take(self.outlines.corners.len())?;

@@ -288,7 +288,8 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let far = extent.far();
         grid.within(&around.bounds_of(one), &mut |ranks| {
             // The ranks in a cell ascend.
-            let higher = ranks.iter().map(|&rank| rank.get()).skip_while(|&other| other <= one);
+            let (_, higher) = ranks.split_at(ranks.partition_point(|rank| rank.get() <= one));
+            let higher = higher.iter().map(|rank| rank.get());
             for other in higher.take_while(|&other| !around.faces.begins_behind(other, far)) {
                 met.insert(other);
             }

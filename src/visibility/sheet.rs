@@ -161,7 +161,7 @@ mod tests {
     use crate::visibility::grid::Grid;
     use crate::visibility::search::{Marks, StretchFinder};
     use crate::visibility::{
-        Crease, Options, Scene, Stretch, StretchSink, Unrounded, YieldCounter, index,
+        Cores, Crease, Options, Scene, Stretch, StretchSink, Unrounded, YieldCounter, index,
     };
     use std::vec::Vec;
 
@@ -301,10 +301,11 @@ mod tests {
         let mut scratch = Scratch::new(&mut words);
         let mut never_cancel = NeverCancel;
         let yield_counter = &mut YieldCounter::new(&mut never_cancel);
-        let around = &index(scene, options, &mut scratch, yield_counter).expect("an index");
+        let around =
+            &index(scene, options, Cores::One, &mut scratch, yield_counter).expect("an index");
         let faces = around.faces.len();
         let marks = Marks::new(faces, 1 << 14, &mut scratch).expect("marks");
-        let grid = &Grid::new(around, is_part, scratch, yield_counter).expect("a grid");
+        let grid = &Grid::new(around, is_part, Cores::One, scratch, yield_counter).expect("a grid");
         let mut search = StretchFinder::new(around, grid, marks, options, Default::default());
         let mut found = Stretches(Vec::new());
         let corners = around.outlines.corners.len();

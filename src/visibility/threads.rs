@@ -1,7 +1,8 @@
 //! Hidden-line removal on all cores of a computer.
 //!
-//! The scene is made ready on one core. Then the edges and the seams are divided into parts, which
-//! the cores work through with marks of their own (`Marks`). The stretches of the parts are handed
+//! What takes the longest while the scene is made ready is divided among the cores, and the rest of
+//! that is done on one (`Cores`). Then the edges and the seams are divided into parts, which the
+//! cores work through with marks of their own (`Marks`). The stretches of the parts are handed
 //! over in the order of the model, by the thread that called, so the result does not depend on the
 //! number of cores.
 //!
@@ -12,7 +13,7 @@ use super::grid::Grid;
 use super::scene_index::SceneIndex;
 use super::search::{Marks, StretchFinder};
 use super::yield_counter::YieldCounter;
-use super::{Options, Report, Scene, Stretch, StretchSink, VisibilityError, index};
+use super::{Cores, Options, Report, Scene, Stretch, StretchSink, VisibilityError, index};
 use crate::index::Index;
 use crate::stage::{Aborted, Cancel, Scratch, SinkFull};
 use core::ops::Range;
@@ -72,8 +73,8 @@ pub fn find_stretches_in_parts<I: Index>(
 ) -> Result<Report, VisibilityError> {
     let mut scratch = scratch;
     let yield_counter = &mut YieldCounter::new(cancel);
-    let around = &index(scene, options, &mut scratch, yield_counter)?;
-    let grid = &Grid::new(around, false, scratch, yield_counter)?;
+    let around = &index(scene, options, Cores::All, &mut scratch, yield_counter)?;
+    let grid = &Grid::new(around, false, Cores::All, scratch, yield_counter)?;
     let stop = &AtomicBool::new(false);
     rayon::in_place_scope_fifo(|scope| {
         let (sender, receiver) = mpsc::channel();
