@@ -31,14 +31,19 @@ impl<I> Default for FaceSet<'_, I> {
 impl<'a, I: Index> FaceSet<'a, I> {
     /// Whether words are recorded at all.
     const IS_RECORDED: bool = I::BITS > 16;
-    /// How many words are recorded.
-    const MOST_USED: usize = 64;
     /// A set with fewer words than this is cleared as a whole, because recording takes longer.
     const MANY_WORDS: usize = 256;
+    /// One in so many words is recorded. To clear more of them one by one takes about as long as to
+    /// clear all.
+    const WORDS_OF_ONE_USED: usize = 8;
 
     /// Returns how many words of a set of this many are recorded.
     const fn used(words: usize) -> usize {
-        if Self::IS_RECORDED && words >= Self::MANY_WORDS { Self::MOST_USED } else { 0 }
+        if Self::IS_RECORDED && words >= Self::MANY_WORDS {
+            words / Self::WORDS_OF_ONE_USED
+        } else {
+            0
+        }
     }
 
     /// Returns the recorded words, if those are all `count` words that are not zero.
@@ -118,7 +123,7 @@ impl<'a, I: Index> FaceSet<'a, I> {
         let Self { words, used, count, .. } = self;
         match Self::recorded(used, *count) {
             // Sorting many words takes longer than looking through all.
-            Some(used) if 8 * used.len() < words.len() => {
+            Some(used) if 64 * used.len() < words.len() => {
                 heap_sort_by_key(used, |word| *word);
                 for &word in &*used {
                     of_word((word as usize, words[word as usize]), each)?;
