@@ -36,6 +36,12 @@ pub struct CellArea {
 }
 
 impl CellArea {
+    /// Returns the four corners.
+    fn corners(&self) -> [CoarsePoint; 4] {
+        let Self { low, high } = *self;
+        [low, CoarsePoint { x: high.x, ..low }, high, CoarsePoint { x: low.x, ..high }]
+    }
+
     /// Whether the segment between two vertices at these coarse points may have a point in the cell
     /// or just beside it.
     fn may_touch(&self, a: CoarsePoint, b: CoarsePoint) -> bool {
@@ -66,6 +72,11 @@ impl<I: Index> OpenSides<I> {
     /// Whether each side was met in both directions.
     pub fn is_empty(&self) -> bool {
         self.count == 0
+    }
+
+    /// Returns the sides that were met in one direction only.
+    fn sides(&self) -> &[Directed<I>] {
+        self.sides.get(..self.count).unwrap_or_default()
     }
 
     /// Removes the side that runs in the opposite direction, or adds this one. Returns `None` if
@@ -106,7 +117,8 @@ impl<I: Index> SceneIndex<'_, I> {
                 }
             }
         }
-        if count == 0 || !open.is_empty() {
+        // Most sides that are left lie so near the cell that the coarse grid cannot tell.
+        if count == 0 || open.sides().iter().any(|&side| self.passes(side, cell)) {
             return None;
         }
         let middle = self.coarse_projection.middle(cell.low, cell.high);
@@ -117,6 +129,15 @@ impl<I: Index> SceneIndex<'_, I> {
             }
         }
         (layers == 1).then_some(far)
+    }
+
+    /// Whether the line through two vertices passes through a cell or touches it. It is exact.
+    fn passes(&self, [a, b]: [I; 2], cell: &CellArea) -> bool {
+        let sides = cell.corners().map_each(|corner| {
+            let corner = self.coarse_projection.middle(corner, corner);
+            self.coarse_projection.side_of_point(a, b, &corner)
+        });
+        sides.iter().any(|&side| side == 0 || side != sides[0])
     }
 
     /// Returns the sense in which all triangles of a face turn on the page: 1 anticlockwise, -1
@@ -158,8 +179,10 @@ mod tests {
     use crate::index::Index;
     use crate::model::{Corner, Elements};
     use crate::stage::{NeverCancel, Scratch, SinkFull};
+    use crate::visibility::coarse_projection::CoarsePoint;
     use crate::visibility::grid::Grid;
     use crate::visibility::search::{Marks, StretchFinder};
+    use crate::visibility::sheet::CellArea;
     use crate::visibility::{
         Cores, Crease, Options, Scene, Stretch, StretchSink, Unrounded, YieldCounter, index,
     };
@@ -340,6 +363,40 @@ mod tests {
             assert!(sheets > 100, "{sheets}");
             assert!(found == expected, "{} and {}", found.len(), expected.len());
         }
+    }
+
+    #[test]
+    fn a_sheet_is_found_however_near_its_sides_are() {
+        // A bar makes the page wide, so that a face is 14 units of the coarse grid wide.
+        let mut vertices = std::vec![Vertex::new(0, 0, 9000), Vertex::new(500_000, 500_000, 9000)];
+        let mut corners = std::vec![Corner::<u32>::new(0, true, false), Corner::new(1, true, true)];
+        let count = 24;
+        for at in 0..count * count {
+            let [x, y] = [at % count, at / count].map(|at| 100_000 + 448 * at as i32);
+            vertices.push(Vertex::new(x + y / 3, y - x / 5, x / 100));
+        }
+        for at in (0..count * (count - 1)).filter(|at| at % count != count - 1) {
+            let [a, b, c, d] = [at, at + 1, at + 1 + count, at + count].map(|at| 2 + at);
+            for face in [[a, b, c], [a, c, d]] {
+                corners.extend((0..3).map(|n| Corner::new(face[n], false, n == 2)));
+            }
+        }
+        let scene = scene(&vertices, &corners, Projection::Parallel);
+        let mut words = std::vec![0u64; 1 << 14];
+        let (mut scratch, mut never_cancel) = (Scratch::new(&mut words), NeverCancel);
+        let yield_counter = &mut YieldCounter::new(&mut never_cancel);
+        let options = Options::default();
+        let around = &index(&scene, options, Cores::One, &mut scratch, yield_counter).unwrap();
+        let ranks: Vec<_> = (0..around.faces.len() as u32).collect();
+        let middle = around.coarse_projection.positions[(2 + count * count / 2 + 12) as usize];
+        let mut sheets = 0;
+        for at in 0..100u16 {
+            let low = |from: u16, at: u16| from - 100 + 20 * at;
+            let low = CoarsePoint { x: low(middle.x, at % 10), y: low(middle.y, at / 10) };
+            let high = CoarsePoint { x: low.x + 20, y: low.y + 20 };
+            sheets += u32::from(around.sheet(&CellArea { low, high }, &ranks).is_some());
+        }
+        assert!(sheets > 95, "{sheets}");
     }
 
     #[test]
