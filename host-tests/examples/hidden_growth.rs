@@ -1,7 +1,7 @@
 //! Times of the search for hidden lines as meshes grow, with the numbers of a computer:
-//! `hidden_growth [KIND FACES [seams] [all-cores]]`, KIND being `icosphere` or `terrain`. Without
-//! arguments, both kinds from 5,000 to 1.3 million faces, without and with seams, each on one core
-//! and on all.
+//! `hidden_growth [KIND FACES [seams] [all-cores]]`, KIND being `icosphere` or `terrain`, or
+//! `hidden_growth FILE.obj [seams] [all-cores]`. Without arguments, both kinds from 5,000 to 1.3
+//! million faces, without and with seams, each on one core and on all.
 //!
 //! `valgrind --tool=callgrind --toggle-collect='*find_stretches*'` counts the instructions of one.
 
@@ -13,7 +13,7 @@ use penup::visibility::{
     Options, Scene, Stretch, StretchSink, Unrounded, find_stretches, scratch_bytes, threads,
 };
 use penup_host_tests::meshes::{Mesh, icosphere, terrain};
-use penup_host_tests::scene_files::{Model, View};
+use penup_host_tests::scene_files::{Model, ObjElement, ObjText, View};
 use std::time::Instant;
 
 /// Counts the stretches.
@@ -26,18 +26,41 @@ impl StretchSink<u32> for Count {
     }
 }
 
-fn run(kind: &str, faces: usize, with_seams: bool, on_all_cores: bool) {
-    let make = match kind {
-        "icosphere" => icosphere,
-        "terrain" => terrain,
+fn make(kind: &str, faces: usize) -> Mesh {
+    match kind {
+        "icosphere" => icosphere(faces),
+        "terrain" => terrain(faces),
         _ => panic!("icosphere or terrain, not {kind}"),
+    }
+}
+
+/// Reads an OBJ file, and moves and scales it so that it fits the view of the other meshes.
+fn read(file: &str) -> Mesh {
+    let text = ObjText::read(&std::fs::read_to_string(file).expect("an OBJ file"));
+    let parts = |axis: usize| text.vertices.iter().map(move |vertex| vertex[axis]);
+    let low = [0, 1, 2].map(|axis| parts(axis).fold(f64::INFINITY, f64::min));
+    let high = [0, 1, 2].map(|axis| parts(axis).fold(f64::NEG_INFINITY, f64::max));
+    let largest = [0, 1, 2].map(|axis| high[axis] - low[axis]).into_iter().fold(0.0, f64::max);
+    let fit = |vertex: &[f64; 3]| {
+        [0, 1, 2].map(|axis| (2.0 * vertex[axis] - low[axis] - high[axis]) / largest)
     };
-    let Mesh { vertices, faces: triangles } = make(faces);
+    let numbers = |element: &ObjElement| element.vertices.iter().map(|&n| n as u32).collect();
+    Mesh {
+        vertices: text.vertices.iter().map(fit).collect(),
+        faces: text.elements.iter().filter(|element| element.is_face).map(numbers).collect(),
+    }
+}
+
+fn run(kind: &str, mesh: Mesh, with_seams: bool, on_all_cores: bool) {
+    let Mesh { vertices, faces: triangles } = mesh;
     let model = Model { vertices, corners: Vec::new() };
     let (eye, at, up) = ([2.3, -3.1, 1.9], [0.0; 3], [0.0, 0.0, 1.0]);
     let view = View::new(&model, eye, at, up, Projection::Perspective);
-    let corner = |(number, &vertex): (usize, &u32)| Corner::<u32>::new(vertex, false, number == 2);
-    let corners: Vec<_> = triangles.iter().flat_map(|t| t.iter().enumerate().map(corner)).collect();
+    let corners_of = |face: &Vec<u32>| -> Vec<_> {
+        let corner = |(n, &vertex)| Corner::<u32>::new(vertex, false, n + 1 == face.len());
+        face.iter().enumerate().map(corner).collect()
+    };
+    let corners: Vec<_> = triangles.iter().flat_map(corners_of).collect();
     let scene = Scene {
         vertices: &view.vertices,
         elements: Elements::new(&corners),
@@ -59,17 +82,23 @@ fn run(kind: &str, faces: usize, with_seams: bool, on_all_cores: bool) {
 
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
-    if let [kind, faces, rest @ ..] = &arguments[..] {
+    if let [kind, rest @ ..] = &arguments[..] {
         let has = |option: &str| rest.iter().any(|given| given == option);
-        let faces = faces.parse().expect("a number of faces");
-        run(kind, faces, has("seams"), has("all-cores"));
+        let mesh = if kind.ends_with(".obj") {
+            read(kind)
+        } else {
+            let faces = rest.first().and_then(|faces| faces.parse().ok());
+            make(kind, faces.expect("a number of faces"))
+        };
+        run(kind, mesh, has("seams"), has("all-cores"));
         return;
     }
     for kind in ["icosphere", "terrain"] {
         for faces in [5_000, 20_000, 80_000, 320_000, 1_300_000] {
             for with_seams in [false, true] {
-                run(kind, faces, with_seams, false);
-                run(kind, faces, with_seams, true);
+                let mesh = make(kind, faces);
+                run(kind, mesh.clone(), with_seams, false);
+                run(kind, mesh, with_seams, true);
             }
         }
     }
