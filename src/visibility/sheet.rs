@@ -69,13 +69,8 @@ impl<I: Index> OpenSides<I> {
         Self { sides: [[I::ZERO; 2]; MOST_OPEN_SIDES], count: 0 }
     }
 
-    /// Whether each side was met in both directions.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
-    }
-
     /// Returns the sides that were met in one direction only.
-    fn sides(&self) -> &[Directed<I>] {
+    pub fn sides(&self) -> &[Directed<I>] {
         self.sides.get(..self.count).unwrap_or_default()
     }
 

@@ -59,7 +59,7 @@ impl<'a> Solids<'a> {
                     far = far.max(around.coarse_projection.vertex(a).z);
                     open.meet([a, b]).is_none()
                 });
-            if is_open || open.is_empty() {
+            if is_open || open.sides().is_empty() {
                 for depth in depths.get_mut(begin..end).into_iter().flatten() {
                     *depth = if !is_open && *depth == -1 { far } else { NEVER };
                 }
