@@ -112,8 +112,7 @@ impl<I: Index> SceneIndex<'_, I> {
                 }
             }
         }
-        // Most sides that are left lie so near the cell that the coarse grid cannot tell.
-        if count == 0 || open.sides().iter().any(|&side| self.passes(side, cell)) {
+        if count == 0 || open.sides().iter().any(|&side| self.may_pass(side, cell)) {
             return None;
         }
         let middle = self.coarse_projection.middle(cell.low, cell.high);
@@ -126,8 +125,17 @@ impl<I: Index> SceneIndex<'_, I> {
         (layers == 1).then_some(far)
     }
 
-    /// Whether the line through two vertices passes through a cell or touches it. It is exact.
-    fn passes(&self, [a, b]: [I; 2], cell: &CellArea) -> bool {
+    /// Whether the line through two vertices that [may touch](CellArea::may_touch) a cell may have
+    /// a point in it.
+    ///
+    /// On a computer, a cell of a fine mesh has some twenty units of the coarse grid, by which that
+    /// cannot be told of many lines beside it. So the exact answer is given. On a board a cell has
+    /// hundreds of units.
+    #[inline]
+    fn may_pass(&self, [a, b]: [I; 2], cell: &CellArea) -> bool {
+        if !Self::HAS_SHORTCUTS {
+            return true;
+        }
         let sides = cell.corners().map_each(|corner| {
             let corner = self.coarse_projection.middle(corner, corner);
             self.coarse_projection.side_of_point(a, b, &corner)
@@ -174,9 +182,11 @@ mod tests {
     use crate::index::Index;
     use crate::model::{Corner, Elements};
     use crate::stage::{NeverCancel, Scratch, SinkFull};
+    #[cfg(feature = "threads")]
     use crate::visibility::coarse_projection::CoarsePoint;
     use crate::visibility::grid::Grid;
     use crate::visibility::search::{Marks, StretchFinder};
+    #[cfg(feature = "threads")]
     use crate::visibility::sheet::CellArea;
     use crate::visibility::{
         Cores, Crease, Options, Scene, Stretch, StretchSink, Unrounded, YieldCounter, index,
@@ -360,6 +370,7 @@ mod tests {
         }
     }
 
+    #[cfg(feature = "threads")]
     #[test]
     fn a_sheet_is_found_however_near_its_sides_are() {
         // A bar makes the page wide, so that a face is 14 units of the coarse grid wide.
