@@ -26,6 +26,7 @@ use crate::words::explained;
 use irregular::MOST_PENS;
 use penup::protocol::{Command, CommandError, LINE_LIMIT};
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::HashSet;
 
 /// The format itself.
@@ -92,6 +93,9 @@ pub(super) struct ObjLines {
     bytes: Vec<u8>,
     /// The position of every line whose number is a multiple of [`CURSOR_EVERY`].
     cursors: Vec<Cursor>,
+    /// The number and the position of the line behind the one that was generated last. Most lines
+    /// are asked for in order.
+    next: Cell<Option<(usize, Cursor)>>,
     count: usize,
     /// The bounds of the plan, if the file is a plan.
     flat: Flat,
@@ -178,7 +182,8 @@ impl ObjLines {
             return Err(ReadError::Utf16 { file: name });
         }
         let flat = Flat::default();
-        let mut file = Self { name, bytes, cursors: Vec::new(), count: 0, flat };
+        let mut file =
+            Self { name, bytes, cursors: Vec::new(), next: Cell::new(None), count: 0, flat };
         let mut cursor = Cursor::default();
         if file.bytes.starts_with(b"\xEF\xBB\xBF") {
             cursor.at = 3;
@@ -259,13 +264,16 @@ impl Lines for ObjLines {
     }
 
     fn line(&self, index: usize) -> Option<JobLine> {
-        let mut cursor = *self.cursors.get(index / CURSOR_EVERY)?;
+        let stored = (index - index % CURSOR_EVERY, *self.cursors.get(index / CURSOR_EVERY)?);
+        let is_nearer = |next: &(usize, Cursor)| (stored.0..=index).contains(&next.0);
+        let (number, mut cursor) = self.next.get().filter(is_nearer).unwrap_or(stored);
         let mut content = String::new();
         let mut from = cursor;
-        for _ in 0..=index % CURSOR_EVERY {
+        for _ in number..=index {
             // This cannot fail: every line was already read once without an error.
             from = cursor.read(&self.bytes, &mut content).ok()??;
         }
+        self.next.set(Some((index + 1, cursor)));
         Some(JobLine { sent: content, origin: Some(self.origin(from)) })
     }
 
@@ -357,7 +365,12 @@ impl Cursor {
                 content.push(' ');
                 vertices += 1;
             }
-            content.extend(decoded(head).chars().map(sendable));
+            let head = decoded(head);
+            if head.bytes().any(|byte| acts_at_once(char::from(byte))) {
+                content.extend(head.chars().map(sendable));
+            } else {
+                content.push_str(&head);
+            }
             if content.len() > LINE_LIMIT {
                 content.truncate(before);
                 if before > 0 && Command::parse(content) == Ok(Command::Nothing) {

@@ -9,6 +9,12 @@ fn sent(bytes: &[u8]) -> Vec<(usize, String)> {
     let lines: Vec<JobLine> = (0..file.count()).filter_map(|index| file.line(index)).collect();
     assert_eq!((lines.len(), file.line(file.count())), (file.count(), None));
     assert!(file.in_order().eq(lines.iter().cloned()));
+    // In any other order they are the same.
+    for step in [1, 7, 17, 100] {
+        for index in (0..lines.len()).rev().flat_map(|index| [index, index + step]) {
+            assert_eq!(file.line(index).as_ref(), lines.get(index), "{index}");
+        }
+    }
     let number = |line: &JobLine| line.origin.as_ref().expect("from the file").line;
     lines.into_iter().map(|line| (number(&line), line.sent)).collect()
 }
@@ -27,6 +33,13 @@ fn blank_lines_and_comments_stay_at_home_and_numbers_count_them() {
     assert_eq!(sent(b""), []);
     assert_eq!(sent(b"v 1 2 3"), [(1, "v 1 2 3".into())]);
     assert_eq!(sent(b"\rv 1 2 3\rf 1 2 3#\r"), [(2, "v 1 2 3".into()), (3, "f 1 2 3".into())]);
+}
+
+#[test]
+fn many_lines_are_the_same_in_any_order() {
+    let text: String = (0..60).map(|n| format!("v {n} 0 0\n# {n}\n")).collect();
+    let expected: Vec<_> = (0..60).map(|n| (2 * n + 1, format!("v {n} 0 0"))).collect();
+    assert_eq!(sent(text.as_bytes()), expected);
 }
 
 #[test]
