@@ -325,7 +325,8 @@ mod tests {
         options: Options,
         is_part: bool,
     ) -> (Vec<Stretch<u32>>, usize) {
-        let mut words = std::vec![0u64; 1 << 14];
+        let is_large = scene.vertices.len() > 1000;
+        let mut words = std::vec![0u64; if is_large { 1 << 18 } else { 1 << 14 }];
         let mut scratch = Scratch::new(&mut words);
         let mut never_cancel = NeverCancel;
         let yield_counter = &mut YieldCounter::new(&mut never_cancel);
@@ -403,6 +404,42 @@ mod tests {
             sheets += u32::from(around.sheet(&CellArea { low, high }, &ranks).is_some());
         }
         assert!(sheets > 95, "{sheets}");
+    }
+
+    /// With the numbers of a computer, what enters a cell is decided exactly, with those of a board
+    /// by the coarse grid alone.
+    #[cfg(feature = "threads")]
+    #[test]
+    fn sheets_that_are_found_exactly_change_no_stretch() {
+        let count = 70;
+        for seed in 0..if cfg!(miri) { 0 } else { 6 } {
+            // A cloth with folds where its points are moved by more than their distance.
+            let mut random = Random(seed);
+            let mut vertices = Vec::new();
+            for at in 0..count * count {
+                let [x, y] = [at % count, at / count].map(|at| 6000.0 * f64::from(at));
+                let is_folded = random.is_one_of(60);
+                let reach = if is_folded { 20_000.0 } else { 3000.0 };
+                let [x, y] = [x, y].map(|at| (at + reach * (random.part() - 0.5)) as i32);
+                let slope = x / 8 + (9000.0 * random.part()) as i32;
+                vertices.push(Vertex::new(x - 200_000, y - 200_000, 300_000 + slope));
+            }
+            let mut faces = Vec::new();
+            for at in (0..count * (count - 1)).filter(|at| at % count != count - 1) {
+                let [a, b, c, d] = [at, at + 1, at + 1 + count, at + count];
+                faces.extend([std::vec![a, b, c], std::vec![a, c, d]]);
+            }
+            let cloth = Balls { vertices, elements: faces };
+            let projection = [Projection::Perspective, Projection::Parallel][seed as usize % 2];
+            let options = Options { with_seams: true, ..Options::default() };
+            let (corners, wide_corners) = (cloth.corners::<u16>(), cloth.corners::<u32>());
+            let narrow_scene = scene(&cloth.vertices, &corners, projection);
+            let wide_scene = scene(&cloth.vertices, &wide_corners, projection);
+            let (expected, fewer) = find(&narrow_scene, options, true);
+            let (found, sheets) = find(&wide_scene, options, true);
+            assert!(sheets > fewer && fewer > 500, "{seed}: {sheets} and {fewer}");
+            assert!(found == expected, "{seed}: {} and {}", found.len(), expected.len());
+        }
     }
 
     #[test]
