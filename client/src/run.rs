@@ -30,7 +30,7 @@ use penup_job::room::Room;
 use penup_job::streamed::StreamedJob;
 use penup_job::{Job, Settings};
 use penup_readers::page::Page;
-use penup_readers::words::MOSTLY_FLAT;
+use penup_readers::words::{MOSTLY_FLAT, PROBABLY_Y_UP};
 use penup_readers::{Arrangement, ReadError, SourceFile};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -373,8 +373,16 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Sourc
         .settings_for(&source)
         .map_err(|reason| ReadError::Content { file: file.display().to_string(), reason })?;
     if !quiet {
-        let has_crease = changed(&settings).1.iter().any(|name| name == "crease");
-        let notes = source.notes().iter().filter(|note| !has_crease || *note != MOSTLY_FLAT);
+        let names = changed(&settings).1;
+        let is_known = |note: &String| {
+            let options: &[&str] = match note.as_str() {
+                MOSTLY_FLAT => &["crease"],
+                PROBABLY_Y_UP => &["up", "angles"],
+                _ => &[],
+            };
+            options.iter().any(|option| names.iter().any(|name| name == option))
+        };
+        let notes = source.notes().iter().filter(|note| !is_known(note));
         note(file, &notes.cloned().collect::<Vec<_>>());
         if let Some(bounds) = source.bounds() {
             note(file, settings.moves_plan(bounds).as_slice());

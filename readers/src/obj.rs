@@ -22,7 +22,7 @@ use super::format::{Contents, Format};
 use super::mesh::Mesh;
 use crate::lines::acts_at_once;
 use crate::lines::{JobLine, Lines, Origin};
-use crate::words::explained;
+use crate::words::{PROBABLY_Y_UP, explained};
 use irregular::MOST_PENS;
 use penup::protocol::{Command, CommandError, LINE_LIMIT};
 use std::borrow::Cow;
@@ -58,15 +58,33 @@ impl Format for Obj {
     }
 
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
-        match ObjLines::checked(file, bytes, true)? {
+        let has_y_up = has_y_up(&bytes);
+        let mut contents = match ObjLines::checked(file, bytes, true)? {
             Checked::Regular(lines) => {
                 let bounds = lines.flat.bounds();
                 let notes = crease_note(&lines).into_iter().collect();
-                Ok(Contents { bounds, notes, ..Contents::of(lines) })
+                Contents { bounds, notes, ..Contents::of(lines) }
             }
-            Checked::Irregular(file, bytes) => irregular::read(file, &bytes),
+            Checked::Irregular(file, bytes) => irregular::read(file, &bytes)?,
+        };
+        if has_y_up && contents.bounds.is_none() {
+            contents.notes.push(PROBABLY_Y_UP.to_owned());
         }
+        Ok(contents)
     }
+}
+
+/// What the first lines of files hold that come from programs which usually write y up: Blender,
+/// and Maya, which does not give its name.
+const Y_UP_HEADS: [&[u8]; 2] =
+    [b"# Blender ", b"# This file uses centimeters as units for non-parametric coordinates."];
+
+/// Whether a file comes from a program that usually writes y up.
+fn has_y_up(bytes: &[u8]) -> bool {
+    bytes
+        .split(|byte| is_line_end(*byte))
+        .take(4)
+        .any(|line| Y_UP_HEADS.iter().any(|head| line.starts_with(head)))
 }
 
 /// The most lines of a file that is searched for nearly flat edges. More of them would take time

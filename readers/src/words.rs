@@ -41,6 +41,11 @@ const WORDS: &[(&str, &str)] = &[
 pub const MOSTLY_FLAT: &str =
     "most edges are nearly flat: --crease 30 leaves them out, and outlines stay";
 
+/// The note on a model by a program that usually writes y up. It says nothing new to a user who has
+/// said what is up.
+pub const PROBABLY_Y_UP: &str =
+    "the program that wrote it usually has y up: if the model lies on its side, add --y-up";
+
 /// What the library says of `error:number`. `None` if it has no such error.
 ///
 /// ```
