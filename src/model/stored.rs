@@ -161,6 +161,7 @@ pub struct StoredModel<'f> {
 
 impl<'f> StoredModel<'f> {
     /// The model that lies in an area, if there is one and all of it has been written.
+    #[inline(never)] // Keeps its frame off the stack while the model is drawn.
     pub fn new(area: Area<'f>) -> Option<Self> {
         let record = area.record()?;
         let summary = ModelSummary::of_words(&record.words)?;

@@ -25,9 +25,9 @@ const ENOUGH_LINES: usize = 64;
 /// The number of positions that are looked at between two checks for cancelling.
 const POSITIONS_BETWEEN_CHECKS: usize = 256;
 
-/// Prepares the search: the camera, the index of the tiles, which then lies at the front of
-/// `words`, and the place on the page. Returns the least and the greatest coordinates of the whole
-/// drawing, too, in steps.
+/// Prepares `search`: the camera, the index of the tiles, which then lies at the front of `words`,
+/// and the place on the page. Returns the least and the greatest coordinates of the whole drawing,
+/// in steps.
 ///
 /// # Errors
 /// The [`CommandError`] to reply with.
@@ -37,8 +37,9 @@ pub(super) fn prepare(
     options: &PlotOptions,
     steps: StepsPerMillimetre,
     words: &mut [u64],
+    search: &mut Option<DrawingSearch>,
     cancel: &mut dyn Cancel,
-) -> Result<(DrawingSearch, [PagePoint; 2]), CommandError> {
+) -> Result<[PagePoint; 2], CommandError> {
     cancel.enter(Stage::View);
     let camera = options.camera(model).ok_or(CommandError::NothingToPlot)?;
     cancel.check()?;
@@ -85,9 +86,9 @@ pub(super) fn prepare(
     let pens = of_model | of_hidden | u32::from(has_title);
     let pen = pens.trailing_zeros() as u8;
     let pens = pens & pens.wrapping_sub(1);
-    let search =
-        DrawingSearch { view, map, options: *options, tiles, pens, pen, around, has_title };
-    Ok((search, [least, greatest]))
+    *search =
+        Some(DrawingSearch { view, map, options: *options, tiles, pens, pen, around, has_title });
+    Ok([least, greatest])
 }
 
 /// Calls `each` with the lines of the title, if there is one, as it stands below a drawing with

@@ -2,7 +2,7 @@
 //! others, while the machine draws.
 
 use super::compute::{Computed, next_part, prepare};
-use super::parts::{ComputedPart, DrawingSearch};
+use super::parts::ComputedPart;
 use crate::drawing::PagePoint;
 use crate::fixed::Millimetres;
 use crate::index::Index;
@@ -13,7 +13,7 @@ use crate::plotter::listener::Listener;
 use crate::plotter::reply::Reply;
 use crate::plotter::streamed::Streamed;
 use crate::plotter::{
-    BegunJob, Board, Cursor, Inner, Job, REPLY_BYTES, VisibilityMode, report, title,
+    BegunJob, Board, Cursor, Inner, Job, PlotOptions, REPLY_BYTES, VisibilityMode, report, title,
 };
 use crate::protocol::{CommandError, RealTime, StoredModelError, StreamedTarget};
 use crate::stage::{Aborted, Cancel};
@@ -44,7 +44,8 @@ impl<I: Index> Inner<'_, I> {
         }
         let steps = self.machine.settings().page_steps();
         title::check(&self.options, steps)?;
-        let model = self.whole_model(listener.board)?;
+        let model = self.whole_model(listener.board);
+        let model = model.as_ref().map_err(|&error| error)?;
         if model.is_plan() && self.options.shows_plans_flat() {
             return Err(StoredModelError::FacesOnly.into());
         }
@@ -55,24 +56,29 @@ impl<I: Index> Inner<'_, I> {
         self.job = Job::default();
         self.cursor = Cursor::default();
         self.parts.end();
-        let (mut search, [least, greatest]) =
-            prepare(&model, &self.options, steps, self.words, listener)?;
+        let order = self.order_of_parts(&self.options);
+        let search = &mut self.parts.search;
+        let [least, greatest] = prepare(model, &self.options, steps, self.words, search, listener)?;
         let bounds = beyond([least, greatest], self.machine.stroke_ends(), steps);
         for point in bounds {
             self.machine.check_travel(0, point)?;
         }
+        // No copy of it, which would take a twentieth of the stack.
+        let Some(search) = &mut self.parts.search else {
+            return Err(CommandError::NothingToPlot);
+        };
         self.job = Job::left_out(search.tiles.degenerate_faces());
         if self.machine.state() == State::Check {
             return Ok(());
         }
-        let (at, order) = (self.machine.end(), self.order_of_parts(&search));
-        let part = next_part(&model, &mut search, steps, order, self.words, None, listener)?;
+        let at = self.machine.end();
+        let part = next_part(model, search, steps, order, self.words, None, listener)?;
         let part = part.ok_or(CommandError::NothingToPlot)?;
         self.machine.start_streamed(JobSize::default(), bounds)?;
         self.parts.is_active = true;
         self.parts.last.target.point = at;
         self.streamed = Streamed::open_ended();
-        self.take_part(search, Some(part));
+        self.take_part(Some(part));
         self.feed_part();
         Reply(listener.board).line(format_args!(
             "[MSG:computed and drawn part by part: $again and $resume do not draw this]"
@@ -81,15 +87,16 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// The options of the order of each part.
-    fn order_of_parts(&self, search: &DrawingSearch) -> order::Options {
+    fn order_of_parts(&self, options: &PlotOptions) -> order::Options {
         let settings = self.machine.settings();
-        search.options.order(settings.page_steps(), settings.time_model(self.units_per_second()))
+        options.order(settings.page_steps(), settings.time_model(self.units_per_second()))
     }
 
     /// Notes what has been computed.
-    fn take_part(&mut self, search: DrawingSearch, part: Option<Computed<I>>) {
-        self.parts.search = part.is_some().then_some(search);
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn take_part(&mut self, part: Option<Computed<I>>) {
         if part.is_none() {
+            self.parts.search = None;
             self.streamed.end_here();
         }
         if let Some((job, _)) = &part {
@@ -106,6 +113,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Hands the strokes of the computed part to the machine, as far as there is room.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn feed_part(&mut self) {
         let ends = self.machine.stroke_ends();
         let (words, machine) = (&mut *self.words, &self.machine);
@@ -133,19 +141,21 @@ impl<I: Index> Inner<'_, I> {
             self.feed_part();
             return PartsProgress::Idle;
         }
-        let Some(mut search) = self.parts.search else { return PartsProgress::Idle };
+        // One copy: each takes a twentieth of the stack.
+        let mut search = self.parts.search;
+        let Some(search) = &mut search else { return PartsProgress::Idle };
         let model = board.model_flash().and_then(|(area, _)| StoredModel::new(area));
-        let Some(model) = model else {
+        let Some(model) = &model else {
             self.give_up(StoredModelError::Damaged.into(), board);
             return PartsProgress::Busy;
         };
         let steps = self.machine.settings().page_steps();
-        let order = self.order_of_parts(&search);
+        let order = self.order_of_parts(&search.options);
         let at = Some(self.parts.last.target.point);
         // The machine goes on meanwhile, and does not use this memory.
         let words = core::mem::take(&mut self.words);
         let mut server = PartCancel { inner: self, board, is_status_due: false, ends: None };
-        let part = next_part(&model, &mut search, steps, order, words, at, &mut server);
+        let part = next_part(model, search, steps, order, words, at, &mut server);
         let ends = server.ends;
         self.words = words;
         match (ends, part) {
@@ -153,7 +163,8 @@ impl<I: Index> Inner<'_, I> {
             // The machine has reported why.
             (Some(EarlyEnd::ByMachine), _) => self.end_parts(),
             (None, Ok(part)) => {
-                self.take_part(search, part);
+                self.parts.search = Some(*search);
+                self.take_part(part);
                 self.feed_part();
             }
             (None, Err(error)) => self.give_up(error, board),
@@ -170,6 +181,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Forgets the drawing: the machine reads no more of it.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn end_parts(&mut self) {
         self.parts.end();
         self.streamed = Streamed::default();
