@@ -233,7 +233,7 @@ pub const PICO: BoardRow = BoardRow {
     flash: Region { start: 0x1000_0000, size: 2 << 20 },
     boot_loader: 256,
     ram: Region { start: 0x2000_0000, size: 264 << 10 },
-    budget: ImageBudget { flash: 640 << 10, ram: 252 << 10, stack: 12 << 10 },
+    budget: ImageBudget { flash: 640 << 10, ram: 252 << 10, stack: 16 << 10 },
     clock_hertz: 125_000_000,
     pins: Pins {
         step_x: 2,

@@ -66,11 +66,14 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("the first part was there after {} s of this computer", began.elapsed().as_secs());
     let (mut cycles, mut calls) = ([0; STAGES_IN_TILES.len()], [0; STAGES_IN_TILES.len()]);
     let (mut machine, mut events) = (Machine::default(), Vec::new());
-    let mut late = String::new();
+    let (mut late, mut deepest) = (String::new(), 0);
     loop {
         let status = line.status()?;
         if status.starts_with("[MSG:") {
             println!("{status}");
+            if status.starts_with("[MSG:started again") {
+                return Err("the board was started again while it drew".into());
+            }
             continue;
         }
         if let Some((_, rest)) = status.split_once("|Late:") {
@@ -91,6 +94,11 @@ fn main() -> Result<(), Box<dyn Error>> {
         }
         if status.starts_with("<Idle") {
             break;
+        }
+        let now = line.emulator.0.stack()?.deepest;
+        if now > deepest {
+            deepest = now;
+            println!("after {} parts the stack has been used to {deepest} bytes", calls[1]);
         }
         sleep(Duration::from_secs(1));
     }

@@ -1,6 +1,7 @@
 //! Runs the jobs that use the most stack of a board, and measures how much they leave.
 
 use crate::emulated_jobs::Line;
+use crate::meshes::soup;
 use crate::whole_jobs::job_lines;
 use penup_client::emulator::{
     EmulatedBoard, Emulator, EmulatorError, Options, Pico, Stack, image_path,
@@ -11,6 +12,20 @@ use std::time::Duration;
 
 /// The name of a job, and its lines.
 type Job = (&'static str, Vec<String>);
+
+/// The number of status reports that a job drawn part by part is asked for while a part is computed
+/// and the machine moves.
+const REPORTS_IN_PARTS: usize = 40;
+
+/// A solid that is larger than the Pico's memory, with many seams. It lies in flash, and each part
+/// is computed while the one before is drawn.
+fn in_flash() -> Job {
+    let settings = ["$see=faces", "$page=60x60", "$margin=2", "$110=600", "$111=600"];
+    let mut lines = settings.map(str::to_owned).to_vec();
+    lines.extend(soup(1400).obj());
+    lines.push("$plot".to_owned());
+    ("a solid in flash", lines)
+}
 
 /// The jobs. `lattice` is the largest lattice scene for the board. The effort is small, because
 /// more of it takes longer but no more stack.
@@ -60,7 +75,7 @@ pub fn on_the_lm3s6965(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Er
         let painted = emulator.stack()?;
         painted.ok_or(EmulatorError::Ended { said: "the stack was not painted".into() })
     };
-    run_all(line, "lattice5.obj", |_| Ok(()), stack, report)
+    run_all(line, jobs("lattice5.obj"), |_| Ok(()), stack, report)
 }
 
 /// Runs all jobs on the Pico, whose USB host queries the status all the time.
@@ -75,17 +90,19 @@ pub fn on_the_pico(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>
         while pico.receive_by_usb(&mut [0; 256], Duration::ZERO)? > 0 {}
         Ok(())
     };
-    run_all(line, "lattice2.obj", ask_by_usb, Pico::stack, report)
+    let jobs = jobs("lattice2.obj").into_iter().chain([in_flash()]);
+    run_all(line, jobs, ask_by_usb, Pico::stack, report)
 }
 
 fn run_all<E: EmulatedBoard>(
     mut line: Line<E>,
-    lattice: &str,
+    jobs: impl IntoIterator<Item = Job>,
     mut meanwhile: impl FnMut(&mut E) -> std::io::Result<()>,
     mut stack: impl FnMut(&mut E) -> Result<Stack, EmulatorError>,
     mut report: impl FnMut(&str, Stack),
 ) -> Result<(), Box<dyn Error>> {
-    for (name, lines) in jobs(lattice) {
+    for (name, lines) in jobs {
+        let mut is_in_parts = false;
         for text in [String::from("$clear")].into_iter().chain(lines) {
             line.emulator.send(format!("{text}\n").as_bytes())?;
             let asks = text == "$plot";
@@ -96,9 +113,22 @@ fn run_all<E: EmulatedBoard>(
                     sleep(Duration::from_millis(20));
                 }
                 let heard = line.hear()?;
+                is_in_parts |= heard.contains("drawn part by part");
                 if heard == "ok" || heard.starts_with("error:") {
                     break;
                 }
+            }
+        }
+        // A hundred times as many end the wait for parts that do not come.
+        let (mut reports, mut asked) = (0, 0);
+        while is_in_parts && reports < REPORTS_IN_PARTS {
+            asked += 1;
+            meanwhile(&mut line.emulator)?;
+            let status = line.status()?;
+            reports += usize::from(status.contains("|Stage:visibility"));
+            let has_ended = status.starts_with("<Idle") || status.contains("started again");
+            if has_ended || asked > 100 * REPORTS_IN_PARTS {
+                return Err(format!("{name}: {status} after {reports} reports").into());
             }
         }
         // Draws a part of it with one feed hold, and aborts the rest.

@@ -10,6 +10,7 @@ use std::error::Error;
 const MARGIN: usize = 1024;
 
 fn leaves_a_margin(job: &str, Stack { size, deepest }: Stack) {
+    println!("{job}: {deepest} of {size} bytes");
     assert!(deepest > 1000, "{job}: {deepest} bytes, which is no stack of a job");
     assert!(deepest + MARGIN <= size, "{job}: {deepest} of {size} bytes");
 }

@@ -185,8 +185,8 @@ fn find_lines(
     let sink = PageSink { collector, map, view, options, observer: &mut Unobserved };
     let mut sink = PassSink { sink, pen: *pen };
     loop {
-        let mut tiles =
-            Tiles::go_on(&source, parameters, visibility, *paused, index).ok_or_else(no_index)?;
+        let tiles = Tiles::go_on(&source, parameters, visibility, *paused, index);
+        let Some(mut tiles) = tiles else { return Err(no_index()) };
         let before = sink.sink.collector.count;
         let outcome = tiles.follow_next(Scratch::new(&mut *scratch), cancel, &mut sink);
         *paused = tiles.pause();
