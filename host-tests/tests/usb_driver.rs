@@ -127,7 +127,7 @@ fn a_request_that_comes_while_another_one_is_read_is_read_whole() {
             |controller| controller.set_up(SET_CONFIGURATION),
         );
         let mut requests = Vec::new();
-        for _ in 0..4 {
+        for _ in 0..6 {
             if look(&bus).1 {
                 requests.extend(bus.read_setup());
             }

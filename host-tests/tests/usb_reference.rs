@@ -27,19 +27,18 @@ const USUAL_TYPES: [u8; 8] = [0x00, 0x01, 0x02, 0x21, 0x80, 0x81, 0x82, 0xA1];
 /// Values of `bRequest` beside 0 to 0x24.
 const FURTHER_REQUESTS: [u8; 6] = [0x30, 0x40, 0x7F, 0x80, 0xFE, 0xFF];
 /// Values of `wValue` that mean something, and their neighbours.
-const VALUES: [u16; 17] = [
-    0, 1, 2, 3, 9, 127, 128, 256, 0x0100, 0x0200, 0x0300, 0x0301, 0x0303, 0x0304, 0x0600, 0x0F00,
-    0xFFFF,
+const VALUES: [u16; 16] = [
+    0, 1, 2, 3, 9, 127, 128, 0x0100, 0x0200, 0x0300, 0x0301, 0x0303, 0x0304, 0x0600, 0x0F00, 0xFFFF,
 ];
 /// Values of `wIndex` that mean something, and their neighbours.
 const INDICES: [u16; 11] = [0, 1, 2, 0x80, 0x81, 0x82, 0x83, 255, 256, 0x0409, 0xFF01];
 /// Values of `wLength`.
 const LENGTHS: [u16; 12] = [0, 1, 2, 6, 7, 18, 64, 67, 127, 128, 129, 0xFFFF];
 
-/// The least packets that a host takes or sends in a transfer that does not end.
+/// The most packets that the host takes or sends in the data stage of a transfer.
 const MOST_PACKETS: usize = 4;
 
-/// The two devices, and a host that knows nothing of what is right.
+/// The two devices, with a host that does anything, right or wrong.
 struct Bench<'b> {
     twins: Twins<'b>,
     /// Whether the host's next packet to the port is DATA1.

@@ -52,9 +52,7 @@ enum Stage {
     DataIn,
     /// The same; an empty packet follows, because the last data fill theirs.
     DataInEmpty,
-    /// The same; no packet follows.
-    DataInLast,
-    /// The status stage: the host sends an empty packet.
+    /// The status stage: the host sends an empty packet, when it has taken the last data.
     StatusOut,
     /// The data stage, in which the host sends packets of this request.
     DataOut(Request),
@@ -96,7 +94,6 @@ impl ControlPipe {
     /// driver refuses its data.
     pub fn set_up<C: Controller>(&mut self, bus: &Bus<C>) -> Option<Request> {
         let request = Request::parse(bus.read_setup()?);
-        bus.set_halted(TO_0, false);
         let length = usize::from(request.length);
         if request.is_from_device() {
             self.stage = Stage::Idle;
@@ -131,7 +128,7 @@ impl ControlPipe {
                 }
             }
             // The host confirms the data, all of them or those that it wanted.
-            Stage::DataIn | Stage::DataInEmpty | Stage::DataInLast | Stage::StatusOut => {
+            Stage::DataIn | Stage::DataInEmpty | Stage::StatusOut => {
                 if bus.read(TO_0, &mut []).is_ok() {
                     self.stage = Stage::Idle;
                 }
@@ -151,18 +148,14 @@ impl ControlPipe {
             Stage::DataIn => self.send(bus),
             Stage::DataInEmpty => {
                 if bus.write(FROM_0, &[]).is_ok() {
-                    self.stage = Stage::DataInLast;
+                    self.stage = Stage::StatusOut;
                 }
-            }
-            Stage::DataInLast => {
-                bus.set_halted(TO_0, false);
-                self.stage = Stage::StatusOut;
             }
             Stage::StatusIn => {
                 self.stage = Stage::Idle;
                 return true;
             }
-            // The packet belongs to a transfer that was broken off.
+            // It was the last packet, or belongs to a transfer that was broken off.
             Stage::Idle | Stage::StatusOut | Stage::DataOut(_) => {}
         }
         false
@@ -198,7 +191,7 @@ impl ControlPipe {
         self.moved += packet.len();
         if self.moved >= self.length {
             let is_full = packet.len() == PACKET;
-            self.stage = if is_full { Stage::DataInEmpty } else { Stage::DataInLast };
+            self.stage = if is_full { Stage::DataInEmpty } else { Stage::StatusOut };
         }
     }
 

@@ -3,6 +3,7 @@
 //! The endpoints are those of a serial port, and are constants.
 
 use super::buffers::{Buffers, FROM_0, FROM_PORT, NOTICES, SETUP_REQ, TO_0, TO_PORT, control_word};
+use super::endpoints::MOST_DATA;
 use super::{Controller, Register};
 
 /// The greatest packet of every endpoint but that of notices, in bytes.
@@ -184,7 +185,7 @@ impl<C: Controller> Bus<C> {
     }
 
     /// Reads the host's request, and makes endpoint 0 ready for what follows it: packets that begin
-    /// with DATA1. Returns `None` if another request came while this one was read. It will be
+    /// with DATA1. A halt of endpoint 0 ends. Returns `None` if another request came while this one was read. It will be
     /// reported.
     pub fn read_setup(&self) -> Option<[u8; 8]> {
         self.controller().put(Register::SieStatus, bits::SETUP_REC);
@@ -200,9 +201,10 @@ impl<C: Controller> Bus<C> {
             // The host confirms what it gets, by an empty packet. There is no room for others,
             // because the answer lies in the same memory.
             self.buffers.give(TO_0, control_word::IS_DATA_1);
-        } else if length > 0 {
+        } else if (1..=MOST_DATA as u32).contains(&length) {
             self.buffers.give(TO_0, control_word::IS_DATA_1 | PACKET as u32);
         } else {
+            // There are no data, or they will be refused.
             self.buffers.keep(TO_0, control_word::IS_DATA_1);
         }
         Some((u64::from(high) << 32 | u64::from(low)).to_le_bytes())
