@@ -185,8 +185,8 @@ impl<C: Controller> Bus<C> {
     }
 
     /// Reads the host's request, and makes endpoint 0 ready for what follows it: packets that begin
-    /// with DATA1. A halt of endpoint 0 ends. Returns `None` if another request came while this one was read. It will be
-    /// reported.
+    /// with DATA1. A halt of endpoint 0 ends. Returns `None` if another request came while this one
+    /// was read. It will be reported.
     pub fn read_setup(&self) -> Option<[u8; 8]> {
         self.controller().put(Register::SieStatus, bits::SETUP_REC);
         let [low, high] = self.buffers.setup();
