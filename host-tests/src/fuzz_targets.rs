@@ -14,7 +14,7 @@ mod scene;
 mod sender;
 mod session;
 mod stored;
-mod usb;
+pub mod usb;
 
 pub use drawing::fuzz as drawing;
 pub use edits::fuzz as edits;

@@ -51,7 +51,8 @@ pub mod gear_train;
 pub mod spiral;
 pub mod step_edges;
 pub mod usb_controller;
-#[path = "../../src/boards/pico/usb/driver/mod.rs"]
-pub mod usb_driver;
+pub mod usb_firmware;
 pub mod usb_host;
 pub mod usb_port;
+pub mod usb_reference;
+pub mod usb_twins;

@@ -1,7 +1,7 @@
 //! The RP2040's USB controller as a device, in plain memory (data sheet, section 4.1).
 //!
 //! One side of it is the program's: the registers and the memory that the driver
-//! ([`usb_driver`](crate::usb_driver)) uses. The other side is the host's end of the cable. A
+//! ([`driver`](crate::usb_firmware::driver)) uses. The other side is the host's end of the cable. A
 //! packet of the device stays until the host takes it. A SETUP packet is always accepted, and lifts
 //! the stall of endpoint 0; what that endpoint held goes only when the driver sees the SETUP
 //! packet, as on the chip. A received packet whose data toggle is not the expected one is
@@ -12,7 +12,7 @@
 //!
 //! What is left out: time, and the errata E5 and E15, which the emulated Pico has.
 
-use crate::usb_driver::{Controller, Register};
+use crate::usb_firmware::driver::{Controller, Register};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// The number of words of the memory.
@@ -279,6 +279,23 @@ impl UsbController {
     /// The address to which the device answers.
     pub fn address(&self) -> u8 {
         self.state().register(Register::AddrEndp) as u8
+    }
+
+    /// What the host can see that is not the same in another controller: all registers and the
+    /// whole memory are compared.
+    pub fn difference(&self, other: &Self) -> Option<String> {
+        let (state, other) = (self.state(), other.state());
+        if state.memory != other.memory {
+            let words = state.memory.iter().zip(&other.memory).enumerate();
+            let differing: Vec<String> = words
+                .filter(|(_, (word, other))| word != other)
+                .map(|(index, (word, other))| format!("{index}: {word:08x} {other:08x}"))
+                .collect();
+            return Some(format!("the words {}", differing.join(", ")));
+        }
+        let registers = (state.registers, state.status, state.finished);
+        let others = (other.registers, other.status, other.finished);
+        (registers != others).then(|| format!("the registers {registers:x?} and {others:x?}"))
     }
 
     /// Whether the controller interrupts the processor.

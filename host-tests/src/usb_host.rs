@@ -1,5 +1,8 @@
 //! A USB host that checks what the port of the Pico promises, whatever packets it sends.
 //!
+//! It does everything to the reference device, too, and both must answer the same: see
+//! [`usb_twins`](crate::usb_twins).
+//!
 //! It keeps its own data toggles, as a real host does, and drops a packet that has the wrong one.
 //! It acts as USB 2.0 wants, or breaks transfers off, or sends what no host sends; then it checks
 //! only what the device still owes it. Three things are left out:
@@ -16,9 +19,11 @@
 
 mod enumerate;
 
-use crate::usb_controller::{Answer, Handshake};
-use crate::usb_driver::PACKET;
+use crate::usb_controller::{Answer, Handshake, UsbController};
+use crate::usb_firmware::device::Device;
+use crate::usb_firmware::driver::PACKET;
 use crate::usb_port::Port;
+use crate::usb_twins::Twins;
 
 /// The number of endpoints in each direction.
 const ENDPOINTS: usize = 16;
@@ -86,8 +91,8 @@ impl Transfer {
 
 /// The host, with the device at the other end of its cable.
 pub struct Host<'p> {
-    /// The device.
-    pub port: Port<'p>,
+    /// The device, and the reference, which must be the same.
+    pub twins: Twins<'p>,
     /// Whether the host does one thing after the other without waiting for the device.
     pub is_hasty: bool,
     is_suspended: bool,
@@ -111,9 +116,9 @@ const OUT: usize = 1;
 
 impl<'p> Host<'p> {
     /// Plugs the device in. The bus has not been reset yet.
-    pub fn new(port: Port<'p>) -> Self {
+    pub fn new(twins: Twins<'p>) -> Self {
         Self {
-            port,
+            twins,
             is_hasty: false,
             is_suspended: false,
             transfer: Transfer::NONE,
@@ -123,6 +128,11 @@ impl<'p> Host<'p> {
             taken: 0,
             next: 0,
         }
+    }
+
+    /// The port of the device.
+    pub fn port(&self) -> &Port<Device<'p, UsbController>> {
+        self.twins.port()
     }
 
     /// The next bytes of the pattern.
@@ -138,8 +148,8 @@ impl<'p> Host<'p> {
     /// Lets the device work until its interrupts end.
     pub fn settle(&mut self) {
         for _ in 0..MOST_TURNS {
-            self.port.serve();
-            if !self.port.bus().has_interrupt() {
+            self.twins.serve();
+            if !self.port().bus().has_interrupt() {
                 return;
             }
         }
@@ -157,17 +167,17 @@ impl<'p> Host<'p> {
     /// nothing else.
     pub fn reset(&mut self) {
         self.is_suspended = false;
-        let keeps_setup = self.port.bus().has_setup() && self.port.bus().address() == 0;
-        self.port.bus().reset_bus();
+        let keeps_setup = self.port().bus().has_setup() && self.port().bus().address() == 0;
+        self.twins.reset_bus();
         self.transfer = Transfer::NONE;
         self.settle();
-        let is_anew = !self.port.is_up() && !self.port.is_open();
+        let is_anew = !self.port().is_up() && !self.port().is_open();
         assert!(is_anew || keeps_setup, "a reset has left the port open");
         let lost = self.accepted.len() - self.arrived();
         assert!(lost <= PACKET, "{lost} bytes were lost by a reset");
-        self.accepted = self.port.waiting();
-        self.port.received.clear();
-        self.port.sent.clear();
+        self.accepted = self.port().waiting().iter().copied().collect();
+        self.twins.forget_received();
+        self.twins.forget_sent();
         self.taken = 0;
         self.is_data_1 = [[false; 2]; ENDPOINTS];
         self.may_lose = [[0; 2]; ENDPOINTS];
@@ -176,24 +186,25 @@ impl<'p> Host<'p> {
     /// Suspends the bus. It resumes it before the next packet, if not before.
     pub fn suspend(&mut self) {
         self.is_suspended = true;
-        self.port.bus().suspend_bus();
+        self.twins.suspend_bus();
     }
 
     /// Resumes the bus.
     pub fn resume(&mut self) {
         if self.is_suspended {
             self.is_suspended = false;
-            self.port.bus().resume_bus();
+            self.twins.resume_bus();
         }
     }
 
     /// Checks that what the port has received is what it was sent, and returns the number of those
     /// bytes.
     fn arrived(&self) -> usize {
-        let waiting = self.port.waiting();
-        let (read, count) = (&self.port.received, self.port.received.len());
-        let is_same =
-            self.accepted.starts_with(read) && self.accepted[count..].starts_with(&waiting);
+        let waiting = self.port().waiting();
+        let (read, count) = (&self.port().received, self.port().received.len());
+        let is_same = self.accepted.starts_with(read)
+            && self.accepted.len() >= count + waiting.len()
+            && self.accepted[count..].iter().zip(waiting).all(|(sent, read)| sent == read);
         assert!(is_same, "the port has received other bytes than it was sent");
         count + waiting.len()
     }
@@ -202,7 +213,7 @@ impl<'p> Host<'p> {
     pub fn set_up(&mut self, request: [u8; 8]) {
         self.resume();
         self.break_off_anew();
-        self.port.bus().set_up(request);
+        self.twins.set_up(request);
         self.transfer = Transfer { request, moved: 0, is_over: false, is_sound: true };
         self.is_data_1[0] = [true; 2];
     }
@@ -211,8 +222,8 @@ impl<'p> Host<'p> {
     /// bytes, if the host takes them for new ones.
     pub fn ask_control(&mut self) -> Result<Vec<u8>, Answer> {
         self.resume();
-        let had_setup = self.port.bus().has_setup();
-        let (bytes, is_data_1, is_current) = match self.port.bus().ask(0) {
+        let had_setup = self.port().bus().has_setup();
+        let (bytes, is_data_1, is_current) = match self.twins.ask(0) {
             Answer::Packet { bytes, is_data_1, is_current } => (bytes, is_data_1, is_current),
             Answer::Stall => {
                 let is_owed = self.transfer.is_sound && !self.transfer.is_over;
@@ -260,10 +271,9 @@ impl<'p> Host<'p> {
     /// Sends endpoint 0 a packet: data of a request, or the confirmation of an answer.
     pub fn give_control(&mut self, packet: &[u8]) -> Handshake {
         self.resume();
-        let bus = self.port.bus();
-        let had_setup = bus.has_setup();
+        let had_setup = self.port().bus().has_setup();
         let is_data_1 = self.transfer.is_in() || self.is_data_1[0][OUT];
-        let handshake = bus.give(0, is_data_1, packet);
+        let handshake = self.twins.give(0, is_data_1, packet);
         let left = self.transfer.length().saturating_sub(self.transfer.moved);
         let is_due = if self.transfer.is_in() {
             packet.is_empty()
@@ -294,7 +304,7 @@ impl<'p> Host<'p> {
     /// nothing.
     fn check_progress(&self, is_owed: bool) {
         let transfer = &self.transfer;
-        let is_late = transfer.is_sound && !transfer.is_over && !self.port.bus().has_interrupt();
+        let is_late = transfer.is_sound && !transfer.is_over && !self.port().bus().has_interrupt();
         assert!(!(is_owed && is_late), "the device does not go on with {:x?}", transfer.request);
     }
 
@@ -332,20 +342,20 @@ impl<'p> Host<'p> {
     pub fn ask(&mut self, endpoint: usize) -> Result<Vec<u8>, Answer> {
         self.resume();
         self.break_off_anew();
-        let (bytes, is_data_1) = match self.port.bus().ask(endpoint) {
+        let (bytes, is_data_1) = match self.twins.ask(endpoint) {
             Answer::Packet { bytes, is_data_1, .. } => (bytes, is_data_1),
             answer => return Err(answer),
         };
         assert_eq!(endpoint, FROM_PORT, "a packet of an endpoint that sends nothing");
-        assert_eq!(self.port.sent.get(self.taken), Some(&bytes), "another packet than was sent");
+        assert_eq!(self.port().sent.get(self.taken), Some(&bytes), "another packet than was sent");
         if is_data_1 == self.is_data_1[endpoint][IN] {
             self.is_data_1[endpoint][IN] = !is_data_1;
             self.taken += 1;
-            assert_eq!(self.taken, self.port.sent.len(), "a packet is missing");
+            assert_eq!(self.taken, self.port().sent.len(), "a packet is missing");
             return Ok(bytes);
         }
         self.lose(endpoint, IN, "a packet from the port has the wrong data toggle");
-        self.port.sent.pop();
+        self.twins.forget_last_sent();
         Ok(Vec::new())
     }
 
@@ -354,7 +364,7 @@ impl<'p> Host<'p> {
         self.resume();
         self.break_off_anew();
         let is_data_1 = self.is_data_1[TO_PORT][OUT];
-        let handshake = self.port.bus().give(TO_PORT, is_data_1, packet);
+        let handshake = self.twins.give(TO_PORT, is_data_1, packet);
         match handshake {
             Handshake::Ack => {
                 self.accepted.extend_from_slice(packet);
@@ -365,8 +375,8 @@ impl<'p> Host<'p> {
                 self.is_data_1[TO_PORT][OUT] = !is_data_1;
             }
             Handshake::Nak => {
-                let has_room = self.port.waiting().len() <= ROOM_UP_TO;
-                let is_idle = !self.port.bus().has_interrupt();
+                let has_room = self.port().waiting().len() <= ROOM_UP_TO;
+                let is_idle = !self.port().bus().has_interrupt();
                 assert!(!(has_room && is_idle), "the port has room, but takes nothing");
             }
             Handshake::Stall | Handshake::Nothing => {}
@@ -421,7 +431,7 @@ impl<'p> Host<'p> {
                 self.pause();
                 return answer;
             }
-            self.port.serve();
+            self.twins.serve();
         }
         Err(Answer::Nak)
     }
@@ -434,14 +444,14 @@ impl<'p> Host<'p> {
                 self.pause();
                 return handshake;
             }
-            self.port.serve();
+            self.twins.serve();
         }
         Handshake::Nak
     }
 
     /// Takes all that the port has to send, and checks that all bytes have arrived on both sides.
     pub fn drain(&mut self) {
-        self.port.is_line_full = false;
+        self.twins.set_line_full(false);
         self.settle();
         assert_eq!(self.arrived(), self.accepted.len(), "bytes for the port are missing");
         loop {
@@ -451,7 +461,7 @@ impl<'p> Host<'p> {
                 Err(_) => return,
             }
         }
-        assert!(!self.port.has_to_send(), "the port keeps bytes back");
-        assert_eq!(self.taken, self.port.sent.len(), "bytes from the port are missing");
+        assert!(!self.port().has_to_send(), "the port keeps bytes back");
+        assert_eq!(self.taken, self.port().sent.len(), "bytes from the port are missing");
     }
 }

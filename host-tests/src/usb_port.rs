@@ -1,26 +1,16 @@
-//! The Pico's serial port by USB, as its firmware uses the crates `usb-device` and `usbd-serial`,
-//! on a controller made of plain memory.
+//! The Pico's serial port by USB, on a controller made of plain memory.
 //!
 //! [`Port::serve`] does what the function of that name in `src/boards/pico/usb.rs` does, with the
-//! very driver that the firmware has ([`usb_driver`](crate::usb_driver)). What is left out belongs
-//! to the chip or to the protocol: the errata E5 and E15, the main loop's queues and messages, and
-//! real-time bytes.
+//! very device and driver that the firmware has ([`usb_firmware`](crate::usb_firmware)), or with
+//! another device ([`usb_reference`](crate::usb_reference)). What is left out belongs to the chip
+//! or to the protocol: the errata E5 and E15, the main loop's queues and messages, and real-time
+//! bytes.
 
 use crate::usb_controller::UsbController;
-use crate::usb_driver::{Buffers, Bus, DataToggles, PACKET};
+use crate::usb_firmware::device::Device;
+use crate::usb_firmware::driver::{Buffers, PACKET};
 use std::collections::VecDeque;
-use usb_device::bus::UsbBusAllocator;
-use usb_device::device::{
-    StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid,
-};
-use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
-/// The USB number of the maker and of the product.
-pub const VENDOR_AND_PRODUCT: [u16; 2] = [0x1209, 0x0001];
-/// The maker's name.
-pub const MANUFACTURER: &str = "penup";
-/// The product's name.
-pub const PRODUCT: &str = "penup pen plotter";
 /// The size of a sent packet, so that no empty one is needed behind it.
 const SENT_PACKET: usize = PACKET - 1;
 /// The greatest number of bytes that wait to be sent.
@@ -28,11 +18,54 @@ const MOST_TO_SEND: usize = 2047;
 /// The greatest number of received bytes that wait for room in the line's queue.
 const MOST_WAITING: usize = 512;
 
+/// A USB device with a serial port.
+pub trait SerialDevice {
+    /// Follows what has happened on the bus, and answers the host at endpoint 0.
+    fn poll(&mut self);
+    /// Whether the host has configured the device.
+    fn is_configured(&self) -> bool;
+    /// Whether a program at the host has the port open (Data Terminal Ready).
+    fn dtr(&self) -> bool;
+    /// The line coding: the bits a second, and the codes of stop bits, parity and data bits.
+    fn line_coding(&self) -> (u32, [u8; 3]);
+    /// Reads a packet for the port, if there is one, and returns the number of its bytes.
+    fn read_packet(&mut self, into: &mut [u8]) -> Option<usize>;
+    /// Writes a packet of the port. Returns whether there was room.
+    fn write_packet(&mut self, packet: &[u8]) -> bool;
+}
+
+/// The device of the firmware.
+impl SerialDevice for Device<'_, UsbController> {
+    fn poll(&mut self) {
+        Device::poll(self);
+    }
+
+    fn is_configured(&self) -> bool {
+        Device::is_configured(self)
+    }
+
+    fn dtr(&self) -> bool {
+        Device::dtr(self)
+    }
+
+    fn line_coding(&self) -> (u32, [u8; 3]) {
+        let coding = Device::line_coding(self);
+        let [.., stop_bits, parity, bits] = coding.bytes();
+        (coding.data_rate(), [stop_bits, parity, bits])
+    }
+
+    fn read_packet(&mut self, into: &mut [u8]) -> Option<usize> {
+        Device::read_packet(self, into).ok()
+    }
+
+    fn write_packet(&mut self, packet: &[u8]) -> bool {
+        Device::write_packet(self, packet).is_ok()
+    }
+}
+
 /// The device and its serial port.
-pub struct Port<'b> {
-    device: UsbDevice<'b, Bus<UsbController>>,
-    class: CdcAcmClass<'b, Bus<UsbController>>,
-    toggles: DataToggles<UsbController>,
+pub struct Port<D> {
+    device: D,
     buffers: Buffers<UsbController>,
     is_up: bool,
     is_open: bool,
@@ -49,28 +82,12 @@ pub struct Port<'b> {
     pub sent: Vec<Vec<u8>>,
 }
 
-impl<'b> Port<'b> {
-    /// Connects the device to the host, with this serial number.
-    pub fn new(bus: &'b UsbBusAllocator<Bus<UsbController>>, number: &'b str) -> Self {
-        let class = CdcAcmClass::new(bus, PACKET as u16);
-        let strings = StringDescriptors::default()
-            .manufacturer(MANUFACTURER)
-            .product(PRODUCT)
-            .serial_number(number);
-        let [vendor, product] = VENDOR_AND_PRODUCT;
-        let device = UsbDeviceBuilder::new(bus, UsbVidPid(vendor, product))
-            .device_class(USB_CLASS_CDC)
-            .strings(&[strings])
-            .and_then(|builder| builder.max_packet_size_0(64))
-            .expect("the strings fit")
-            .build();
-        device.bus().connect();
-        let buffers = Buffers(device.bus().controller().clone());
+impl<D: SerialDevice> Port<D> {
+    /// Makes the port of a device that `controller` connects to the host.
+    pub fn new(device: D, controller: UsbController) -> Self {
         Self {
             device,
-            class,
-            toggles: DataToggles(buffers.clone()),
-            buffers,
+            buffers: Buffers(controller),
             is_up: false,
             is_open: false,
             waiting: VecDeque::new(),
@@ -87,6 +104,11 @@ impl<'b> Port<'b> {
         &self.buffers.0
     }
 
+    /// The device.
+    pub fn device(&self) -> &D {
+        &self.device
+    }
+
     /// Whether the host has configured the device.
     pub fn is_up(&self) -> bool {
         self.is_up
@@ -98,8 +120,8 @@ impl<'b> Port<'b> {
     }
 
     /// The received bytes that the line's queue has not taken.
-    pub fn waiting(&self) -> Vec<u8> {
-        self.waiting.iter().copied().collect()
+    pub fn waiting(&self) -> &VecDeque<u8> {
+        &self.waiting
     }
 
     /// Whether bytes wait that the controller has not taken.
@@ -115,10 +137,7 @@ impl<'b> Port<'b> {
 
     /// Does all the work of the port.
     pub fn serve(&mut self) {
-        let unread = self.buffers.unread();
-        self.device.bus().look();
-        self.device.poll(&mut [&mut self.toggles, &mut self.class]);
-        self.buffers.refuse(unread);
+        self.device.poll();
         self.follow_state();
         self.follow_port();
         self.receive();
@@ -127,9 +146,8 @@ impl<'b> Port<'b> {
 
     /// Resets the port for each new host.
     fn follow_state(&mut self) {
-        let state = self.device.state();
-        let is_up = state == UsbDeviceState::Configured;
-        if is_up != self.is_up && state != UsbDeviceState::Suspend {
+        let is_up = self.device.is_configured();
+        if is_up != self.is_up {
             self.is_up = is_up;
             self.forget_sent();
         }
@@ -137,7 +155,7 @@ impl<'b> Port<'b> {
 
     /// Follows whether a program at the host has the port open.
     fn follow_port(&mut self) {
-        let is_open = self.class.dtr();
+        let is_open = self.device.dtr();
         if is_open == self.is_open {
             return;
         }
@@ -166,7 +184,7 @@ impl<'b> Port<'b> {
                 return self.buffers.leave();
             }
             let mut packet = [0; PACKET];
-            let Ok(count) = self.class.read_packet(&mut packet) else { return };
+            let Some(count) = self.device.read_packet(&mut packet) else { return };
             self.waiting.extend(&packet[..count]);
         }
     }
@@ -182,7 +200,7 @@ impl<'b> Port<'b> {
             {
                 self.packet.push(byte);
             }
-            if self.packet.is_empty() || self.class.write_packet(&self.packet).is_err() {
+            if self.packet.is_empty() || !self.device.write_packet(&self.packet) {
                 return;
             }
             self.sent.push(std::mem::take(&mut self.packet));

@@ -3,17 +3,15 @@
 #![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup_host_tests::usb_controller::{Answer, Handshake, UsbController};
-use penup_host_tests::usb_driver::{Buffers, Bus, Controller, Register};
+use penup_host_tests::usb_firmware::driver::{
+    Buffers, Bus, Controller, Event, FROM_0, FROM_PORT, PacketError, Register, TO_PORT,
+};
 use std::sync::atomic::{AtomicU32, Ordering};
-use usb_device::UsbError;
-use usb_device::bus::{PollResult, UsbBus};
 
 /// Asks for the state of the device.
 const GET_STATUS: [u8; 8] = [0x80, 0, 0, 0, 0, 0, 2, 0];
 /// Configures the device.
 const SET_CONFIGURATION: [u8; 8] = [0x00, 9, 1, 0, 0, 0, 0, 0];
-/// The endpoint from which the host takes the port's bytes.
-const FROM_PORT: u8 = 0x82;
 /// The bit of a control word with which a buffer belongs to the controller.
 const AVAILABLE: u32 = 1 << 10;
 
@@ -61,7 +59,7 @@ impl<F: Fn(&UsbController)> Controller for Disturbed<F> {
 
 /// A driver that has just seen the first reset of the bus, and whose host acts behind `readings`
 /// further readings.
-fn disturbed<F: Fn(&UsbController) + Sync>(
+fn disturbed<F: Fn(&UsbController)>(
     readings: u32,
     before: impl Fn(&Bus<UsbController>),
     act: F,
@@ -77,21 +75,17 @@ fn connected(controller: &UsbController) -> Bus<UsbController> {
     let bus = Bus::new(controller.clone());
     bus.connect();
     controller.reset_bus();
-    bus.look();
-    assert!(matches!(bus.poll(), PollResult::Reset));
+    assert_eq!(bus.look(), Event::Reset);
     bus.reset();
     bus
 }
 
-/// What the driver reports when it looks: endpoints that were filled, that were emptied, and
-/// whether there is a request.
-fn look<C: Controller + Sync>(bus: &Bus<C>) -> (u16, u16, bool) {
-    bus.look();
-    match bus.poll() {
-        PollResult::Data { ep_out, ep_in_complete, ep_setup } => {
-            (ep_out, ep_in_complete, ep_setup != 0)
-        }
-        _ => (0, 0, false),
+/// What the driver reports when it looks: the buffers that were taken or filled, and whether there
+/// is a request.
+fn look<C: Controller>(bus: &Bus<C>) -> (u32, bool) {
+    match bus.look() {
+        Event::Packets { has_setup, finished } => (finished, has_setup),
+        Event::Reset => (0, false),
     }
 }
 
@@ -100,10 +94,10 @@ fn a_packet_that_is_taken_while_the_driver_looks_is_reported() {
     for readings in 1..=4 {
         let bus = disturbed(
             readings,
-            |bus| assert_eq!(bus.write(FROM_PORT.into(), b"ok\r\n"), Ok(4)),
+            |bus| assert_eq!(bus.write(FROM_PORT, b"ok\r\n"), Ok(())),
             |controller| assert!(matches!(controller.ask(2), Answer::Packet { .. })),
         );
-        let taken: u32 = (0..4).map(|_| u32::from(look(&bus).1 == 1 << 2)).sum();
+        let taken: u32 = (0..4).map(|_| u32::from(look(&bus).0 == 1 << FROM_PORT)).sum();
         assert_eq!(taken, 1, "behind reading {readings}");
         assert!(!bus.controller().controller.has_interrupt());
     }
@@ -117,10 +111,10 @@ fn a_packet_that_comes_while_the_driver_reads_another_one_is_not_lost() {
     for turn in 0..4_u8 {
         assert_eq!(controller.give(1, turn % 2 == 1, &[turn; 64]), Handshake::Ack);
         assert_eq!(controller.give(1, turn % 2 == 0, &[turn; 64]), Handshake::Nak);
-        assert_eq!(look(&bus), (1 << 1, 0, false));
-        assert_eq!(bus.read(1.into(), &mut into), Ok(64));
+        assert_eq!(look(&bus), (1 << TO_PORT, false));
+        assert_eq!(bus.read(TO_PORT, &mut into), Ok(64));
         assert_eq!(into, [turn; 64]);
-        assert_eq!(bus.read(1.into(), &mut into), Err(UsbError::WouldBlock));
+        assert_eq!(bus.read(TO_PORT, &mut into), Err(PacketError::WouldBlock));
     }
 }
 
@@ -132,10 +126,10 @@ fn a_request_that_comes_while_another_one_is_read_is_read_whole() {
             |bus| bus.controller().set_up(GET_STATUS),
             |controller| controller.set_up(SET_CONFIGURATION),
         );
-        let (mut requests, mut into) = (Vec::new(), [0; 8]);
-        for _ in 0..4 {
-            if look(&bus).2 && bus.read(0.into(), &mut into) == Ok(8) {
-                requests.push(into);
+        let mut requests = Vec::new();
+        for _ in 0..6 {
+            if look(&bus).1 {
+                requests.extend(bus.read_setup());
             }
         }
         assert_eq!(requests.pop(), Some(SET_CONFIGURATION), "behind reading {readings}");
@@ -148,14 +142,13 @@ fn a_request_from_before_a_reset_is_forgotten_if_the_device_had_an_address() {
     for address in [0, 5] {
         let controller = UsbController::default();
         let bus = connected(&controller);
-        bus.set_device_address(address);
+        bus.set_address(address);
         controller.set_up(SET_CONFIGURATION);
         controller.reset_bus();
-        bus.look();
-        assert!(matches!(bus.poll(), PollResult::Reset));
+        assert_eq!(bus.look(), Event::Reset);
         bus.reset();
         // Without an address, the request may have come behind the reset.
-        assert_eq!(look(&bus), (0, 0, address == 0));
+        assert_eq!(look(&bus), (0, address == 0));
         assert_eq!(controller.address(), 0);
     }
 }
@@ -165,9 +158,9 @@ fn an_answer_leaves_no_room_for_data_in_its_memory() {
     let controller = UsbController::default();
     let bus = connected(&controller);
     controller.set_up(GET_STATUS);
-    assert_eq!(look(&bus), (0, 0, true));
-    assert_eq!(bus.read(0.into(), &mut [0; 8]), Ok(8));
-    assert_eq!(bus.write(0x80.into(), &[1, 0]), Ok(2));
+    assert_eq!(look(&bus), (0, true));
+    assert_eq!(bus.read_setup(), Some(GET_STATUS));
+    assert_eq!(bus.write(FROM_0, &[1, 0]), Ok(()));
     assert_eq!(controller.give(0, true, &[0xEE; 2]), Handshake::Nothing);
     let answer = Answer::Packet { bytes: vec![1, 0], is_data_1: true, is_current: true };
     assert_eq!(controller.ask(0), answer);
@@ -200,7 +193,7 @@ fn the_controller_refuses_a_buffer_that_comes_too_early() {
 fn the_controller_refuses_writes_to_its_buffers() {
     let controller = UsbController::default();
     let bus = connected(&controller);
-    assert_eq!(bus.write(FROM_PORT.into(), b"ok\r\n"), Ok(4));
+    assert_eq!(bus.write(FROM_PORT, b"ok\r\n"), Ok(()));
     controller.put_word((0x100 + 4 * 64) / 4, 0);
 }
 
@@ -209,7 +202,7 @@ fn the_controller_refuses_writes_to_its_buffers() {
 fn the_controller_refuses_another_length_of_a_packet_that_it_has() {
     let controller = UsbController::default();
     let bus = connected(&controller);
-    assert_eq!(bus.write(FROM_PORT.into(), b"ok\r\n"), Ok(4));
+    assert_eq!(bus.write(FROM_PORT, b"ok\r\n"), Ok(()));
     let word = Buffers(controller.clone()).control(4);
     controller.put_word(0x90 / 4, word + 1);
 }

@@ -1,13 +1,11 @@
 //! Packets of a USB host, in any order.
 
-use crate::usb_controller::UsbController;
-use crate::usb_driver::{Bus, PACKET};
+use crate::usb_firmware::driver::PACKET;
 use crate::usb_host::{FROM_PORT, Host};
-use crate::usb_port::Port;
-use usb_device::bus::UsbBusAllocator;
+use crate::usb_twins::Twins;
 
 /// Requests that real hosts make, and some that they might make.
-const REQUESTS: [[u8; 8]; 16] = [
+pub const REQUESTS: [[u8; 8]; 16] = [
     [0x80, 6, 0, 1, 0, 0, 64, 0], // 0: the device descriptor, before its length is known
     [0x80, 6, 0, 1, 0, 0, 18, 0], // 1: the device descriptor
     [0x00, 5, 7, 0, 0, 0, 0, 0],  // 2: set address
@@ -26,7 +24,8 @@ const REQUESTS: [[u8; 8]; 16] = [
     [0x21, 0x00, 0, 0, 0, 0, 100, 0], // ? a request with more than one packet of data
 ];
 
-/// Lets a host do what the input says, and then find the device, as real hosts do.
+/// Lets a host do what the input says, and then find the device, as real hosts do. It does the same
+/// to the reference device, from which the Pico's must not differ.
 ///
 /// The first byte is the number of digits of the serial number (the Pico's has 16; others make
 /// answers of whole packets); if its seventh bit is set, the host that finds the device at the end
@@ -54,8 +53,8 @@ const REQUESTS: [[u8; 8]; 16] = [
 pub fn fuzz(input: &[u8]) {
     let Some((first, rest)) = input.split_first() else { return };
     let number: String = (0..first % 64).map(|digit| char::from(b'0' + digit % 10)).collect();
-    let bus = UsbBusAllocator::new(Bus::new(UsbController::default()));
-    let mut host = Host::new(Port::new(&bus, &number));
+    let bus = Twins::allocator();
+    let mut host = Host::new(Twins::new(&bus, &number));
     let mut rest = rest.iter().copied();
     while let Some(action) = rest.next() {
         host.is_hasty = action & 0x20 == 0;
@@ -90,12 +89,12 @@ fn act(host: &mut Host<'_>, action: u8, rest: &mut impl Iterator<Item = u8>) {
                 host.pause();
             }
         }
-        10 => host.port.is_line_full = !host.port.is_line_full,
+        10 => host.twins.set_line_full(!host.twins.is_line_full()),
         11 => host.suspend(),
         12 => host.resume(),
         13 => {
             let bytes = host.pattern(byte().into());
-            host.port.write(&bytes);
+            host.twins.write(&bytes);
         }
         14 => host.set_up(std::array::from_fn(|_| byte())),
         15 => {

@@ -2,8 +2,8 @@
 
 use super::{FROM_PORT, Host, Outcome};
 use crate::usb_controller::Handshake;
-use crate::usb_driver::PACKET;
-use crate::usb_port::{MANUFACTURER, PRODUCT, VENDOR_AND_PRODUCT};
+use crate::usb_firmware::driver::PACKET;
+use crate::usb_reference::{MANUFACTURER, PRODUCT, VENDOR_AND_PRODUCT};
 
 /// Sets the line coding. The data follow: 115200 bits a second, one stop bit, no parity, 8 bits.
 const SET_LINE_CODING: [u8; 8] = [0x21, 0x20, 0, 0, 0, 0, 7, 0];
@@ -24,14 +24,14 @@ impl Host<'_> {
     /// Finds the device as real hosts do, and checks that it is complete.
     pub fn enumerate(&mut self, address: u8, number: &str) {
         self.reset();
-        assert_eq!(self.port.bus().address(), 0);
+        assert_eq!(self.port().bus().address(), 0);
         let first = self.answer(DEVICE, 0, 64);
         // Windows and Linux reset the bus once more.
         self.reset();
         assert_eq!(self.transfer([0, 5, address, 0, 0, 0, 0, 0], &[]), Outcome::Done(Vec::new()));
         // The host waits here for 2 ms at least.
         self.settle();
-        assert_eq!(self.port.bus().address(), address);
+        assert_eq!(self.port().bus().address(), address);
 
         let device = self.answer(DEVICE, 0, 18);
         assert_eq!(first, device);
@@ -55,30 +55,30 @@ impl Host<'_> {
 
         assert_eq!(self.transfer([0, 9, 1, 0, 0, 0, 0, 0], &[]), Outcome::Done(Vec::new()));
         self.settle();
-        assert!(self.port.is_up() && !self.port.is_open());
+        assert!(self.port().is_up() && !self.port().is_open());
         assert_eq!(self.transfer(SET_LINE_CODING, &LINE_CODING), Outcome::Done(Vec::new()));
         let coding = self.transfer([0xA1, 0x21, 0, 0, 0, 0, 7, 0], &[]);
         assert_eq!(coding, Outcome::Done(LINE_CODING.to_vec()));
         let open = self.transfer([0x21, 0x22, 3, 0, 0, 0, 0, 0], &[]);
         assert_eq!(open, Outcome::Done(Vec::new()));
         self.settle();
-        assert!(self.port.is_open());
+        assert!(self.port().is_open());
         self.exchange();
     }
 
     /// Sends a line to the port and another one back.
     fn exchange(&mut self) {
         self.drain();
-        self.port.received.clear();
+        self.twins.forget_received();
         self.accepted.clear();
         let line = self.pattern(100);
         for packet in line.chunks(PACKET) {
             assert_eq!(self.give(packet), Handshake::Ack);
             self.settle();
         }
-        assert_eq!(self.port.received, line, "the port has not received the line");
+        assert_eq!(self.port().received, line, "the port has not received the line");
         let reply = self.pattern(2 * PACKET);
-        self.port.write(&reply);
+        self.twins.write(&reply);
         self.settle();
         // A host waits for further packets until one is not full.
         let (mut heard, mut is_over) = (Vec::new(), true);

@@ -13,12 +13,14 @@
 //! rest of a line that it has not ended, but nobody is told. A program that opens the port (DTR
 //! rises) gets a greeting, which goes only to it: see [`take_opened`].
 //!
-//! The controller is driven by [`driver`]. Two of the chip's errata are worked around: see
+//! The controller is driven by [`driver`], and [`device`] answers the host's requests. Two of the
+//! chip's errata are worked around: see
 //! [`connection`] for E5, which takes GPIO 15 for a millisecond when a host resets the bus, and
 //! [`frame`] for E15. E2 does not matter, because no endpoint is aborted, nor do E3 and E4, which
 //! are those of a host.
 
 mod connection;
+mod device;
 mod driver;
 mod frame;
 
@@ -30,14 +32,9 @@ use penup::byte_queue::{ByteQueue, Consumer, Producer};
 use penup::protocol::{DAMAGED, RealTime};
 use rp2040_hal::pac::{Interrupt, interrupt};
 use static_cell::StaticCell;
-use usb_device::bus::UsbBusAllocator;
-use usb_device::device::{
-    StringDescriptors, UsbDevice, UsbDeviceBuilder, UsbDeviceState, UsbVidPid,
-};
-use usbd_serial::{CdcAcmClass, USB_CLASS_CDC};
 
 use self::connection::Connection;
-use self::driver::{Buffers, Bus, Controller, DataToggles, PACKET, Register};
+use self::driver::{Controller, PACKET, Register};
 use self::frame::Frame;
 pub use self::frame::forget as forget_frame;
 use super::ports::{self, Port, ReceiveSide};
@@ -47,9 +44,6 @@ use crate::boards::fault::once;
 use crate::boards::handler::Owned;
 use crate::boards::peripheral::Offset;
 
-/// The USB number for tests and for projects without a number of their own:
-/// <https://pid.codes/1209/0001>.
-const VENDOR_AND_PRODUCT: UsbVidPid = UsbVidPid(0x1209, 0x0001);
 /// The size of a sent packet. After a full packet, an empty one would be needed for the host to see
 /// the end.
 const SENT_PACKET: usize = PACKET - 1;
@@ -71,14 +65,10 @@ const TOUCH_RATE: u32 = 1200;
 /// The bit of the controller's interrupts for a reset of the bus.
 const BUS_RESET: u32 = 1 << 12;
 
-/// The buffers of the controller, which the driver has too.
-const BUFFERS: Buffers<Chip> = Buffers(Chip);
-/// The driver of the controller, which `usb-device` borrows.
-static BUS: StaticCell<UsbBusAllocator<Bus<Chip>>> = StaticCell::new();
 /// The queue of bytes to send.
 static QUEUE: StaticCell<ByteQueue<SENT_SLOTS>> = StaticCell::new();
-/// The device, which belongs to the USB handler.
-static DEVICE: Owned<Device> = Owned::empty();
+/// The serial line, which belongs to the USB handler.
+static LINE: Owned<UsbLine> = Owned::empty();
 
 /// Whether the host takes nothing. The main loop sets it, and the handler clears it.
 static HOST_IS_GONE: AtomicBool = AtomicBool::new(true);
@@ -93,14 +83,10 @@ static WAS_OPENED: AtomicBool = AtomicBool::new(false);
 /// the main loop clears it.
 static WAS_TOUCHED: AtomicBool = AtomicBool::new(false);
 
-/// The USB device: the serial line and what it needs of the chip.
-struct Device {
-    /// The USB device of `usb-device`.
-    device: UsbDevice<'static, Bus<Chip>>,
-    /// The serial port of `usbd-serial`.
-    class: CdcAcmClass<'static, Bus<Chip>>,
-    /// Begins packets anew with DATA0 where `usb-device` does not.
-    toggles: DataToggles<Chip>,
+/// The serial line: the USB device and what it needs of the chip.
+struct UsbLine {
+    /// The USB device, whose only function is a serial port.
+    device: device::Device<'static, Chip>,
     /// Whether the host has configured the device, so that bytes can be exchanged.
     is_up: bool,
     /// Whether a program has the port open, according to DTR.
@@ -136,44 +122,26 @@ pub struct Sender {
 
 /// Connects the device to the host, with this serial number. `ports` must be set up, the clock of
 /// the controller must run at 48 MHz, and the pins must be out of reset.
-///
-/// # Panics
-/// Never: the strings fit.
 pub fn set_up(nvic: &mut NVIC, number: &'static str) -> Sender {
     registers::restart(registers::reset::USBCTRL);
-    let bus = once(BUS.try_init(UsbBusAllocator::new(Bus::new(Chip))));
-    let bus: &UsbBusAllocator<_> = bus;
-    let class = CdcAcmClass::new(bus, PACKET as u16);
-    let strings = StringDescriptors::default()
-        .manufacturer("penup")
-        .product("penup pen plotter")
-        .serial_number(number);
-    let builder = UsbDeviceBuilder::new(bus, VENDOR_AND_PRODUCT).device_class(USB_CLASS_CDC);
-    let builder = builder.strings(&[strings]).and_then(|builder| builder.max_packet_size_0(64));
-    let device = builder.map(UsbDeviceBuilder::build);
     let (sent, to_send) = once(QUEUE.try_init(ByteQueue::new())).split();
-    if let Ok(device) = device {
-        device.bus().connect();
-        let device = Device {
-            device,
-            class,
-            toggles: DataToggles(BUFFERS),
-            is_up: false,
-            is_open: false,
-            connection: Connection::new(),
-            awaits_bus: false,
-            frame: Frame::new(),
-            waiting: Deque::new(),
-            is_in_line: false,
-            aborts: 0,
-            to_send,
-            packet: Vec::new(),
-        };
-        // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
-        // it).
-        unsafe { DEVICE.fill(device) };
-        critical::enable(nvic, Interrupt::USBCTRL_IRQ, critical::SERIAL_PRIORITY);
-    }
+    let line = UsbLine {
+        device: device::Device::new(Chip, number),
+        is_up: false,
+        is_open: false,
+        connection: Connection::new(),
+        awaits_bus: false,
+        frame: Frame::new(),
+        waiting: Deque::new(),
+        is_in_line: false,
+        aborts: 0,
+        to_send,
+        packet: Vec::new(),
+    };
+    // SAFETY: the interrupt is masked since reset, and this runs once (the queue's cell ensures
+    // it).
+    unsafe { LINE.fill(line) };
+    critical::enable(nvic, Interrupt::USBCTRL_IRQ, critical::SERIAL_PRIORITY);
     Sender { bytes: sent, full: None, is_cut: false }
 }
 
@@ -266,39 +234,26 @@ fn take(flag: &AtomicBool) -> bool {
 /// other port are masked.
 fn serve() {
     // SAFETY: by the contract above.
-    if let (Some(device), Some(receive_side)) = unsafe { (DEVICE.get(), ports::receive_side()) } {
-        device.frame.follow();
+    if let (Some(line), Some(receive_side)) = unsafe { (LINE.get(), ports::receive_side()) } {
+        line.frame.follow();
         // This must be read before polling, which clears it.
-        let took = BUFFERS.is_taken();
-        if device.connection.is_ready() {
-            device.poll();
+        let took = line.device.buffers().is_taken();
+        if line.connection.is_ready() {
+            line.device.poll();
         }
-        device.await_bus(USB.intr().get() & BUS_RESET != 0);
-        device.follow_state();
-        device.follow_port(receive_side);
+        line.await_bus(USB.intr().get() & BUS_RESET != 0);
+        line.follow_state();
+        line.follow_port(receive_side);
         if took {
-            device.resume_host();
+            line.resume_host();
         }
-        device.receive(receive_side);
-        device.send();
-        IS_WAITED.store(device.awaits_bus || !device.waiting.is_empty(), Ordering::Relaxed);
+        line.receive(receive_side);
+        line.send();
+        IS_WAITED.store(line.awaits_bus || !line.waiting.is_empty(), Ordering::Relaxed);
     }
 }
 
-impl Device {
-    /// Lets `usb-device` see what has happened on the bus.
-    fn poll(&mut self) {
-        let unread = BUFFERS.unread();
-        self.device.bus().look();
-        // The driver never reports that the bus is suspended. Where the compiler sees that here, it
-        // leaves out a panic of `usb-device`.
-        if self.device.state() == UsbDeviceState::Suspend {
-            return;
-        }
-        self.device.poll(&mut [&mut self.toggles, &mut self.class]);
-        BUFFERS.refuse(unread);
-    }
-
+impl UsbLine {
     /// Masks or unmasks the interrupt of a bus reset. While the host resets the bus, for some 10 to
     /// 50 ms or for as long as the host has no power, the interrupt would come again at once. So it
     /// is masked, and the main loop checks instead.
@@ -312,9 +267,8 @@ impl Device {
     /// Resets the port for each new host. A host that suspends the bus is still the same
     /// afterwards.
     fn follow_state(&mut self) {
-        let state = self.device.state();
-        let is_up = state == UsbDeviceState::Configured;
-        if is_up != self.is_up && state != UsbDeviceState::Suspend {
+        let is_up = self.device.is_configured();
+        if is_up != self.is_up {
             self.is_up = is_up;
             self.forget_sent();
             // The host counts as gone until a program opens the port.
@@ -324,7 +278,7 @@ impl Device {
 
     /// Follows whether a program at the host has the port open.
     fn follow_port(&mut self, receive_side: &mut ReceiveSide) {
-        let is_open = self.class.dtr();
+        let is_open = self.device.dtr();
         if is_open == self.is_open {
             return;
         }
@@ -338,7 +292,7 @@ impl Device {
         }
         HOST_IS_GONE.store(true, Ordering::Relaxed);
         self.forget_sent();
-        BUFFERS.take_back();
+        self.device.buffers().take_back();
         if self.is_in_line {
             // The unfinished line is refused, and the next one is a separate line. There is room,
             // because packets are read only while there are two slots more than they need.
@@ -347,7 +301,7 @@ impl Device {
             let _ = self.waiting.push_back(b'\n');
             self.is_in_line = false;
         }
-        if self.class.line_coding().data_rate() == TOUCH_RATE {
+        if self.device.line_coding().data_rate() == TOUCH_RATE {
             WAS_TOUCHED.store(true, Ordering::Relaxed);
         }
     }
@@ -391,10 +345,10 @@ impl Device {
                 self.waiting.pop_front();
             }
             if self.waiting.capacity() - self.waiting.len() < PACKET + 2 {
-                return BUFFERS.leave();
+                return self.device.buffers().leave();
             }
             let mut packet = [0; PACKET];
-            let Ok(count) = self.class.read_packet(&mut packet) else { return };
+            let Ok(count) = self.device.read_packet(&mut packet) else { return };
             // A host that sends is present, even without DTR.
             if self.is_up && count > 0 {
                 HOST_IS_GONE.store(false, Ordering::Relaxed);
@@ -429,7 +383,7 @@ impl Device {
             if self.packet.is_empty() {
                 return self.frame.stop();
             }
-            if !self.frame.may_send() || self.class.write_packet(&self.packet).is_err() {
+            if !self.frame.may_send() || self.device.write_packet(&self.packet).is_err() {
                 return;
             }
             self.packet.clear();

@@ -5,8 +5,6 @@
 //! controller runs on another clock, so this bit must be set some cycles after the others (data
 //! sheet, section 4.1.2.5.1): see [`Buffers::give`].
 
-use usb_device::endpoint::EndpointAddress;
-
 use super::{Controller, Register};
 
 /// The buffer of endpoint 0 whose packets the host takes.
@@ -46,9 +44,10 @@ const CONTROL_WORDS: usize = 0x80 / 4;
 /// 48 MHz is 2.6 of the core's. The Pico SDK waits as long.
 const SETTLING: u32 = 12;
 
-/// The number of the buffer of an endpoint, below 32.
-pub fn buffer_of(endpoint: EndpointAddress) -> usize {
-    2 * (endpoint.index() & 0xF) + usize::from(endpoint.is_out())
+/// The number of the buffer of an endpoint, below 32. `address` is a `bEndpointAddress` (USB 2.0,
+/// section 9.6.6): the number of the endpoint, and bit 7 if the host takes its packets.
+pub fn buffer_of(address: u8) -> usize {
+    2 * usize::from(address & 0xF) + usize::from(address & 0x80 == 0)
 }
 
 /// The buffers of a controller.

@@ -1,21 +1,15 @@
-//! The driver of the USB controller, as the crate `usb-device` wants it.
+//! The driver of the USB controller: packets and requests in both directions.
 //!
-//! The endpoints are those of `usbd-serial`, and are constants. So the driver has no table of
-//! them, and allocating one cannot fail.
+//! The endpoints are those of a serial port, and are constants.
 
-use usb_device::bus::{PollResult, UsbBus};
-use usb_device::endpoint::{EndpointAddress, EndpointType};
-use usb_device::{Result, UsbDirection, UsbError};
-
-use super::buffers::{
-    Buffers, FROM_0, FROM_PORT, NOTICES, SETUP_REQ, TO_0, TO_PORT, buffer_of, control_word,
-};
+use super::buffers::{Buffers, FROM_0, FROM_PORT, NOTICES, SETUP_REQ, TO_0, TO_PORT, control_word};
+use super::endpoints::MOST_DATA;
 use super::{Controller, Register};
 
 /// The greatest packet of every endpoint but that of notices, in bytes.
 pub const PACKET: usize = 64;
 /// The greatest notice of the port to the host, in bytes. None is ever sent.
-const NOTICE: usize = 8;
+pub const NOTICE: usize = 8;
 /// The number of endpoints in each direction that have buffers.
 const ENDPOINTS: usize = 3;
 
@@ -60,14 +54,31 @@ const ALL_BUFFERS: u32 = (1 << (2 * ENDPOINTS)) - 1;
 const ALL_TAKEN: u32 = 0x5555_5555;
 /// The words of the memory before the buffers.
 const BUFFERS: usize = 0x100 / 4;
+/// The first word of the memory behind the buffers.
+const END: usize = BUFFERS + 2 * ENDPOINTS * PACKET / 4;
 
-/// The word of the memory, behind the buffers, in which [`Bus::look`] puts what it has seen: the
-/// buffers that the host has taken or filled, and the two bits below.
-const SEEN: usize = BUFFERS + 2 * ENDPOINTS * PACKET / 4;
-/// In [`SEEN`]: the host resets the bus.
-const SEEN_RESET: u32 = 1 << 30;
-/// In [`SEEN`]: the host has made a request, which the next reading of endpoint 0 is to read.
-const SEEN_SETUP: u32 = 1 << 31;
+/// What has happened on the bus.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Event {
+    /// The host resets the bus.
+    Reset,
+    /// Packets were exchanged, or none.
+    Packets {
+        /// Whether the host has made a request, which [`Bus::read_setup`] is to read.
+        has_setup: bool,
+        /// The buffers that the host has taken or filled, one bit for each.
+        finished: u32,
+    },
+}
+
+/// Why a packet was not read or written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PacketError {
+    /// There is no packet to read, or the controller still has the last one that was written.
+    WouldBlock,
+    /// There is not so much room.
+    Overflow,
+}
 
 /// The greatest packet of a buffer; 0 if there is no such buffer.
 const fn greatest(buffer: usize) -> usize {
@@ -95,6 +106,11 @@ impl<C: Controller> Bus<C> {
         Self { buffers: Buffers(controller) }
     }
 
+    /// The buffers of the endpoints.
+    pub fn buffers(&self) -> &Buffers<C> {
+        &self.buffers
+    }
+
     /// The controller.
     pub fn controller(&self) -> &C {
         &self.buffers.0
@@ -105,7 +121,7 @@ impl<C: Controller> Bus<C> {
         use Register::{Inte, MainCtrl, SieCtrl, UsbMuxing, UsbPwr};
         let controller = self.controller();
         // Memory holds anything when the power comes.
-        for index in 0..=SEEN {
+        for index in 0..END {
             controller.put_word(index, 0);
         }
         self.begin_endpoints();
@@ -116,22 +132,22 @@ impl<C: Controller> Bus<C> {
         controller.put(SieCtrl, bits::EP0_INT_1BUF | bits::PULLUP_EN);
     }
 
-    /// Looks what has happened on the bus, for the polling of the device that must follow. That the
-    /// host suspends or resumes the bus is not seen: nothing depends on it.
-    pub fn look(&self) {
+    /// Looks what has happened on the bus since the last call. That the host suspends or resumes
+    /// the bus is not seen: nothing depends on it.
+    pub fn look(&self) -> Event {
         let due = self.controller().get(Register::Intr);
         if due & bits::BUS_RESET_INT != 0 {
-            return self.controller().put_word(SEEN, SEEN_RESET);
+            return Event::Reset;
         }
-        let mut seen = self.buffers.finished() & ALL_BUFFERS;
+        let finished = self.buffers.finished() & ALL_BUFFERS;
         // That a packet was taken is reported once; that one was received, until it is read.
-        self.buffers.clear_finished(seen & ALL_TAKEN);
-        if due & SETUP_REQ != 0 {
+        self.buffers.clear_finished(finished & ALL_TAKEN);
+        let has_setup = due & SETUP_REQ != 0;
+        if has_setup {
             // What endpoint 0 holds answers a request that the host has broken off.
             self.buffers.keep(FROM_0, self.buffers.control(FROM_0));
-            seen |= SEEN_SETUP;
         }
-        self.controller().put_word(SEEN, seen);
+        Event::Packets { has_setup, finished }
     }
 
     /// Empties all buffers, and makes the endpoints ready for a host.
@@ -151,20 +167,32 @@ impl<C: Controller> Bus<C> {
         self.buffers.give(TO_PORT, PACKET as u32);
     }
 
+    /// Begins anew behind a reset of the bus: without an address, and with empty buffers.
+    pub fn reset(&self) {
+        self.controller().put(Register::SieStatus, bits::BUS_RESET);
+        // A request to an address was made before the reset. One to address 0 may have come after
+        // it: the host waits only ten milliseconds, and work on the flash lasts longer.
+        if self.controller().get(Register::AddrEndp) != 0 {
+            self.controller().put(Register::SieStatus, bits::SETUP_REC);
+            self.controller().put(Register::AddrEndp, 0);
+        }
+        self.begin_endpoints();
+    }
+
+    /// Lets the device answer to this address.
+    pub fn set_address(&self, address: u8) {
+        self.controller().put(Register::AddrEndp, u32::from(address & 0x7F));
+    }
+
     /// Reads the host's request, and makes endpoint 0 ready for what follows it: packets that begin
-    /// with DATA1.
-    ///
-    /// # Errors
-    /// Another request came while this one was read. It will be reported.
-    fn read_setup(&self, into: &mut [u8]) -> Result<usize> {
+    /// with DATA1. A halt of endpoint 0 ends. Returns `None` if another request came while this one
+    /// was read. It will be reported.
+    pub fn read_setup(&self) -> Option<[u8; 8]> {
         self.controller().put(Register::SieStatus, bits::SETUP_REC);
         let [low, high] = self.buffers.setup();
         if self.buffers.setup() != [low, high] {
-            return Err(UsbError::WouldBlock);
+            return None;
         }
-        let request = u64::from(high) << 32 | u64::from(low);
-        let request = request.to_le_bytes();
-        into.get_mut(..request.len()).ok_or(UsbError::BufferOverflow)?.copy_from_slice(&request);
         // The first packet to the host flips the data toggle.
         self.buffers.keep(FROM_0, 0);
         self.buffers.clear_finished(1 << TO_0);
@@ -173,23 +201,27 @@ impl<C: Controller> Bus<C> {
             // The host confirms what it gets, by an empty packet. There is no room for others,
             // because the answer lies in the same memory.
             self.buffers.give(TO_0, control_word::IS_DATA_1);
-        } else if length > 0 {
+        } else if (1..=MOST_DATA as u32).contains(&length) {
             self.buffers.give(TO_0, control_word::IS_DATA_1 | PACKET as u32);
         } else {
+            // There are no data, or they will be refused.
             self.buffers.keep(TO_0, control_word::IS_DATA_1);
         }
-        Ok(request.len())
+        Some((u64::from(high) << 32 | u64::from(low)).to_le_bytes())
     }
 
-    /// Reads a packet, and gives the controller the buffer again.
-    fn read_packet(&self, buffer: usize, into: &mut [u8]) -> Result<usize> {
+    /// Reads a packet, gives the controller the buffer again, and returns the number of bytes.
+    ///
+    /// # Errors
+    /// There is no packet, or less room than it needs. Then it is still there.
+    pub fn read(&self, buffer: usize, into: &mut [u8]) -> Result<usize, PacketError> {
         use control_word::{AVAILABLE, FULL, IS_DATA_1, LENGTH, STALL};
         let word = self.buffers.control(buffer);
         if word & FULL == 0 || word & AVAILABLE != 0 {
-            return Err(UsbError::WouldBlock);
+            return Err(PacketError::WouldBlock);
         }
         let length = (word & LENGTH) as usize;
-        let into = into.get_mut(..length.min(PACKET)).ok_or(UsbError::BufferOverflow)?;
+        let into = into.get_mut(..length.min(PACKET)).ok_or(PacketError::Overflow)?;
         for (index, bytes) in (place(buffer)..).zip(into.chunks_mut(4)) {
             let word = self.controller().word(index).to_le_bytes();
             bytes.iter_mut().zip(word).for_each(|(into, byte)| *into = byte);
@@ -205,58 +237,19 @@ impl<C: Controller> Bus<C> {
         }
         Ok(into.len())
     }
-}
 
-impl<C: Controller + Sync> UsbBus for Bus<C> {
-    fn alloc_ep(
-        &mut self,
-        direction: UsbDirection,
-        address: Option<EndpointAddress>,
-        kind: EndpointType,
-        size: u16,
-        _interval: u8,
-    ) -> Result<EndpointAddress> {
-        let (index, packet) = match (kind, direction) {
-            (EndpointType::Control, _) => (0, PACKET),
-            (EndpointType::Interrupt, UsbDirection::In) => (NOTICES / 2, NOTICE),
-            (EndpointType::Bulk, UsbDirection::In) => (FROM_PORT / 2, PACKET),
-            (EndpointType::Bulk, UsbDirection::Out) => (TO_PORT / 2, PACKET),
-            _ => return Err(UsbError::EndpointOverflow),
-        };
-        let endpoint = EndpointAddress::from_parts(index, direction);
-        if usize::from(size) != packet || address.is_some_and(|address| address != endpoint) {
-            return Err(UsbError::Unsupported);
-        }
-        Ok(endpoint)
-    }
-
-    /// Does nothing: see [`Bus::connect`].
-    fn enable(&mut self) {}
-
-    fn reset(&self) {
-        self.controller().put(Register::SieStatus, bits::BUS_RESET);
-        // A request to an address was made before the reset. One to address 0 may have come after
-        // it: the host waits only ten milliseconds, and work on the flash lasts longer.
-        if self.controller().get(Register::AddrEndp) != 0 {
-            self.controller().put(Register::SieStatus, bits::SETUP_REC);
-            self.controller().put(Register::AddrEndp, 0);
-        }
-        self.begin_endpoints();
-    }
-
-    fn set_device_address(&self, address: u8) {
-        self.controller().put(Register::AddrEndp, u32::from(address & 0x7F));
-    }
-
-    fn write(&self, endpoint: EndpointAddress, packet: &[u8]) -> Result<usize> {
+    /// Writes a packet, which the controller then has until the host takes it.
+    ///
+    /// # Errors
+    /// The controller still has the last packet, or this one is too long for the endpoint.
+    pub fn write(&self, buffer: usize, packet: &[u8]) -> Result<(), PacketError> {
         use control_word::{AVAILABLE, FULL, IS_DATA_1, STALL};
-        let buffer = buffer_of(endpoint);
         let word = self.buffers.control(buffer);
         if word & AVAILABLE != 0 {
-            return Err(UsbError::WouldBlock);
+            return Err(PacketError::WouldBlock);
         }
         if packet.len() > greatest(buffer) {
-            return Err(UsbError::BufferOverflow);
+            return Err(PacketError::Overflow);
         }
         for (index, bytes) in (place(buffer)..).zip(packet.chunks(4)) {
             let word = bytes.iter().rev().fold(0, |word, byte| word << 8 | u32::from(*byte));
@@ -264,57 +257,23 @@ impl<C: Controller + Sync> UsbBus for Bus<C> {
         }
         let next = word & STALL | !word & IS_DATA_1 | FULL | packet.len() as u32;
         self.buffers.give(buffer, next);
-        Ok(packet.len())
+        Ok(())
     }
 
-    #[inline(always)]
-    fn read(&self, endpoint: EndpointAddress, into: &mut [u8]) -> Result<usize> {
-        let buffer = buffer_of(endpoint);
-        let seen = self.controller().word(SEEN);
-        let count = if buffer == TO_0 && seen & SEEN_SETUP != 0 {
-            self.controller().put_word(SEEN, seen & !SEEN_SETUP);
-            self.read_setup(into)?
-        } else {
-            self.read_packet(buffer, into)?
-        };
-        // It is never more. Where the compiler sees that, `usb-device` needs no check of bounds.
-        Ok(count.min(into.len()))
-    }
-
-    fn set_stalled(&self, endpoint: EndpointAddress, is_stalled: bool) {
-        let buffer = buffer_of(endpoint);
+    /// Halts the endpoint of a buffer, or lifts its halt. At endpoint 0 a halt ends with the host's
+    /// next request.
+    pub fn set_halted(&self, buffer: usize, is_halted: bool) {
         if greatest(buffer) == 0 {
             return;
         }
-        self.buffers.set_bit(buffer, control_word::STALL, is_stalled);
-        if is_stalled && buffer <= TO_0 {
+        self.buffers.set_bit(buffer, control_word::STALL, is_halted);
+        if is_halted && buffer <= TO_0 {
             self.buffers.arm_stall();
         }
     }
 
-    fn is_stalled(&self, endpoint: EndpointAddress) -> bool {
-        self.buffers.control(buffer_of(endpoint)) & control_word::STALL != 0
-    }
-
-    fn suspend(&self) {}
-
-    fn resume(&self) {}
-
-    /// Reports what [`Bus::look`] has seen last.
-    fn poll(&self) -> PollResult {
-        let seen = self.controller().word(SEEN);
-        if seen & SEEN_RESET != 0 {
-            return PollResult::Reset;
-        }
-        if seen == 0 {
-            return PollResult::None;
-        }
-        let (mut ep_in_complete, mut ep_out) = (0, 0);
-        for endpoint in 0..ENDPOINTS {
-            let bit = |buffer: usize| ((seen >> buffer & 1) as u16) << endpoint;
-            ep_in_complete |= bit(2 * endpoint);
-            ep_out |= bit(2 * endpoint + 1);
-        }
-        PollResult::Data { ep_out, ep_in_complete, ep_setup: u16::from(seen & SEEN_SETUP != 0) }
+    /// Whether the endpoint of a buffer is halted.
+    pub fn is_halted(&self, buffer: usize) -> bool {
+        self.buffers.control(buffer) & control_word::STALL != 0
     }
 }

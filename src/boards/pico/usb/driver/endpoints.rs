@@ -1,21 +1,15 @@
-//! Does with the buffers of the endpoints what the crate `usb-device` leaves undone.
+//! What is done with the buffers of the endpoints beside reading and writing them.
 //!
 //! * A packet that the host has not taken is taken back: see [`Buffers::take_back`].
 //! * A packet for which the port has no room waits in the controller: see [`Buffers::leave`].
 //! * Data at endpoint 0 that nobody reads are refused: see [`Buffers::refuse`].
-//! * Packets begin anew with DATA0 where USB 2.0 wants it: see [`DataToggles`].
-
-use usb_device::bus::UsbBus;
-use usb_device::class::{ControlOut, UsbClass};
-use usb_device::control::{Recipient, Request, RequestType};
+//! * Packets begin anew with DATA0 where USB 2.0 wants it: see [`Buffers::begin_anew`].
 
 use super::Controller;
-use super::buffers::{Buffers, FROM_0, FROM_PORT, TO_0, TO_PORT, buffer_of, control_word};
+use super::buffers::{Buffers, FROM_0, FROM_PORT, TO_0, TO_PORT, control_word};
 
-/// The most bytes of data from the host for which `usb-device` has room in one request.
-const MOST_DATA: u32 = 128;
-/// The number of the interface to which the port's endpoints belong. The other one is 0.
-const DATA_INTERFACE: u16 = 1;
+/// The most bytes of data from the host for which the device has room in one request.
+pub const MOST_DATA: usize = 128;
 /// Cycles of the core after which a packet of 64 bytes that has already begun is over: 60
 /// microseconds.
 const PACKET_CYCLES: u32 = 7500;
@@ -58,17 +52,17 @@ impl<C: Controller> Buffers<C> {
         is_left.then(|| self.control(TO_0))
     }
 
-    /// Whether a request was read with more data from the host than `usb-device` has room for.
+    /// Whether a request was read with more data from the host than the device has room for.
     fn is_too_long(&self) -> bool {
         let [low, high] = self.setup();
         let is_from_device = low & 0x80 != 0;
         let length = high >> 16;
-        !is_from_device && length > MOST_DATA && !self.has_setup()
+        !is_from_device && length > MOST_DATA as u32 && !self.has_setup()
     }
 
-    /// Refuses data at endpoint 0 that `usb-device` neither reads nor refuses, until the next
+    /// Refuses data at endpoint 0 that the device has neither read nor refused, until the next
     /// request. Otherwise their interrupt would come without an end, or they would be taken for
-    /// those of an earlier request. Call it after the device was polled; `before` is what
+    /// those of an earlier request. Call it after the device has done all else; `before` is what
     /// [`Buffers::unread`] returned before.
     ///
     /// Such data are those of a request that is too long, and data that no request has announced.
@@ -86,37 +80,10 @@ impl<C: Controller> Buffers<C> {
 
     /// Makes the next packet of an endpoint DATA0, even if it is waiting for the host already. The
     /// host exchanges no packet with the endpoint until its request is confirmed.
-    fn begin_anew(&self, buffer: usize) {
+    pub fn begin_anew(&self, buffer: usize) {
         use control_word::{AVAILABLE, IS_DATA_1};
         // The driver flips the toggle when it writes a packet, and when it has read one.
         let is_flipped = self.control(buffer) & AVAILABLE == 0;
         self.set_bit(buffer, IS_DATA_1, is_flipped);
-    }
-}
-
-/// Begins anew with DATA0 when the host configures the device, chooses the setting of the port's
-/// interface or lifts the halt of an endpoint (USB 2.0, sections 9.1.1.5 and 9.4.5). `usb-device`
-/// does not, and then a packet would be lost where the host's data toggle differs.
-///
-/// It must come before the port's own class, which would accept such a request as a rule.
-pub struct DataToggles<C>(pub Buffers<C>);
-
-impl<B: UsbBus, C: Controller> UsbClass<B> for DataToggles<C> {
-    fn control_out(&mut self, transfer: ControlOut<'_, '_, '_, B>) {
-        let request = transfer.request();
-        let begins_anew = |buffer: usize| match (request.recipient, request.request, request.value)
-        {
-            (Recipient::Device, Request::SET_CONFIGURATION, 0 | 1) => true,
-            (Recipient::Interface, Request::SET_INTERFACE, 0) => request.index == DATA_INTERFACE,
-            (Recipient::Endpoint, Request::CLEAR_FEATURE, Request::FEATURE_ENDPOINT_HALT) => {
-                buffer_of((request.index as u8 & 0x8F).into()) == buffer
-            }
-            _ => false,
-        };
-        if request.request_type == RequestType::Standard {
-            for buffer in [FROM_PORT, TO_PORT].into_iter().filter(|buffer| begins_anew(*buffer)) {
-                self.0.begin_anew(buffer);
-            }
-        }
     }
 }

@@ -1,9 +1,9 @@
 //! Drives the RP2040's USB controller as a device with the endpoints of one serial port (data
 //! sheet, section 4.1).
 //!
-//! [`Bus`] is the driver that the crate `usb-device` asks for, `buffers` is what both sides
-//! share, and `endpoints` has what that crate leaves undone. Nothing here panics, waits for the
-//! host, or needs an allocator or a lock: the interrupt handler calls it, or code that masks that
+//! [`Bus`] exchanges packets with the host, `buffers` is what program and controller share, and
+//! `endpoints` has what is done with the buffers besides. Nothing here panics, waits for the host,
+//! or needs an allocator or a lock: the interrupt handler calls it, or code that masks that
 //! handler.
 //!
 //! The driver reaches the chip by the trait [`Controller`] alone, so the tests of the host run
@@ -13,9 +13,9 @@ mod buffers;
 mod bus;
 mod endpoints;
 
-pub use self::buffers::Buffers;
-pub use self::bus::{Bus, PACKET};
-pub use self::endpoints::DataToggles;
+pub use self::buffers::{Buffers, FROM_0, FROM_PORT, TO_0, TO_PORT, buffer_of};
+pub use self::bus::{Bus, Event, NOTICE, PACKET, PacketError};
+pub use self::endpoints::MOST_DATA;
 
 /// The registers of the controller that the driver uses, with the data sheet's names.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
