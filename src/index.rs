@@ -52,6 +52,8 @@ pub trait Index:
     const NONE: Self;
     /// How many bits a number has.
     const BITS: u32;
+    /// Whether memory and code may be spent to save time: on a computer, but not on a board.
+    const HAS_ROOM: bool = cfg!(feature = "threads") && Self::BITS > 16;
 
     /// Makes the number `at`, which must be below 2^[`Index::BITS`]; higher bits are discarded.
     fn new(at: usize) -> Self;

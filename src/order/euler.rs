@@ -7,7 +7,7 @@
 
 use super::incidence::Incidence;
 use super::metric::length;
-use super::neighbours::Neighbours;
+use super::neighbours::{Candidate, Neighbours};
 use super::network::Network;
 use super::remaining::Remaining;
 use super::work_budget::WorkBudget;
@@ -153,7 +153,7 @@ impl<'s, 'a, I: Index> Unused<'s, 'a, I> {
         near: Option<Neighbours<'_, I>>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Option<I>, OrderError> {
-        for station in near.into_iter().flat_map(|near| near.of(pen)) {
+        for Candidate { station, .. } in near.into_iter().flat_map(|near| near.of(pen)) {
             work_budget.work(1)?;
             if self.is_entrance(station) {
                 return Ok(Some(station));

@@ -13,7 +13,7 @@
 use super::cycle::Cycle;
 use super::distances::Distances;
 use super::incidence::Incidence;
-use super::neighbours::Neighbours;
+use super::neighbours::{Candidate, Near, Neighbours};
 use super::network::Network;
 use super::search::StepSearch;
 use super::work_budget::WorkBudget;
@@ -91,6 +91,39 @@ impl<'s, I: Index> Waiting<'s, I> {
     }
 }
 
+/// The stations to which a new move from a station may lead, in the order in which they are tried.
+pub(super) struct Candidates<'s, I> {
+    /// Whether the gap comes first.
+    gap: bool,
+    /// The station itself, if it comes next.
+    own: Option<I>,
+    /// Then the neighbours of the station.
+    pub near: Near<'s, I>,
+    /// The anchor, if it comes last.
+    anchor: Option<I>,
+}
+
+impl<I: Index> Candidates<'_, I> {
+    /// Returns the next of those before the neighbours.
+    #[inline]
+    pub fn first(&mut self) -> Option<Candidate<I>> {
+        if core::mem::take(&mut self.gap) {
+            return Some(Candidate::new(I::NONE));
+        }
+        self.own.take().map(Candidate::new)
+    }
+}
+
+impl<I: Index> Iterator for Candidates<'_, I> {
+    type Item = Candidate<I>;
+
+    #[inline]
+    fn next(&mut self) -> Option<Candidate<I>> {
+        let near = self.first().or_else(|| self.near.next());
+        near.or_else(|| self.anchor.take().map(Candidate::new))
+    }
+}
+
 /// A tour that is being shortened, and the tables that are needed to exchange its pen-up moves.
 pub(super) struct Exchanges<'s, 'a, I: Index> {
     /// The tour, as a cycle of legs that can be turned around and restored.
@@ -105,9 +138,9 @@ pub(super) struct Exchanges<'s, 'a, I: Index> {
     neighbours: Neighbours<'s, I>,
     /// The stations around which an exchange is still to be tried.
     waiting: Waiting<'s, I>,
-    /// The number of the gap among the legs; `None` if the tour is a closed cycle. The gap stands
-    /// for the open side of an open path.
-    gap: Option<I>,
+    /// The number of the gap among the legs; [`Index::NONE`] if the tour is a closed cycle. The gap
+    /// stands for the open side of an open path.
+    gap: I,
     /// The cost of a move besides its length, in 1/256 steps.
     lift_cost: u32,
 }
@@ -138,7 +171,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
             incidence,
             neighbours,
             waiting,
-            gap,
+            gap: gap.unwrap_or(I::NONE),
             lift_cost,
         })
     }
@@ -151,11 +184,12 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
             + Scratch::bytes_for::<[I; 2]>(Cycle::<I>::MEMORY)
             + Scratch::bytes_for::<I>(stations)
             + Scratch::bytes_for::<u8>(stations)
+            + Distances::<I>::bytes(stations)
     }
 
     /// Whether the tour is an open path, which is stored as a cycle with a gap.
     pub fn is_open(&self) -> bool {
-        self.gap.is_some()
+        self.gap != I::NONE
     }
 
     /// Returns the station where a leg ends; [`Index::NONE`] for the gap, whose end is the
@@ -172,7 +206,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
 
     /// Whether `leg` is the gap between the end and the start of an open path.
     pub fn is_gap(&self, leg: Leg<I>) -> bool {
-        self.gap == Some(I::new(leg.segment()))
+        self.gap == I::new(leg.segment())
     }
 
     /// Returns the station where a leg begins; [`Index::NONE`] for the gap.
@@ -203,6 +237,17 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         self.distances.below(bound, from, to).map_or(0, |length| hand - i64::from(length) - 1)
     }
 
+    /// As [`Self::left`], for the move from a station to one of its candidates.
+    #[inline]
+    pub fn left_to(&self, hand: i64, from: I, candidate: Candidate<I>) -> i64 {
+        let Candidate { station, length } = candidate;
+        if I::HAS_ROOM && length != Candidate::<I>::UNKNOWN {
+            (hand - i64::from(self.lift_cost) - i64::from(length) - 1).max(0)
+        } else {
+            self.left(hand, from, station)
+        }
+    }
+
     /// Returns the cost of all moves of the tour.
     pub fn cost(&self) -> u64 {
         (0..self.cycle.len())
@@ -213,6 +258,18 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     /// Returns the cost of the move after `leg`; 0 if `leg` ends where the next leg begins.
     pub fn move_after(&self, leg: Leg<I>) -> i64 {
         self.distance(self.end(leg), self.start(self.cycle.next(leg)))
+    }
+
+    /// Whether the pen is lifted after `leg`, so that [`Self::move_after`] is more than 0.
+    pub fn lifts_after(&self, leg: Leg<I>) -> bool {
+        self.lifts_between(leg, self.cycle.next(leg))
+    }
+
+    /// Whether the pen is lifted between two successive legs.
+    #[inline]
+    pub fn lifts_between(&self, leg: Leg<I>, next: Leg<I>) -> bool {
+        let (from, to) = (self.end(leg), self.start(next));
+        from != I::NONE && to != I::NONE && from != to
     }
 
     /// Tries exchanges around all stations in the queue, until it is empty or the budget is used
@@ -246,7 +303,7 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     ) -> Result<Option<i64>, OrderError> {
         let mut from = self.incidence.first(station);
         while let Some(leg) = from {
-            if self.move_after(leg.flipped()) > 0
+            if self.lifts_after(leg.flipped())
                 && self.cycle.can_turn()
                 && let Some(gain) = self.exchange(leg.flipped(), work_budget)?
             {
@@ -273,6 +330,11 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
             let Some(step) = StepSearch::best_step(self, a, hand, work_budget)? else {
                 break;
             };
+            if I::HAS_ROOM && step.gain == 0 && touched_now + 1 == STEPS {
+                // It would be taken back at once.
+                work_budget.work(1 + self.moved(a, step) as u32 / 32)?;
+                break;
+            }
             touched[touched_now] = self.ends_of(a, step);
             a = self.make(a, step, work_budget)?;
             if step.gain > 0 {
@@ -290,23 +352,45 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     /// Returns the stations to which a new move from `station` may lead: [`Index::NONE`] for the
     /// gap, if `by_gap`, then `station` itself, if several legs begin there, then its neighbours,
     /// and last, if `by_gap`, the anchor.
-    pub fn candidates(&self, station: I, by_gap: bool) -> impl Iterator<Item = I> + use<'s, 'a, I> {
-        let gap = by_gap.then_some(I::NONE).into_iter();
-        let own = self.legs_from(station).nth(1).map(|_| station);
-        let near = gap.chain(own).chain(self.neighbours.of(station));
-        #[cfg(feature = "early-ink")]
-        let near = near.chain(self.network.anchor().filter(|_| by_gap));
-        near
+    #[inline]
+    pub fn candidates(&self, station: I, by_gap: bool) -> Candidates<'s, I> {
+        Candidates {
+            gap: by_gap,
+            own: self.legs_from(station).nth(1).map(|_| station),
+            near: self.neighbours.of(station),
+            anchor: self.network.anchor().filter(|_| by_gap),
+        }
     }
 
     /// Returns the cost of a move from `station` to the nearer end of the path, or a very large
     /// number if the tour is a closed cycle.
     pub fn distance_to_path_ends(&self, station: I) -> i64 {
-        let Some(gap) = self.gap.map(|gap| Leg::new(gap, false)) else {
+        self.to_path_ends(|end| self.distance(end, station))
+    }
+
+    /// Returns a lower bound of that cost with little work on a computer, and the cost itself on a
+    /// board.
+    pub fn least_to_path_ends(&self, station: I) -> i64 {
+        if !I::HAS_ROOM {
+            return self.distance_to_path_ends(station);
+        }
+        self.to_path_ends(|end| {
+            if end == I::NONE || station == I::NONE || end == station {
+                return 0;
+            }
+            i64::from(self.distances.at_least(end, station)) + i64::from(self.lift_cost) + 1
+        })
+    }
+
+    /// Returns the lower of the costs of both ends of the path.
+    #[inline]
+    fn to_path_ends(&self, cost: impl Fn(I) -> i64) -> i64 {
+        if !self.is_open() {
             return i64::MAX;
-        };
+        }
+        let gap = Leg::new(self.gap, false);
         let ends = [gap, gap.flipped()].map_each(|gap| self.start(self.cycle.next(gap)));
-        let [a, b] = ends.map_each(|end| self.distance(end, station));
+        let [a, b] = ends.map_each(cost);
         a.min(b)
     }
 
@@ -319,6 +403,25 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
             pair.copy_from_slice(&[self.end(leg), self.start(self.cycle.next(leg))]);
         }
         ends
+    }
+
+    /// Returns how many legs [`Self::make`] moves in a step of an exchange that cuts the tour after
+    /// `a`.
+    fn moved(&self, a: Leg<I>, step: Step<I>) -> usize {
+        let position = |leg| self.cycle.position(leg);
+        let steps = |from, to| self.cycle.legs_between(from, to);
+        let (a, c) = (position(a), position(step.c));
+        let Some((e, third_onward)) = step.third else {
+            return self.cycle.turned_by(steps(a, c));
+        };
+        let e = position(e);
+        let turns = match (step.onward, third_onward) {
+            (true, true) => [steps(a, e), steps(c, e), steps(a, c)],
+            (true, false) => [steps(a, e), steps(c, e), 0],
+            (false, true) => [steps(a, c), steps(e, c), 0],
+            (false, false) => [steps(a, c), steps(a, e), 0],
+        };
+        turns.into_iter().map(|inner| self.cycle.turned_by(inner)).sum()
     }
 
     /// Makes a step of an exchange that cuts the tour after `a`. Returns the leg after which the
@@ -354,21 +457,26 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
     /// Returns the legs that begin at a station; for [`Index::NONE`], the gap in both directions.
     /// With an anchor, each end of the gap is a station of its own.
     pub fn legs_from(&self, station: I) -> impl Iterator<Item = Leg<I>> + '_ {
-        let first = if station == I::NONE {
-            self.gap.map(|gap| Leg::new(gap, false))
-        } else if self.network.anchor().is_some_and(|anchor| anchor == station) {
-            self.gap.map(|gap| Leg::new(gap, true))
-        } else {
-            self.incidence.first(station)
+        let first = match self.incidence.first_at(station) {
+            Some(first) => first,
+            None => self.gap_from(station),
         };
-        core::iter::successors(first, |&leg| {
-            if self.is_gap(leg) {
-                let is_first = self.network.anchor().is_none() && !leg.reversed();
-                is_first.then(|| leg.flipped())
-            } else {
-                self.incidence.next(leg)
-            }
+        core::iter::successors(first, |&leg| match self.incidence.next_after(leg) {
+            Some(next) => next,
+            None => self.gap_after(leg),
         })
+    }
+
+    /// Returns the direction of the gap that begins at what is no station of the network.
+    fn gap_from(&self, station: I) -> Option<Leg<I>> {
+        self.is_open().then(|| Leg::new(self.gap, station != I::NONE))
+    }
+
+    /// Returns the other direction of the gap, which begins at the same station as `gap` if there
+    /// is no anchor.
+    fn gap_after(&self, gap: Leg<I>) -> Option<Leg<I>> {
+        let is_first = self.network.anchor().is_none() && !gap.reversed();
+        is_first.then(|| gap.flipped())
     }
 
     /// Puts the stations where `legs` end into the queue, so that exchanges are tried around them.

@@ -44,6 +44,18 @@ impl<'s, I: Index> Incidence<'s, I> {
         leg(self.next[after.code().get()])
     }
 
+    /// As [`Incidence::first`], but `None` if `station` is none of the network.
+    #[inline]
+    pub fn first_at(&self, station: I) -> Option<Option<Leg<I>>> {
+        self.first.get(station.get()).map(|&code| leg(code))
+    }
+
+    /// As [`Incidence::next`], but `None` if `after` is no leg of the network.
+    #[inline]
+    pub fn next_after(&self, after: Leg<I>) -> Option<Option<Leg<I>>> {
+        self.next.get(after.code().get()).map(|&code| leg(code))
+    }
+
     /// Removes the first leg from the list of `station`.
     pub fn drop_first(&mut self, station: I) {
         let first = &mut self.first[station.get()];

@@ -83,13 +83,14 @@ fn next_move<I: Index>(
     from: Leg<I>,
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<Option<Leg<I>>, OrderError> {
-    let mut leg = from;
+    let mut leg = tour.cycle.next(from);
     for _ in 0..tour.cycle.len() {
         work_budget.work(1)?;
-        leg = tour.cycle.next(leg);
-        if tour.move_after(leg) > 0 {
+        let next = tour.cycle.next(leg);
+        if tour.lifts_between(leg, next) {
             return Ok(Some(leg));
         }
+        leg = next;
     }
     Ok(None)
 }

@@ -22,6 +22,7 @@ pub fn length(a: PagePoint, b: PagePoint) -> u32 {
 
 /// Returns a lower bound of the distance in 1/256 steps, without a square root: the greater of the
 /// differences in x and in y.
+#[cfg_attr(feature = "threads", inline)]
 pub(super) fn least_length(a: PagePoint, b: PagePoint) -> u32 {
     a.x.abs_diff(b.x).max(a.y.abs_diff(b.y)) << 8
 }

@@ -14,10 +14,50 @@ use crate::stage::Scratch;
 /// For each station the same number of other stations, the nearest first.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neighbours<'a, I> {
-    /// The neighbours of each station in turn; [`Index::NONE`] fills unused entries.
-    stations: &'a [I],
-    /// The number of entries in `stations` for each station.
+    /// The neighbours of each station in turn; [`Index::NONE`] fills unused entries. On a computer,
+    /// the length of the move to it, in 1/256 steps, follows each neighbour.
+    lists: &'a [I],
+    /// The number of neighbours in the list of each station.
     per_station: usize,
+}
+
+/// A station to which a new move may lead.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate<I> {
+    /// The station.
+    pub station: I,
+    /// The length of the move to it, in 1/256 steps; [`Candidate::UNKNOWN`] where it is not stored.
+    pub length: u32,
+}
+
+impl<I: Index> Candidate<I> {
+    /// The length of a move that is still to be computed. No move is so long.
+    pub const UNKNOWN: u32 = u32::MAX;
+
+    /// A station to which the length of a move is not stored.
+    pub fn new(station: I) -> Self {
+        Self { station, length: Self::UNKNOWN }
+    }
+}
+
+/// The neighbours of one station that are still to come, the nearest first.
+pub(super) struct Near<'a, I>(&'a [I]);
+
+impl<I: Index> Iterator for Near<'_, I> {
+    type Item = Candidate<I>;
+
+    #[inline]
+    fn next(&mut self) -> Option<Candidate<I>> {
+        let (candidate, rest) = if I::HAS_ROOM {
+            let (&[station, length], rest) = self.0.split_first_chunk()?;
+            (Candidate { station, length: length.into() }, rest)
+        } else {
+            let (&station, rest) = self.0.split_first()?;
+            (Candidate::new(station), rest)
+        };
+        self.0 = rest;
+        (candidate.station != I::NONE).then_some(candidate)
+    }
 }
 
 impl<'a, I: Index> Neighbours<'a, I> {
@@ -31,21 +71,37 @@ impl<'a, I: Index> Neighbours<'a, I> {
         scratch: &mut Scratch<'a>,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<Self, OrderError> {
-        let stations = scratch.take(network.stations().get() * per_station)?;
-        stations.fill(I::NONE);
+        let entries = Self::entries(per_station);
+        let lists: &mut [I] = scratch.take(network.stations().get() * entries)?;
+        lists.fill(I::NONE);
         let mut lent = scratch.reborrow();
         let count = network.stations();
         let cells = Cells::new(network, count, &|station| station, &mut lent)?;
         let grid = Grid { network, cells };
-        for (station, near) in I::all().zip(stations.chunks_exact_mut(per_station)) {
-            grid.search(station, near, work_budget)?;
+        for (station, list) in I::all().zip(lists.chunks_exact_mut(entries)) {
+            grid.search(station, &mut list[..per_station], work_budget)?;
+            if I::HAS_ROOM {
+                // From the last neighbour on, so that none is overwritten before it is moved.
+                for at in (0..per_station).rev() {
+                    let other = list[at];
+                    let length =
+                        if other == I::NONE { 0 } else { network.distance(station, other) };
+                    list[2 * at] = other;
+                    list[2 * at + 1] = I::new(length as usize);
+                }
+            }
         }
-        Ok(Self { stations, per_station })
+        Ok(Self { lists, per_station })
+    }
+
+    /// Returns the number of entries of the list of each station.
+    const fn entries(per_station: usize) -> usize {
+        if I::HAS_ROOM { 2 * per_station } else { per_station }
     }
 
     /// Returns the scratch memory that the result occupies for this many stations, in bytes.
     pub const fn bytes(stations: usize, per_station: usize) -> usize {
-        Scratch::bytes_for::<I>(stations * per_station)
+        Scratch::bytes_for::<I>(stations * Self::entries(per_station))
     }
 
     /// Returns the further scratch memory that the search needs for this many stations, in bytes.
@@ -54,10 +110,11 @@ impl<'a, I: Index> Neighbours<'a, I> {
     }
 
     /// Returns the neighbours of `station`, the nearest first.
-    pub fn of(&self, station: I) -> impl Iterator<Item = I> + use<'a, I> {
-        let begin = station.get() * self.per_station;
-        let near = self.stations.get(begin..begin + self.per_station).unwrap_or(&[]);
-        near.iter().copied().take_while(|&station| station != I::NONE)
+    #[inline]
+    pub fn of(&self, station: I) -> Near<'a, I> {
+        let entries = Self::entries(self.per_station);
+        let begin = station.get() * entries;
+        Near(self.lists.get(begin..begin + entries).unwrap_or(&[]))
     }
 }
 

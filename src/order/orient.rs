@@ -35,7 +35,6 @@ pub(super) fn orient<I: Index>(
         if strokes == 0 {
             first_start = start;
         } else {
-            old += tour.distance(ends[0], start);
             let reach = |to| {
                 [0, 1].map_each(|direction| least[direction] + tour.distance(ends[direction], to))
             };
@@ -43,6 +42,8 @@ pub(super) fn orient<I: Index>(
             choices[strokes] =
                 u8::from(unchanged[1] < unchanged[0]) | u8::from(reversed[1] < reversed[0]) << 1;
             least = [unchanged, reversed].map_each(|[a, b]| a.min(b));
+            // Last, so that the distance that is kept with `start` is that of a move of the tour.
+            old += tour.distance(ends[0], start);
         }
         ends = [end, start];
         strokes += 1;
@@ -83,7 +84,7 @@ impl<I: Index> Exchanges<'_, '_, I> {
     /// its start.
     fn first_of_a_stroke(&self) -> Option<Leg<I>> {
         let legs = || (0..self.cycle.len()).map(|index| self.cycle.leg(index));
-        let begins = |leg: &Leg<I>| self.move_after(self.cycle.previous(*leg)) > 0;
+        let begins = |leg: &Leg<I>| self.lifts_after(self.cycle.previous(*leg));
         legs().find(|&leg| self.is_gap(leg)).or_else(|| legs().find(begins))
     }
 
@@ -91,9 +92,9 @@ impl<I: Index> Exchanges<'_, '_, I> {
     /// a stroke by itself, and a stroke ends before `begin`.
     fn last_of_stroke(&self, leg: Leg<I>, begin: Leg<I>) -> Leg<I> {
         let mut last = leg;
-        while !self.is_gap(last) && self.move_after(last) == 0 {
+        while !self.is_gap(last) {
             let next = self.cycle.next(last);
-            if self.is_gap(next) || next == begin {
+            if self.lifts_between(last, next) || self.is_gap(next) || next == begin {
                 break;
             }
             last = next;

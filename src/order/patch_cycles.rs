@@ -5,7 +5,7 @@
 //! this is approximated by an allowance that doubles from round to round (after Karp, "A patching
 //! algorithm for the nonsymmetric traveling-salesman problem", 1979).
 
-use super::neighbours::Neighbours;
+use super::neighbours::{Candidate, Neighbours};
 use super::network::Network;
 use super::partition::Partition;
 use super::work_budget::WorkBudget;
@@ -41,7 +41,7 @@ pub(super) fn patch_cycles<I: Index>(
     let mut apart = true;
     while core::mem::take(&mut apart) {
         for a in I::below(network.stations()) {
-            for c in near.of(a) {
+            for Candidate { station: c, .. } in near.of(a) {
                 let (b, d) = (mate[a.get()], mate[c.get()]);
                 work_budget.work(1)?;
                 if !is_move(b) || !is_move(d) || parts.find(a) == parts.find(c) {

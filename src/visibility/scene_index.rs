@@ -97,7 +97,7 @@ impl<'a, I: Index> SceneIndex<'a, I> {
 impl<I: Index> SceneIndex<'_, I> {
     /// Whether `bounds` and what follows it are filled, with which most questions about a face are
     /// answered without a look at its corners. On a board their memory is worth more as cells.
-    pub const HAS_SHORTCUTS: bool = cfg!(feature = "threads") && I::BITS > 16;
+    pub const HAS_SHORTCUTS: bool = I::HAS_ROOM;
 
     /// Returns the bytes that `bounds` and what follows it take.
     pub const fn bytes_of_shortcuts(corners: usize, faces: usize) -> usize {
