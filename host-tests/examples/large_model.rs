@@ -56,6 +56,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let heard = line.status()?;
         if heard.starts_with("[MSG:") {
             println!("{heard}");
+            refuse_restart(&heard)?;
         } else if heard == "ok" {
             break;
         } else if heard.starts_with("error") {
@@ -71,9 +72,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         let status = line.status()?;
         if status.starts_with("[MSG:") {
             println!("{status}");
-            if status.starts_with("[MSG:started again") {
-                return Err("the board was started again while it drew".into());
-            }
+            refuse_restart(&status)?;
             continue;
         }
         if let Some((_, rest)) = status.split_once("|Late:") {
@@ -113,6 +112,15 @@ fn main() -> Result<(), Box<dyn Error>> {
     lines.push("$plot".to_owned());
     assert_same_as_on_the_host(&PICO, &lines, &events);
     println!("each step and each move of the pen is that of the host");
+    Ok(())
+}
+
+/// Fails if the board says that it was started again: it then draws nothing more, and would be
+/// waited for without end.
+fn refuse_restart(message: &str) -> Result<(), Box<dyn Error>> {
+    if message.starts_with("[MSG:started again") {
+        return Err("the board was started again while it drew".into());
+    }
     Ok(())
 }
 
