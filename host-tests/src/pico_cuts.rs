@@ -49,6 +49,13 @@ pub struct Job {
     pub only_ink: bool,
 }
 
+impl Counts {
+    /// How often the board was stopped.
+    pub fn cuts(&self) -> u32 {
+        self.instants + self.in_flash + self.resets
+    }
+}
+
 impl Job {
     /// Draws the job on the host.
     ///
@@ -96,7 +103,7 @@ impl CutPico {
         Ok(Self { line, reads: 1, counts: Counts::default() })
     }
 
-    /// What has been done to the board.
+    /// What has been done to the board since its start.
     pub fn counts(&self) -> Counts {
         Counts { garbled: self.line.emulator.garbled(), ..self.counts }
     }
@@ -148,7 +155,8 @@ impl CutPico {
                 plot.as_str()
             };
             self.line.emulator.pin_changes()?;
-            let cut = (number < cuts).then(|| some_cut(job, cuts, random));
+            let writes_job = !stopped;
+            let cut = (number < cuts).then(|| some_cut(job, cuts, writes_job, random));
             stopped = self.run(trigger, cut, random)?;
             runs.push(strokes_of(self.line.emulator.pin_changes()?));
         }
@@ -237,9 +245,10 @@ impl CutPico {
     }
 }
 
-/// A cut, most of which leave enough for the rest.
-fn some_cut(job: &Job, cuts: u32, random: &mut Random) -> PowerCut {
-    let share = 2 * job.time / (cuts + 1);
+/// A cut. All `cuts` together, each of which may be the last moment of its share of the job, leave
+/// a share for the rest, so each of them happens.
+fn some_cut(job: &Job, cuts: u32, writes_job: bool, random: &mut Random) -> PowerCut {
+    let share = job.time / (cuts + 1);
     let after = SOONEST + Duration::from_micros(random.below(share.as_micros() as u64 + 1));
     match random.below(5) {
         0 | 1 => PowerCut::At(after),
@@ -247,8 +256,8 @@ fn some_cut(job: &Job, cuts: u32, random: &mut Random) -> PowerCut {
         _ => {
             let strokes = job.whole.len() as u64;
             // Saving a small job erases two sectors and writes some pages; each stroke writes one.
-            let most = 256 * (2 * strokes / (u64::from(cuts) + 1) + 40);
-            PowerCut::InFlash(random.below(most))
+            let saving = if writes_job { 40 } else { 1 };
+            PowerCut::InFlash(random.below(256 * (strokes / (u64::from(cuts) + 1) + saving)))
         }
     }
 }

@@ -76,7 +76,7 @@ fn one_stroke() -> Vec<String> {
 
 /// A job of half an hour that is cut ten times.
 #[test]
-#[ignore = "`cargo xtask power-soak --long` runs it for most of an hour"]
+#[ignore = "`cargo xtask power-soak --long` runs it for some 20 minutes"]
 fn a_job_of_half_an_hour_is_whole_after_ten_cuts() -> TestResult {
     let seed = wish("PENUP_SEED", 1);
     let job = job("lattice4.obj", &["$page=200x200", "$margin=3", "$201=150", "$202=400"]);
@@ -88,5 +88,6 @@ fn a_job_of_half_an_hour_is_whole_after_ten_cuts() -> TestResult {
         .draw(&job, 10, &mut Random::new(seed))
         .map_err(|error| format!("seed {seed}: {error}"))?;
     println!("{:?} in {:?}", board.counts(), begun.elapsed());
+    assert_eq!(board.counts().cuts(), 10);
     Ok(())
 }
