@@ -365,3 +365,78 @@ fn a_kept_setting_that_is_refused_is_told_and_the_others_stay() {
     });
     switch_on(flash, |plotter| assert!(!plotter.heard().contains("$215")));
 }
+
+/// What G10, G28.1 and G30.1 set counts once the machine has stopped. A line that is broken off
+/// before has set nothing.
+#[test]
+fn a_parameter_whose_line_is_broken_off_stays_as_it_was() {
+    for line in ["G10 L20 P1 X0 Y0", "G10 L2 P2 X3", "G28.1", "G30.1"] {
+        for stop in [0xFD, 0x18] {
+            let mut bench = Bench::small();
+            let before = bench.say("$#\n");
+            bench.board.receive(format!("G1 X15 Y2 F600\n{line}\n").as_bytes());
+            bench.work(300);
+            send(&mut bench, &[stop]);
+            bench.finish();
+            bench.say("$X\n");
+            assert_eq!(bench.say("$#\n"), before, "{line} {stop:#x}");
+        }
+        // Left alone, it sets what it says.
+        let mut bench = Bench::small();
+        let before = bench.say("$#\n");
+        assert_eq!(bench.say(&format!("G1 X15 Y2 F600\n{line}\n")), "ok\n");
+        bench.finish();
+        assert_eq!(bench.heard(), "ok\n", "{line}");
+        assert_ne!(bench.say("$#\n"), before, "{line}");
+    }
+}
+
+/// X and Y beside a word for motors or fans are no place to go to.
+#[test]
+fn words_for_other_machines_move_nothing() {
+    let mut bench = Bench::small();
+    bench.say("G1 X10 Y10 F3000\n");
+    bench.finish();
+    bench.heard();
+    for line in ["M84 X0 Y0", "M18 X3", "M106 S255 X4", "M400 X6", "M17 Z5"] {
+        assert_eq!(bench.say(&format!("{line}\n")), "ok\n", "{line}");
+        bench.finish();
+        assert_eq!(status(&mut bench), "<Idle|MPos:10.000,10.000,0.000", "{line}");
+    }
+}
+
+/// M0, M2, M6 and M30 come behind the move or the dot of their line.
+#[test]
+fn the_end_of_a_program_comes_behind_the_move_of_its_line() {
+    let strokes = |bench: &mut Bench| {
+        let report = send(bench, b"?");
+        report.split('|').find(|field| field.starts_with("Strokes:")).unwrap_or("").to_owned()
+    };
+    for end in ["M2", "M30", "M0", "M6"] {
+        let mut bench = Bench::small();
+        bench.board.receive(format!("M3\nM5 {end}\n").as_bytes());
+        bench.finish();
+        send(&mut bench, b"~");
+        bench.finish();
+        assert_eq!(strokes(&mut bench), "Strokes:1/1", "{end}");
+        bench.board.receive(format!("G0 X10 Y5 {end}\n").as_bytes());
+        bench.finish();
+        let is_pause = end == "M0" || end == "M6";
+        let expected = if is_pause { "<Hold:0" } else { "<Idle" };
+        assert_eq!(status(&mut bench), format!("{expected}|MPos:10.000,5.000,0.000"), "{end}");
+    }
+}
+
+/// Nothing moves in check mode, and no coordinate stays of it.
+#[test]
+fn z_is_after_a_check_what_it_was_before() {
+    let mut bench = Bench::small();
+    bench.say("G0 X1 Z3\n");
+    bench.finish();
+    assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,3.000");
+    bench.say("$C\nG1 X5 Z-5 F600\n$C\n");
+    assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,3.000");
+    bench.say("$C\nG0 Z-7\n");
+    send(&mut bench, &[0x18]);
+    assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,3.000");
+}

@@ -160,6 +160,11 @@ impl<I: Index> Inner<'_, I> {
             Command::Check => {
                 let is_over = self.machine.state() == State::Check;
                 self.machine.check(!is_over).map_err(|_| CommandError::Busy)?;
+                if is_over {
+                    self.program = self.program.with_z(self.z_before_check);
+                } else {
+                    self.z_before_check = self.program.z();
+                }
                 let text = if is_over { "Disabled" } else { "Enabled" };
                 Reply(board).line(format_args!("[MSG:{text}]"));
                 if is_over {

@@ -214,12 +214,11 @@ impl<I: Index> Inner<'_, I> {
         let job = self.begin_job_while_travelling(listener)?;
         if !self.begins_early(job) {
             self.job = job.ordered(self.words, listener)?;
-            Self::make_room(listener, records::flash_bytes(&self.job))?;
-            let is_kept = self.save(listener.board);
-            self.begin(listener)?;
-            if is_kept {
-                self.keep_model(listener.board);
+            if self.machine.state() == State::Idle {
+                Self::make_room(listener, records::flash_bytes(&self.job))?;
             }
+            self.begin(listener)?;
+            self.keep_begun(listener.board);
             return Ok(());
         }
         let measured = self.begin_first(job, listener)?;
@@ -269,13 +268,6 @@ impl<I: Index> Inner<'_, I> {
     ) -> Result<Job<I>, CommandError> {
         self.forget_job();
         self.pipeline(cancel, observer).begin()
-    }
-
-    /// Begins to keep how far the job comes, which was computed from the model.
-    #[inline(never)] // Keeps its frame off the stack while the order is computed.
-    fn keep_model<B: Board>(&mut self, board: &mut B) {
-        let contents = [self.model.checksum(), self.options.checksum()];
-        self.keep_progress(Some(contents), board);
     }
 
     /// Whether the machine begins with the first strokes of a job, of which only the drawing is

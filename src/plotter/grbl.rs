@@ -4,9 +4,11 @@
 #[cfg(feature = "early-ink")]
 use super::plot::ANSWER_MICROSECONDS;
 use super::program::{
-    MachineAction, MachinePosition, Parameters, Program, StoredPosition, TEXT_LIMIT, Text,
+    MachineAction, MachinePosition, Parameter, Parameters, Program, StoredPosition, TEXT_LIMIT,
+    Text,
 };
 use super::reply::Reply;
+#[cfg(feature = "early-ink")]
 use super::stream::Task;
 use super::{Board, Inner, records};
 use crate::array::MapEach;
@@ -225,9 +227,9 @@ impl<I: Index> Inner<'_, I> {
     /// The program after a startup line, which may only set modes.
     fn after_startup_line(&self, line: GCode<'_>) -> Result<Program, CommandError> {
         let program = self.program.at(&self.machine, false);
-        let (program, action) = program.after(line, &self.context())?;
-        match action {
-            MachineAction::Nothing => Ok(program),
+        let (program, action, flow) = program.after(line, &self.context())?;
+        match (action, flow) {
+            (MachineAction::Nothing, None) => Ok(program),
             _ => Err(BlockError::NotAtStart.into()),
         }
     }
@@ -259,31 +261,29 @@ impl<I: Index> Inner<'_, I> {
         let _ = self.program.end(self.machine.settings());
     }
 
-    /// Sets the origin of a coordinate system, which is kept once the machine is at rest.
-    pub(super) fn set_system(&mut self, index: usize, origin: MachinePosition) {
-        if let Some(system) = self.parameters.systems.get_mut(index) {
-            *system = origin;
-        }
-        self.report_counts.origin = 0;
-        self.task = Some(Task::Keep { settings: false });
-    }
-
-    /// Sets the position of G28 or G30, which is kept once the machine is at rest.
+    /// Sets and keeps a parameter.
     ///
     /// # Errors
-    /// [`CommandError::Setting`] for a position of G28 that the settings do not hold.
-    pub(super) fn keep_position(
+    /// [`CommandError::Setting`] for a position of G28 that the settings do not hold, or
+    /// [`CommandError::NotStored`].
+    pub(super) fn set_parameter<B: Board>(
         &mut self,
-        kept: StoredPosition,
+        parameter: Parameter,
         position: MachinePosition,
+        board: &mut B,
     ) -> Result<(), CommandError> {
         let [x, y, _] = position;
-        match kept {
-            StoredPosition::Park => self.machine.set_park([x, y])?,
-            StoredPosition::Second => self.parameters.second = position,
+        match parameter {
+            Parameter::System(index) => {
+                if let Some(system) = self.parameters.systems.get_mut(index) {
+                    *system = position;
+                }
+                self.report_counts.origin = 0;
+            }
+            Parameter::Stored(StoredPosition::Park) => self.machine.set_park([x, y])?,
+            Parameter::Stored(StoredPosition::Second) => self.parameters.second = position,
         }
-        self.task = Some(Task::Keep { settings: kept == StoredPosition::Park });
-        Ok(())
+        self.keep(parameter == Parameter::Stored(StoredPosition::Park), board)
     }
 
     /// Keeps the parameters, or the settings if `settings`.

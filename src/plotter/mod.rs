@@ -50,6 +50,7 @@ pub use options::{
 
 #[cfg(any(test, feature = "host"))]
 use crate::drawing::Drawing;
+use crate::fixed::Millimetres;
 use crate::index::Index;
 use crate::machine::{Alarm, Machine, PulserState, Settings, State};
 use crate::model::Model;
@@ -168,6 +169,8 @@ struct Inner<'m, I> {
     parts: stored::Parts<I>,
     /// The modes that lines of G-code have set.
     program: Program,
+    /// Z of the program when the check mode (`$C`) began, which moves nothing.
+    z_before_check: Millimetres,
     /// What is kept when a program ends.
     parameters: Parameters,
     /// What is known of a job that can be resumed.
@@ -238,6 +241,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 #[cfg(feature = "tiles")]
                 parts: stored::Parts::default(),
                 program: Program::default(),
+                z_before_check: Millimetres::ZERO,
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
                 busy_at: 0,

@@ -66,12 +66,8 @@ impl<I: Index> Inner<'_, I> {
             Drawing::Model => self.plot_model(&mut listener),
             #[cfg(not(feature = "early-ink"))]
             Drawing::Model => self.compute(&mut listener, &mut Unobserved).and_then(|()| {
-                let is_kept = self.save(listener.board);
                 self.begin(&mut listener)?;
-                if is_kept {
-                    let contents = [self.model.checksum(), self.options.checksum()];
-                    self.keep_progress(Some(contents), listener.board);
-                }
+                self.keep_begun(listener.board);
                 Ok(())
             }),
             Drawing::LastJob => self.load(listener.board).and_then(|()| {
@@ -167,6 +163,22 @@ impl<I: Index> Inner<'_, I> {
             }
         }
         listener.check()
+    }
+
+    /// Keeps the job of `$plot` that has begun, and how far it comes, before anything moves. A job
+    /// that is refused or only checked (`$C`) does not replace the one that is kept.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    pub(super) fn keep_begun<B: Board>(&mut self, board: &mut B) {
+        if self.machine.state() == State::Run && self.save(board) {
+            self.keep_model(board);
+        }
+    }
+
+    /// Begins to keep how far the job comes, which was computed from the model.
+    #[inline(never)] // Keeps its frame off the stack while the order is computed.
+    pub(super) fn keep_model<B: Board>(&mut self, board: &mut B) {
+        let contents = [self.model.checksum(), self.options.checksum()];
+        self.keep_progress(Some(contents), board);
     }
 
     /// Writes the job to flash before anything moves, because flash cannot be read during the

@@ -220,6 +220,9 @@ impl<I: Index> Inner<'_, I> {
     /// Forgets the modes of G-code and the overrides, and leaves check mode and sleep.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn reset(&mut self) {
+        if self.machine.state() == State::Check {
+            self.program = self.program.with_z(self.z_before_check);
+        }
         self.program = self.program.reset();
         self.report_counts = ReportCounts::default();
         self.machine.set_override(100);

@@ -5,7 +5,7 @@
 //! reports alarms.
 
 use super::overrides::OverrideChange;
-use super::program::{Context, MachineAction, Program};
+use super::program::{Context, Flow, MachineAction, MachinePosition, Parameter, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::{BinaryFraction, decimals_of};
@@ -32,12 +32,9 @@ pub(super) enum Task {
     },
     /// A move with the pen up, behind another one.
     Go(PagePoint),
-    /// Waits until the machine has stopped, then keeps the parameters, or the settings if
-    /// `settings`.
-    Keep {
-        /// Whether the settings have changed.
-        settings: bool,
-    },
+    /// Waits until the machine has stopped, then sets and keeps a parameter. What ends the line
+    /// before, such as ctrl-X, leaves the parameter as it is.
+    Keep(Parameter, MachinePosition),
     /// Keeps the parameters, a moment after the settings were kept.
     #[cfg(feature = "early-ink")]
     Restore {
@@ -222,9 +219,9 @@ impl<I: Index> Inner<'_, I> {
                 machine.draw_to(Target { point: *point, ink: None }, None)?;
                 Ok(Progress::Done(Ok(())))
             }
-            Some(Task::Keep { settings }) if may_keep => {
-                let settings = *settings;
-                Ok(Progress::Done(self.keep(settings, board)))
+            Some(Task::Keep(parameter, position)) if may_keep => {
+                let (parameter, position) = (*parameter, *position);
+                Ok(Progress::Done(self.set_parameter(parameter, position, board)))
             }
             Some(Task::Home) if is_stopped => {
                 self.resumption.find_position();
@@ -324,13 +321,12 @@ impl<I: Index> Inner<'_, I> {
             State::Jog => return Err(CommandError::Jogging),
             state => state == State::Check,
         };
-        let (program, action) =
+        let (program, action, flow) =
             self.program.at(&self.machine, checking).after(line, &self.context())?;
-        let is_end = matches!(action, MachineAction::End);
         let machine = &mut self.machine;
         let waits = !checking;
         match action {
-            MachineAction::Nothing | MachineAction::End => {}
+            MachineAction::Nothing => {}
             MachineAction::Line(point) => machine.draw_to(program.target(point), program.feed())?,
             MachineAction::Arc(arc) => {
                 let (least, most) = arc.bounds();
@@ -353,18 +349,24 @@ impl<I: Index> Inner<'_, I> {
                 let ticks = (u64::from(units) * u64::from(TICKS_PER_SECOND)) >> 16;
                 self.task = Some(Task::Dwell(ticks));
             }
-            MachineAction::Pause { for_pen } if waits => self.task = Some(Task::Pause { for_pen }),
-            MachineAction::Dwell(_) | MachineAction::Pause { .. } => {}
-            MachineAction::SetSystem(index, origin) => self.set_system(index, origin),
-            MachineAction::StorePosition(kept, position) => self.keep_position(kept, position)?,
+            MachineAction::Dwell(_) => {}
+            MachineAction::Set(parameter, position) => {
+                self.task = Some(Task::Keep(parameter, position));
+            }
             MachineAction::Position => self.report_position(board),
         }
         self.note_shift(&program);
         self.program = program;
-        if is_end {
-            self.end_program(board);
-            self.program.forget_pen();
-            Reply(board).line(format_args!("[MSG:Pgm End]"));
+        match flow {
+            None => {}
+            Some(Flow::Pause) if waits => self.task = Some(Task::Pause { for_pen: false }),
+            Some(Flow::ChangePen) if waits => self.task = Some(Task::Pause { for_pen: true }),
+            Some(Flow::Pause | Flow::ChangePen) => {}
+            Some(Flow::End) => {
+                self.end_program(board);
+                self.program.forget_pen();
+                Reply(board).line(format_args!("[MSG:Pgm End]"));
+            }
         }
         Ok(())
     }

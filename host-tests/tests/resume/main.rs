@@ -2,6 +2,7 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod refused;
 mod within_strokes;
 
 use penup::boards::host::{CutFlash, LAYOUT};

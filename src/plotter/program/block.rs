@@ -44,7 +44,7 @@ pub(in crate::plotter) enum StoredPosition {
 
 /// How a line ends the program or interrupts it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Flow {
+pub(in crate::plotter) enum Flow {
     /// M0.
     Pause,
     /// M6.
@@ -146,7 +146,7 @@ impl Block {
                 _ => block.take_number(letter, number)?,
             }
         }
-        if block.axis_use == AxisUse::None && block.has_any(b"XYZ") {
+        if block.axis_use == AxisUse::None && block.has_any(b"XYZ") && !block.takes_all {
             block.axis_use = AxisUse::Motion;
         }
         Ok(block)

@@ -1,7 +1,9 @@
 //! Coordinate systems, shifts and kept positions: G10, G28, G30, G43.1, G53 and G92.
 
 use super::block::{Action, Block, StoredPosition};
-use super::{Context, MachineAction, MachinePosition, Motion, Parameters, Program, steps_at};
+use super::{
+    Context, MachineAction, MachinePosition, Motion, Parameter, Parameters, Program, steps_at,
+};
 use crate::array::MapEach;
 use crate::fixed::{Decimal, Millimetres};
 use crate::protocol::{BlockError, CommandError};
@@ -42,7 +44,7 @@ impl Program {
                 if block.has_any(b"XYZ") {
                     return Err(BlockError::AxisConflict.into());
                 }
-                MachineAction::StorePosition(kept, self.at)
+                MachineAction::Set(Parameter::Stored(kept), self.at)
             }
             Action::GoToStored(kept) => {
                 let to = match kept {
@@ -112,7 +114,7 @@ impl Program {
             }
             _ => return Err(CommandError::UnsupportedWord(b'L')),
         }
-        Ok(MachineAction::SetSystem(index, origin))
+        Ok(MachineAction::Set(Parameter::System(index), origin))
     }
 
     /// The shift with which the present position, less the origin `from`, has the coordinates of

@@ -6,10 +6,15 @@ use super::{Motion, Program, clamped};
 use crate::fixed::Millimetres;
 use crate::protocol::{BlockError, CommandError};
 
+/// Stands for F where none has been given: the greatest number, because without F a move is as fast
+/// as the settings allow. An F of 0 is another thing: no move can have it.
+pub(super) const NO_FEED: Millimetres = Millimetres::MAX;
+
 impl Program {
-    /// The bound of the speed of the present move in mm/min, if there is one.
+    /// The bound of the speed of the present move in mm/min, if there is one. It may be 0, which
+    /// the machine refuses.
     pub(in crate::plotter) fn feed(&self) -> Option<Millimetres> {
-        Some(self.move_feed).filter(|feed| *feed > 0)
+        Some(self.move_feed).filter(|feed| *feed != NO_FEED)
     }
 
     /// Sets the speed of the line, and the units that it is given in.
@@ -29,15 +34,15 @@ impl Program {
             // A speed beyond the range of numbers is beyond every limit, too.
             self.feed = self.length(feed).unwrap_or(Millimetres::MAX);
         } else if was_inverse {
-            self.feed = Millimetres::ZERO;
+            self.feed = NO_FEED;
         }
         self.move_feed = self.feed;
         Ok(())
     }
 }
 
-/// The speed of a straight move in mm/min, where `feed` is one divided by its minutes; 0 if it has
-/// no length.
+/// The speed of a straight move in mm/min, where `feed` is one divided by its minutes; [`NO_FEED`]
+/// if the move has no length.
 pub(super) fn inverse_feed(
     from: [Millimetres; 2],
     to: [Millimetres; 2],
@@ -49,7 +54,7 @@ pub(super) fn inverse_feed(
     };
     let length = 2 * (half(0) * half(0) + half(1) * half(1)).isqrt();
     if length == 0 {
-        return Millimetres::ZERO;
+        return NO_FEED;
     }
     let bits = (u128::from(length) * u128::from(feed.to_bits().unsigned_abs())) >> 16;
     Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX).max(1))

@@ -12,7 +12,7 @@ mod feed;
 mod parameters;
 mod pen;
 
-pub(super) use block::StoredPosition;
+pub(super) use block::{Flow, StoredPosition};
 pub(super) use parameters::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
 
 use crate::drawing::{PAGE_LIMIT, PagePoint, StepsPerMillimetre};
@@ -20,8 +20,8 @@ use crate::fixed::{Decimal, Millimetres, divide_rounding, product};
 use crate::machine::{Machine, Settings};
 use crate::protocol::{BlockError, CommandError, GCode};
 use crate::step::{Arc, Turn};
-use block::{Action, AxisUse, Block, Flow};
-use feed::inverse_feed;
+use block::{Action, AxisUse, Block};
+use feed::{NO_FEED, inverse_feed};
 use pen::PenRule;
 
 /// A position of the machine, in millimetres from the page's origin. Z is only counted: the pen has
@@ -54,9 +54,9 @@ pub(super) struct Program {
     pub(super) draws: bool,
     /// S.
     speed: Millimetres,
-    /// F in mm/min, 0 if none is set.
+    /// F in mm/min, [`NO_FEED`] if none is set.
     feed: Millimetres,
-    /// F of the current move in mm/min, 0 if none is set.
+    /// F of the current move in mm/min, [`NO_FEED`] if none is set.
     move_feed: Millimetres,
     /// The end of the last move, as the lines give it.
     at: MachinePosition,
@@ -121,21 +121,21 @@ pub(super) enum MachineAction {
     Lower,
     /// A dwell, in units of 2^-16 s.
     Dwell(u32),
-    /// A pause until the user resumes, to change the pen if `for_pen`.
-    Pause {
-        /// Whether the pen is to be changed.
-        for_pen: bool,
-    },
     /// Moves with the pen up, first to the one position and then to the other.
     Go([PagePoint; 2]),
-    /// A coordinate system gets a new origin.
-    SetSystem(usize, MachinePosition),
-    /// A position is kept.
-    StorePosition(StoredPosition, MachinePosition),
-    /// The program ends.
-    End,
+    /// A parameter is set once the machine has stopped.
+    Set(Parameter, MachinePosition),
     /// The position is reported.
     Position,
+}
+
+/// A position that a line of G-code sets and the plotter keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Parameter {
+    /// The origin of the coordinate system with this index (G10).
+    System(usize),
+    /// The position of G28 or G30.
+    Stored(StoredPosition),
 }
 
 /// The state outside the program that its interpreter needs.
@@ -165,8 +165,8 @@ impl Default for Program {
             tool: 0,
             draws: false,
             speed: Millimetres::ZERO,
-            feed: Millimetres::ZERO,
-            move_feed: Millimetres::ZERO,
+            feed: NO_FEED,
+            move_feed: NO_FEED,
             at: [Millimetres::ZERO; 3],
             shift: [Millimetres::ZERO; 3],
             tool_length: Millimetres::ZERO,
@@ -194,12 +194,19 @@ impl Program {
         Self { at: [Millimetres::ZERO, Millimetres::ZERO, z], ..Self::default() }
     }
 
+    /// The program with another Z of the machine.
+    pub(super) fn with_z(self, z: Millimetres) -> Self {
+        let [x, y, _] = self.at;
+        Self { at: [x, y, z], ..self }
+    }
+
     /// Z of the machine, in millimetres.
     pub(super) fn z(&self) -> Millimetres {
         self.at[2]
     }
 
-    /// The program after `line`, and the action of that line.
+    /// The program after `line`, the action of that line, and behind it what M0, M2, M6 or M30
+    /// order: only a straight move or a dot may come before.
     ///
     /// # Errors
     /// [`CommandError::UnsupportedWord`] for a word that is not known, [`CommandError::Block`] for
@@ -210,7 +217,7 @@ impl Program {
         mut self,
         line: GCode<'_>,
         context: &Context<'_>,
-    ) -> Result<(Self, MachineAction), CommandError> {
+    ) -> Result<(Self, MachineAction, Option<Flow>), CommandError> {
         let block = Block::read(line)?;
         let settings = context.settings;
         let rule = PenRule::of(settings);
@@ -222,13 +229,16 @@ impl Program {
         self.take_z(&block, settings)?;
         let is_motion =
             block.axis_use == AxisUse::Motion && matches!(action, MachineAction::Nothing);
-        if self.motion == Motion::None && block.has_any(b"XYZ") {
+        if self.motion == Motion::None && block.axis_use != AxisUse::None && block.has_any(b"XYZ") {
             return Err(BlockError::AxisAfterCancel.into());
         }
         if is_motion && !(block.has_any(b"XYZ") || matches!(self.motion, Motion::Arc(_))) {
             // G0 or G1 alone only sets the mode.
         } else if is_motion {
             action = self.motion(&block, context, rule)?;
+        } else if block.axis_use == AxisUse::Motion && block.has_any(b"XYZ") {
+            // Beside a dwell or a report of the position.
+            return Err(BlockError::AxisConflict.into());
         } else {
             self.check_used(&block)?;
         }
@@ -243,16 +253,17 @@ impl Program {
                 action = MachineAction::Lower;
             }
         }
-        match block.flow {
-            None => {}
-            Some(flow) => {
-                if !matches!(action, MachineAction::Nothing | MachineAction::Lower) {
-                    return Err(BlockError::AxisConflict.into());
-                }
-                action = self.flow(flow);
-            }
+        let is_short = matches!(
+            action,
+            MachineAction::Nothing | MachineAction::Lower | MachineAction::Line(_)
+        );
+        if block.flow.is_some() && !is_short {
+            return Err(BlockError::AxisConflict.into());
         }
-        Ok((self, action))
+        if block.flow == Some(Flow::End) {
+            self.end_modes();
+        }
+        Ok((self, action, block.flow))
     }
 
     /// The program after a jog, whose modes are for itself, and the position to go to.
@@ -359,7 +370,7 @@ impl Program {
             self.move_feed = inverse_feed([from_x, from_y], [x, y], self.feed);
         }
         if self.motion == Motion::Rapid {
-            self.move_feed = Millimetres::ZERO;
+            self.move_feed = NO_FEED;
         }
         self.at = [x, y, z];
         if !block.has_any(b"XY") && block.action != Action::Machine {
@@ -388,21 +399,14 @@ impl Program {
         })
     }
 
-    /// The action of M0, M2, M6 or M30.
-    fn flow(&mut self, flow: Flow) -> MachineAction {
-        match flow {
-            Flow::Pause => MachineAction::Pause { for_pen: false },
-            Flow::ChangePen => MachineAction::Pause { for_pen: true },
-            Flow::End => {
-                self.motion = Motion::Line;
-                self.plane = Plane(0);
-                self.relative = false;
-                self.inverse_time = false;
-                self.system = 0;
-                self.coolant = [false; 2];
-                MachineAction::End
-            }
-        }
+    /// Sets the modes that M2 and M30 leave.
+    fn end_modes(&mut self) {
+        self.motion = Motion::Line;
+        self.plane = Plane(0);
+        self.relative = false;
+        self.inverse_time = false;
+        self.system = 0;
+        self.coolant = [false; 2];
     }
 
     /// The coordinate of a letter, in millimetres.
@@ -431,9 +435,10 @@ impl Program {
         (modes, self.spindle, self.coolant)
     }
 
-    /// T, F in mm/min or 1/min, and S.
+    /// T, F in mm/min or 1/min, and S. F is 0 if none is set, as Grbl reports it.
     pub(super) fn numbers(&self) -> (u8, Millimetres, Millimetres) {
-        (self.tool, self.feed, self.speed)
+        let feed = if self.feed == NO_FEED { Millimetres::ZERO } else { self.feed };
+        (self.tool, feed, self.speed)
     }
 
     /// S as a status report has it: 0 while M5 is in force.

@@ -157,8 +157,12 @@ impl<I: Index> Inner<'_, I> {
         contents: Option<[u32; 2]>,
         board: &mut B,
     ) {
+        // A job that is only checked (`$C`) replaces no job that has stopped.
+        if self.machine.state() != State::Run {
+            return;
+        }
         self.resumption = Resumption::default();
-        if self.machine.state() != State::Run || !board.keeps_progress() {
+        if !board.keeps_progress() {
             return;
         }
         let strokes = self.machine.status().job.strokes;

@@ -27,8 +27,8 @@ pub(super) fn explain_block(refusal: &BlockError, row: Row<'_>) {
             format_args!("there is no such {}: its number is whole", letter(*word)),
         ),
         BlockError::AxisConflict => row(
-            error(24, "two words that use X, Y and Z"),
-            format_args!("two words of the line use X, Y and Z: send them in two lines"),
+            error(24, "two orders in a line"),
+            format_args!("the line orders two things, one behind the other: send two lines"),
         ),
         BlockError::Repeated(word) => {
             row(error(25, "word repeated"), format_args!("{} comes twice", letter(*word)))
