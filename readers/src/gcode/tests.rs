@@ -191,6 +191,22 @@ fn what_is_not_obeyed_is_counted_and_what_cannot_be_drawn_refused() {
     assert!(sent("known by its beginning", b"G21\nG0 X5\nG1 X9\n").is_ok());
 }
 
+/// C, Python and Java write small numbers as `1.2e-05`. Slicers put a space before E.
+#[test]
+fn an_exponent_belongs_to_its_number() {
+    let line = [[[0.0, 0.0], [0.0, 10.0], [25.0, 10.0]]];
+    for last in ["X2.5e+01 Y1.0E+1", "X250E-1Y10", "X 2 . 5e+1 Y10", "x2.5e+001 y10"] {
+        assert_eq!(strokes(&format!("G0 X1.2e-05 Y-1e-7\nG1 X1.2e-05 Y10\n{last}\n")), line);
+    }
+    // The words E of a printer: of these moves the first alone extrudes.
+    for other in ["X30 E-4", "X30 e -4", "X30E-0.4", "X30E0", "X30E -4", "X30E-1234"] {
+        let program = format!("M83\nG92E-1\nG0 X10\nG1 X20 E1\nG1 {other}\nG1E-2\n");
+        assert_eq!(strokes(&program), [[[10.0, 0.0], [20.0, 0.0]]], "{other}");
+    }
+    let error = sent("a.nc", b"G1 X5\nX1e+999\n").expect_err("refused");
+    assert!(error.starts_with("a.nc:2: \"X1e+999\" is no number"), "{error}");
+}
+
 /// A square of two layers and a move without ink, as PrusaSlicer (M83) and Cura (M82) write it.
 #[test]
 fn of_a_program_for_a_3d_printer_only_what_it_extrudes_is_drawn() {
