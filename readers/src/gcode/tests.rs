@@ -142,6 +142,78 @@ fn units_modes_offsets_and_comments_are_obeyed() {
     assert_eq!(strokes(offset), [[[10.0, 10.0], [15.0, 10.0], [0.0, 0.0]]]);
 }
 
+/// An L, drawn as a part of a program is.
+const PART: &str = "G0 X0 Y0\nG1 Y20\nG0 X0 Y0\nG1 X10\n";
+
+/// The strokes of an L at so much further right and up.
+fn part(x: f64, y: f64) -> [Vec<[f64; 2]>; 2] {
+    [vec![[x, y], [x, y + 20.0]], vec![[x, y], [x + 10.0, y]]]
+}
+
+#[test]
+fn systems_of_coordinates_lie_where_the_program_sets_them() {
+    let (own, other) = (part(0.0, 0.0), part(50.0, -5.0));
+    let both = [own.clone(), other].concat();
+    let set = "G10 L2 P1 X-300 Y-200\nG10 L2 P2 X-250 Y-205\n";
+    for program in [
+        format!("{set}{PART}G55\n{PART}G54\nG0 X0 Y0\n"),
+        // The system at the beginning is that of the drawing, whichever it is.
+        format!("G55\nG10 L2 P0 X-300 Y-200\nG10 L2 P9 X-250 Y-205\n{PART}G59.3\n{PART}"),
+        format!("G54\n{set}G10 L2 P1 X-200 Y-210\nG55\n{PART}G10 L2 P2 X-200 Y-210\n{PART}"),
+        format!("{PART}G0 X0 Y0\nG10 L20 P2 X-50 Y5\nG55\n{PART}"),
+        format!("G20\nG10 L2 P1 X0 Y0\nG21\nG10 L2 P2 X50 Y-5\nG92 X0 Y0\n{PART}G55\n{PART}"),
+        // What the pen is told of where it is makes its place known again.
+        format!("{PART}G55\nG10 L20 P2 X-40 Y5\n{PART}"),
+        format!("{PART}G55\nG92 X-40 Y5\n{PART}"),
+    ] {
+        assert_eq!(strokes(&program), both, "{program}");
+        assert_eq!(notes("a.nc", program.as_bytes()), [""; 0], "{program}");
+    }
+    // A system before the first move, and one that is chosen again, change nothing.
+    for program in [
+        format!("G52 X0 Y0\nG54\nG55\n{PART}G55\nG54\nG55\n{PART}G54\nM30\n"),
+        format!("G10 L20 P2 X7 Y7\n{PART}G54\n{PART}G59.1\nG91\nG54\nG90\n"),
+        format!("{PART}G55\nG92 X3\nG54\nG92.1\n{PART}"),
+    ] {
+        assert_eq!(strokes(&program), [own.clone(), own.clone()].concat(), "{program}");
+    }
+    let arc = "G90.1\nG10 L2 P1 X0 Y0\nG10 L2 P2 X10 Y0\nG0 X20 Y10\nG55\nG2 X20 Y10 I15 J10\n";
+    let drawn = strokes(arc).concat();
+    assert!(drawn.iter().all(|[x, y]| ((x - 25.0).hypot(y - 10.0) - 5.0).abs() < 0.002));
+}
+
+#[test]
+fn a_move_in_coordinates_without_a_known_place_is_refused() {
+    for (before, line, by) in [
+        ("G55\n", 6, "G55 in line 5 chose coordinates"),
+        ("G59.1\n", 6, "G59.1 in line 5"),
+        ("G10 L2 P2 X9 Y9\nG55\n", 7, "G55 in line 6"),
+        ("G10 L2 P1 X9\n", 6, "G10 L2 in line 5"),
+        ("G55\nG92 X0 Y0\nG54\n", 8, "G54 in line 7"),
+        ("G53 G0 X0 Y0\nG92 X0 Y0\n", 7, "G92 in line 6"),
+    ] {
+        let error = sent("a.nc", format!("{PART}{before}{PART}").as_bytes()).expect_err("refused");
+        assert!(error.starts_with(&format!("a.nc:{line}: {by}")), "{error}");
+    }
+    for (line, expected) in [
+        ("G10 L2 P1 R30", "R turns the coordinates"),
+        ("G54.1 P3", "G54.1 changes where the pen goes"),
+        ("G52 X0 Y5", "G52 changes where the pen goes"),
+    ] {
+        let error = sent("a.nc", format!("{line}\n{PART}").as_bytes()).expect_err("refused");
+        assert!(error.starts_with(&format!("a.nc:1: {expected}")), "{error}");
+    }
+    // Tools are no systems, nor are there more than nine; a printer draws its thread back.
+    let tools = format!("G10 L1 P1 R3\nG10 L20 P11 X5\nG10\nG11\n{PART}");
+    assert_eq!(
+        notes("a.nc", tools.as_bytes()),
+        [
+            "G10 L1 has no meaning for a drawing (line 1)",
+            "G10 L20 has no meaning for a drawing (line 2)",
+        ]
+    );
+}
+
 #[test]
 fn arcs_stay_within_their_circle() {
     for (arc, centre) in [
