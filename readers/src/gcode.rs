@@ -65,7 +65,7 @@ struct Interpreter {
     /// Whether a height was given as such, and not as a distance.
     has_absolute_heights: bool,
     extruder: Extruder,
-    /// For x and y, the line of the `G53` after which the position is not known.
+    /// For x and y, the line of the `G53` or `G28` after which the position is not known.
     unplaced: [Option<u32>; 2],
     /// The number of moves along x or y by `G53`, and the line of the first.
     machine_moves: (usize, usize),
@@ -134,7 +134,7 @@ impl Interpreter {
         };
         let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
         let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
-        let mut sets_system = false;
+        let (mut sets_system, mut goes_home) = (false, false);
         let (mut servo, mut of_machine) = (false, false);
         let (mut is_move, mut is_setting, mut has_place) = (false, false, false);
         for &(letter, value) in &words {
@@ -188,8 +188,9 @@ impl Interpreter {
                     self.systems.choose(chosen(code), self.moves.len() == 0, &by);
                 }
                 ('G', 100) => (moves, sets_system) = (false, true),
+                ('G', 280 | 300) => (moves, goes_home) = (false, true),
                 // A dwell, a retraction, and the places of the machine.
-                ('G', 40 | 110 | 280 | 281 | 300 | 301) => moves = false,
+                ('G', 40 | 110 | 281 | 301) => moves = false,
                 ('G', 170 | 400 | 430 | 490 | 610 | 640 | 940) => {}
                 ('M', 30 | 40) => self.signals.spindle = Some(true),
                 ('M', 50) => self.signals.spindle = Some(false),
@@ -216,6 +217,9 @@ impl Interpreter {
         } else if let Some(power) = value('S') {
             self.signals.power = Some(power);
         }
+        if goes_home {
+            self.go_home(&value, number);
+        }
         if sets_system {
             self.set_system(&value, number)?;
         }
@@ -235,6 +239,22 @@ impl Interpreter {
             self.advance(&value, number)?;
         }
         Ok(goes_on)
+    }
+
+    /// Moves to the home of the machine along the axes that a line names, or all. Before the first
+    /// move, that is where the drawing begins.
+    fn go_home(&mut self, value: &impl Fn(char) -> Option<f64>, number: usize) {
+        if self.moves.len() == 0 {
+            return;
+        }
+        let all = ['X', 'Y', 'Z'].into_iter().all(|letter| value(letter).is_none());
+        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
+            if all || value(letter).is_some() {
+                *unplaced = Some(u32::try_from(number).unwrap_or(u32::MAX));
+            }
+        }
+        // In a program without heights, no other one would follow.
+        self.signals.is_parked |= value('Z').is_some() && self.signals.height.is_some();
     }
 
     /// Moves to coordinates of the machine, which are no place of the drawing.
@@ -424,8 +444,8 @@ impl Format for GCode {
         if let Some((number, by)) = unplaced {
             let line = text.lines().nth(number - 1).unwrap_or_default();
             let reason = format!(
-                "the pen would draw from a place of the machine (G53 in line {by}), which is not \
-                 known here: let the program move to an X and a Y of the drawing before"
+                "the pen would draw from a place of the machine (line {by}), which is not known \
+                 here: let the program move to an X and a Y of the drawing before"
             );
             return Err(ReadError::Line { origin: origin(number - 1, line), reason });
         }

@@ -19,9 +19,9 @@ pub(super) struct Signals {
     pub power: Option<f64>,
     /// Whether the extruder of a 3D printer pushes.
     pub extrudes: bool,
-    /// Whether the pen has been lifted to a height of the machine (`G53`), and no other since.
+    /// Whether the pen has been lifted to a height of the machine (`G53`, `G28`), and no other since.
     pub is_parked: bool,
-    /// The line of the `G53` because of which it is not known where the move begins or ends.
+    /// The line of the `G53` or `G28` because of which it is not known where the move begins or ends.
     pub unplaced: Option<u32>,
 }
 

@@ -330,6 +330,33 @@ fn a_move_in_the_coordinates_of_the_machine_is_not_drawn() {
     assert_eq!(strokes(known_again), [[[1.0, 0.0], [5.0, 0.0]], [[9.0, 0.0], [9.0, 9.0]]]);
 }
 
+/// Printers home before they begin, and mills in the middle, to have room for a new tool.
+#[test]
+fn home_is_a_place_of_the_machine_after_the_first_move() {
+    let first = vec![[10.0, 10.0], [20.0, 10.0]];
+    for (home, after, second) in [
+        ("G28", "G0 X30 Y5\nG1 X40", [[30.0, 5.0], [40.0, 5.0]]),
+        ("G91 G28 Z0\nG90", "G0 X30 Y5\nG1 X40", [[30.0, 5.0], [40.0, 5.0]]),
+        ("G28 X", "G0 X30\nG1 Y9", [[30.0, 10.0], [30.0, 9.0]]),
+        ("G30 Y0", "G0 Y5\nG1 X40", [[20.0, 5.0], [40.0, 5.0]]),
+    ] {
+        let program = format!("G28\nG0 X10 Y10\nG1 X20\n{home}\n{after}\nG28\n");
+        assert_eq!(strokes(&program), [first.clone(), second.to_vec()], "{program}");
+        assert_eq!(notes("a.nc", program.as_bytes()), [""; 0], "{program}");
+    }
+    for (home, after) in [("G28", "G91\nG1 X5"), ("G30 X0", "G0 Y9\nG1 X9"), ("G28 Y", "G1 X9")] {
+        let program = format!("G0 X10 Y10\nG1 X20\n{home}\n{after}\n");
+        let error = sent("a.nc", program.as_bytes()).expect_err("refused");
+        assert!(
+            error.contains("would draw from a place of the machine (line 3), which"),
+            "{error}"
+        );
+    }
+    // It lifts the pen as well.
+    let lifted = "G0 Z5\nG0 X10 Y10\nG1 Z-1\nG1 X20\nG91 G28 Z0\nG90\nG1 X30\nG1 Z-1\nG1 X40\n";
+    assert_eq!(strokes(lifted), [first, vec![[30.0, 10.0], [40.0, 10.0]]]);
+}
+
 #[test]
 fn what_changes_where_the_pen_goes_is_refused_and_never_left_out() {
     for (line, expected) in [
