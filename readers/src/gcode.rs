@@ -13,6 +13,7 @@
 
 mod extruder;
 mod moves;
+mod pens;
 mod signals;
 mod systems;
 mod text;
@@ -24,6 +25,7 @@ use super::plan::Plan;
 use crate::lines::Origin;
 use extruder::Extruder;
 use moves::{Moves, Signals};
+use pens::Changes;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use systems::{Systems, chosen};
@@ -65,6 +67,7 @@ struct Interpreter {
     /// Whether a height was given as such, and not as a distance.
     has_absolute_heights: bool,
     extruder: Extruder,
+    changes: Changes,
     /// For x and y, the line of the `G53` or `G28` after which the position is not known.
     unplaced: [Option<u32>; 2],
     /// The number of moves along x or y by `G53`, and the line of the first.
@@ -90,6 +93,7 @@ impl Interpreter {
             moves: Moves::from([0.0; 2]),
             has_absolute_heights: false,
             extruder: Extruder::default(),
+            changes: Changes::default(),
             unplaced: [None; 2],
             machine_moves: (0, 0),
             unknown: BTreeMap::new(),
@@ -124,9 +128,14 @@ impl Interpreter {
 
     /// Carries out a line. Returns whether the program continues after it.
     fn line(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
+        self.signals.choice.follow(text);
         let words = match parse(text)? {
             Line::Words(words) => words,
             Line::Skipped => return Ok(true),
+            Line::Pause => {
+                self.changes.pause(number);
+                return Ok(true);
+            }
             Line::Command(name) => {
                 self.skip(name, number);
                 return Ok(true);
@@ -134,7 +143,7 @@ impl Interpreter {
         };
         let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
         let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
-        let (mut sets_system, mut goes_home) = (false, false);
+        let (mut sets_system, mut goes_home, mut changes_tool) = (false, false, false);
         let (mut servo, mut of_machine) = (false, false);
         let (mut is_move, mut is_setting, mut has_place) = (false, false, false);
         for &(letter, value) in &words {
@@ -196,7 +205,9 @@ impl Interpreter {
                 ('M', 50) => self.signals.spindle = Some(false),
                 ('M', 2800 | 3000 | 3400) => servo = true,
                 ('M', 20 | 300) => goes_on = false,
-                ('M', 0 | 10 | 60 | 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
+                ('M', 0 | 10) => self.changes.pause(number),
+                ('M', 60) => changes_tool = true,
+                ('M', 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
                 // Modes of speed and of cycles, and the ends of modes that are refused.
                 ('G', 150 | 500 | 690 | 930 | 950 | 960 | 970 | 980 | 990) => {
                     self.skip(format!("{letter}{value}"), number);
@@ -216,6 +227,12 @@ impl Interpreter {
             self.signals.servo = value('S').or(self.signals.servo);
         } else if let Some(power) = value('S') {
             self.signals.power = Some(power);
+        }
+        if moves && !is_setting {
+            self.signals.choice.call(&words);
+        }
+        if changes_tool {
+            self.changes.put_in(&mut self.signals.choice, number);
         }
         if goes_home {
             self.go_home(&value, number);
@@ -450,22 +467,11 @@ impl Format for GCode {
             return Err(ReadError::Line { origin: origin(number - 1, line), reason });
         }
         let mut notes: Vec<String> = extruder::note(&interpreter.moves).into_iter().collect();
-        let mut pairs = interpreter.moves.iter().zip(drawn).filter(|(_, draws)| *draws).peekable();
-        let mut lines = (1..).zip(text.lines());
-        while let Some((first, _)) = pairs.next() {
-            let mut points = first.points.to_vec();
-            while let Some((next, _)) = pairs.next_if(|(it, _)| points.last() == it.points.first())
-            {
-                points.extend_from_slice(&next.points[1..]);
-            }
-            let line = lines.find(|(number, _)| *number == first.line);
-            plan.begin(first.line as usize, line.map_or("", |(_, text)| text));
-            plan.draw(points, None, 1);
-        }
         if !notes.is_empty() {
             // Temperatures, fans and the like.
             interpreter.unknown.retain(|word, _| word.starts_with('G'));
         }
+        notes.extend(interpreter.changes.draw(&interpreter.moves, drawn, &text, &mut plan));
         notes.extend(interpreter.notes());
         if plan.is_empty() {
             let mut reason = "there is nothing to draw in this G-code".to_owned();

@@ -1,5 +1,7 @@
 //! Tests of reading G-code.
 
+use crate::arrange::Arrangement;
+use crate::format::{Body, Contents, Format};
 use crate::tests::{notes, sent};
 
 /// The strokes of a program: for each the points.
@@ -20,6 +22,14 @@ fn strokes(program: &str) -> Vec<Vec<[f64; 2]>> {
         }
     }
     strokes
+}
+
+/// The pens of the strokes of a program.
+fn pens(program: &str) -> Vec<u32> {
+    let format = super::GCode;
+    let contents = format.read("a.nc".to_owned(), program.into(), &Arrangement::default());
+    let Ok(Contents { body: Body::Plan(plan), .. }) = contents else { panic!("no plan") };
+    plan.strokes.iter().map(|stroke| stroke.pen).collect()
 }
 
 /// The same two strokes in the dialects of many programs.
@@ -140,6 +150,71 @@ fn units_modes_offsets_and_comments_are_obeyed() {
     assert_eq!(strokes(inches), [[[25.4, 25.4], [63.5, 25.4], [63.5, 27.4]]]);
     let offset = "G0 X10 Y10\nG92 X0 Y0\nG1 X5\nG92.1\nG1 X0 Y0\n";
     assert_eq!(strokes(offset), [[[10.0, 10.0], [15.0, 10.0], [0.0, 0.0]]]);
+}
+
+#[test]
+fn each_tool_draws_with_a_pen() {
+    let line = "G0 X0 Y0\nM3\nG1 X9 F900\nM5\n";
+    let program = |changes: [&str; 4]| changes.map(|it| format!("{it}\n{line}")).concat();
+    for (changes, expected) in [
+        // penup itself writes the number of a pen before the pause for it.
+        (["(penup 0.1.0)", "(pen 2)\nM0", "(pen 5)\nM0", "(pen 2)\nM0"], [1, 2, 5, 2]),
+        (["(pen 3)\nM0", "(pen 0)", "(pen 33)", "T7 M6"], [3, 3, 3, 3]),
+        // Of other programs the first tool that draws has the first pen.
+        (["T9\nT0", "T4", "", "T0"], [1, 2, 2, 1]),
+        (["", "N5 T2", "t0", "T1"], [1, 2, 3, 4]),
+        // A tool that is called is put in by M6.
+        (["T3\nM6\nT8", "", "M6 T8", "T3 M06 (BLUE)"], [1, 1, 2, 1]),
+        (["T5 M0", "T6 M0", "T6 M1", "T5 M0"], [1, 2, 2, 1]),
+        // These mean the temperature or the fan of an extruder.
+        (["T1", "M104 T0", "M106 T2", "T0 M109"], [1, 1, 1, 1]),
+        (["", "", "", "M2\nT5"], [1, 1, 1, 0]),
+    ] {
+        let expected: Vec<u32> = expected.into_iter().filter(|pen| *pen > 0).collect();
+        let program = program(changes);
+        assert_eq!(pens(&program), expected, "{program}");
+        let said = notes("a.nc", program.as_bytes());
+        assert!(said.iter().all(|it| it.starts_with("M10")), "{program}{said:?}");
+    }
+    // A stroke ends where another pen goes on.
+    let program = "T1\nG0 X1\nG1 X5\nT2\nG1 X9\n";
+    assert_eq!(pens(program), [1, 2]);
+    assert_eq!(strokes(program), [[[1.0, 0.0], [5.0, 0.0]], [[5.0, 0.0], [9.0, 0.0]]]);
+    let many: String = (1..40).map(|tool| format!("T{tool}\n{line}")).collect();
+    assert_eq!(pens(&many)[30..], [31, 32, 32, 32, 32, 32, 32, 32, 32]);
+    assert_eq!(
+        notes("a.nc", many.as_bytes()),
+        ["the program draws with 39 tools, and a plotter has 32 pens: pen 32 draws what the last \
+          of them do"]
+    );
+}
+
+/// So the plotter pauses for them alike, and `--pens` chooses them alike.
+#[cfg(feature = "hpgl")]
+#[test]
+fn pens_are_those_of_the_same_drawing_in_hp_gl() {
+    let program = "(pen 2)\nM0\nG0 X10 Y10\nG1 X20\n(pen 4)\nM0\nG0 X0 Y5\nG1 X7\n";
+    let plot = b"IN;SP2;PU400,400;PD800,400;SP4;PU0,200;PD280,200;PU;SP0;";
+    assert_eq!(sent("a.nc", program.as_bytes()), sent("a.plt", plot));
+    assert!(sent("a.nc", program.as_bytes()).is_ok());
+}
+
+#[test]
+fn a_pause_between_strokes_is_told() {
+    let line = "G0 X0 Y0\nG1 X9\n";
+    let told = |count: &str| {
+        format!(
+            "{count} not followed (from line 4 on): if the pen is changed there, draw the parts of \
+             the program as files of their own"
+        )
+    };
+    for pause in ["M0", "M00 (blue)", "M1 Blue, please", "G4 P1 M0", "M6"] {
+        let program = format!("{pause}\n{line}{pause}\n{line}{pause}\n{line}{pause}\nM2\n");
+        assert_eq!(notes("a.nc", program.as_bytes()), [told("2 pauses are")], "{pause}");
+        let program = format!("T3 M6\n{line}{pause}\n{line}{pause}\n");
+        let expected = if pause == "M6" { vec![] } else { vec![told("1 pause is")] };
+        assert_eq!(notes("a.nc", program.as_bytes()), expected, "{pause}");
+    }
 }
 
 /// An L, drawn as a part of a program is.

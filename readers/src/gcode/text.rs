@@ -9,6 +9,8 @@ pub(super) enum Line {
     Words(Vec<(char, f64)>),
     /// A line that orders nothing.
     Skipped,
+    /// A pause, which may have a message (`M0`, `M1`).
+    Pause,
     /// A command of this name that takes no words, but text or named values.
     Command(String),
 }
@@ -70,7 +72,7 @@ pub(super) fn parse(text: &str) -> Result<Line, RefusalText> {
     }
     let code = name.strip_prefix('M').and_then(|code| code.parse().ok());
     if code.is_some_and(|code| WITH_TEXT.contains(&code)) {
-        return Ok(if code > Some(1) { Line::Command(name) } else { Line::Skipped });
+        return Ok(if code > Some(1) { Line::Command(name) } else { Line::Pause });
     }
     let takes_values = rest.split_whitespace().skip(1).all(|word| word.contains('='));
     if letters.len() > 1 && name.len() > 2 && takes_values {
