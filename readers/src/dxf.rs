@@ -3,8 +3,9 @@
 //! above, with the dashes of their line types.
 //!
 //! Each layer has a pen: that of the number in its name, or else the next one. Layers that are off
-//! or frozen, paper space, and what else is not drawn is counted, and the user is told. The reader
-//! refuses a file that does not consist of pairs of a code and a value.
+//! or frozen, those that are not plotted unless the user names them, paper space, and what else is
+//! not drawn is counted, and the user is told. The reader refuses a file that does not consist of
+//! pairs of a code and a value.
 //!
 //! The file is longer than 500 lines, because it is the list of the entities of DXF: each is drawn
 //! by the same placement on the page and pen.
@@ -66,9 +67,14 @@ const UNITS: [(i64, f64); 11] = [
 const PAPER: &str = "entities in paper space";
 const MODEL: &str = "entities in model space";
 
+/// What is said of the entities on layers of the screen.
+const UNPLOTTED: &str = "entities on layers that are not to be plotted (--layer NAME draws one)";
+
 /// The strokes of a drawing, and what of it is not drawn.
 struct Drawing<'d, 'a> {
     document: &'d Document<'a>,
+    /// The layers that the user has named.
+    named: &'d [String],
     /// The strokes, of which the pens are chosen once all layers are known.
     plan: Plan,
     /// The numbers of the layers that strokes lie on.
@@ -108,6 +114,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
         self.skipped.entry(what.to_owned()).or_insert((0, line)).0 += 1;
     }
 
+    /// Whether the user has named a layer, in any case of its letters.
+    fn is_named(&self, layer: &str) -> bool {
+        self.named.iter().any(|name| name.to_lowercase() == layer.to_lowercase())
+    }
+
     fn all(
         &mut self,
         entities: &'d [Entity<'a>],
@@ -130,6 +141,8 @@ impl<'d, 'a> Drawing<'d, 'a> {
             let is_hidden_text = entity.kind == "ATTRIB" && entity.flags()? & 1 != 0;
             if self.document.is_hidden(layer) {
                 self.skip("entities on layers that are off or frozen", entity.line);
+            } else if self.document.is_unplotted(layer) && !self.is_named(layer) {
+                self.skip(UNPLOTTED, entity.line);
             } else if (entity.number(67, 0.0)? != 0.0) != self.is_of_paper && placement.depth == 0 {
                 self.skip(if self.is_of_paper { MODEL } else { PAPER }, entity.line);
             } else if entity.number(60, 0.0)? != 0.0 || is_hidden_text {
@@ -483,7 +496,12 @@ impl Format for Dxf {
         beginning.starts_with(BINARY)
     }
 
-    fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
+    fn read(
+        &self,
+        file: String,
+        bytes: Vec<u8>,
+        arrangement: &Arrangement,
+    ) -> Result<Contents, ReadError> {
         let refused = |reason: &str| {
             Err(ReadError::Content { file: file.clone(), reason: reason.to_owned() })
         };
@@ -520,6 +538,7 @@ impl Format for Dxf {
         };
         let mut drawing = Drawing {
             document: &document,
+            named: &arrangement.layers,
             plan: Plan::new(file.clone()),
             layers: HashMap::new(),
             skipped: BTreeMap::new(),

@@ -13,7 +13,9 @@
 
 mod extruder;
 mod moves;
+mod pens;
 mod signals;
+mod systems;
 mod text;
 
 use super::arrange::Arrangement;
@@ -23,8 +25,10 @@ use super::plan::Plan;
 use crate::lines::Origin;
 use extruder::Extruder;
 use moves::{Moves, Signals};
+use pens::Changes;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
+use systems::{Systems, chosen};
 use text::{Line, parse};
 
 /// The format itself.
@@ -54,15 +58,17 @@ struct Interpreter {
     has_absolute_centres: bool,
     /// The length of the unit in mm.
     unit: f64,
-    /// The origin that G92 has set, which is added to coordinates.
-    origin: [f64; 3],
+    systems: Systems,
+    /// What G92 has added to heights.
+    lift: f64,
     height: f64,
     signals: Signals,
     moves: Moves,
     /// Whether a height was given as such, and not as a distance.
     has_absolute_heights: bool,
     extruder: Extruder,
-    /// For x and y, the line of the `G53` after which the position is not known.
+    changes: Changes,
+    /// For x and y, the line of the `G53` or `G28` after which the position is not known.
     unplaced: [Option<u32>; 2],
     /// The number of moves along x or y by `G53`, and the line of the first.
     machine_moves: (usize, usize),
@@ -80,12 +86,14 @@ impl Interpreter {
             is_relative: false,
             has_absolute_centres: false,
             unit: 1.0,
-            origin: [0.0; 3],
+            systems: Systems::new(),
+            lift: 0.0,
             height: 0.0,
             signals: Signals::default(),
             moves: Moves::from([0.0; 2]),
             has_absolute_heights: false,
             extruder: Extruder::default(),
+            changes: Changes::default(),
             unplaced: [None; 2],
             machine_moves: (0, 0),
             unknown: BTreeMap::new(),
@@ -120,9 +128,14 @@ impl Interpreter {
 
     /// Carries out a line. Returns whether the program continues after it.
     fn line(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
+        self.signals.choice.follow(text);
         let words = match parse(text)? {
             Line::Words(words) => words,
             Line::Skipped => return Ok(true),
+            Line::Pause => {
+                self.changes.pause(number);
+                return Ok(true);
+            }
             Line::Command(name) => {
                 self.skip(name, number);
                 return Ok(true);
@@ -130,6 +143,7 @@ impl Interpreter {
         };
         let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
         let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
+        let (mut sets_system, mut goes_home, mut changes_tool) = (false, false, false);
         let (mut servo, mut of_machine) = (false, false);
         let (mut is_move, mut is_setting, mut has_place) = (false, false, false);
         for &(letter, value) in &words {
@@ -147,9 +161,16 @@ impl Interpreter {
                 ('G', 901) => self.has_absolute_centres = true,
                 ('G', 911) => self.has_absolute_centres = false,
                 ('G', 920) => (moves, sets_position) = (false, true),
-                ('G', 921) => self.origin = [0.0; 3],
+                ('G', 921) => {
+                    self.systems.unset(&("G92.1".to_owned(), number));
+                    self.lift = 0.0;
+                }
                 ('G', 180 | 190) => return Err("arcs in other planes are not drawn".to_owned()),
-                ('G', 50..=52 | 60..=62 | 160 | 510 | 511 | 680) => {
+                // The end of a shift.
+                ('G', 520) if !words.iter().any(|it| matches!(it.0, 'X' | 'Y') && it.1 != 0.0) => {
+                    moves = false;
+                }
+                ('G', 50..=52 | 60..=62 | 160 | 510 | 511 | 520 | 541 | 680) => {
                     return Err(format!(
                         "{letter}{value} changes where the pen goes in a way that is not read: let \
                          the program that wrote this file write lines and arcs only"
@@ -171,14 +192,22 @@ impl Interpreter {
                 ('G', 800) => self.motion = 0,
                 ('M', 820) => self.extruder.is_relative = false,
                 ('M', 830) => self.extruder.is_relative = true,
-                // A dwell, offsets and the places of the machine.
-                ('G', 40 | 100 | 280 | 281 | 300 | 301) => moves = false,
-                ('G', 170 | 400 | 430 | 490 | 540..=590 | 610 | 640 | 940) => {}
+                ('G', 540 | 550 | 560 | 570 | 580 | 590..=593) => {
+                    let by = (format!("{letter}{value}"), number);
+                    self.systems.choose(chosen(code), self.moves.len() == 0, &by);
+                }
+                ('G', 100) => (moves, sets_system) = (false, true),
+                ('G', 280 | 300) => (moves, goes_home) = (false, true),
+                // A dwell, a retraction, and the places of the machine.
+                ('G', 40 | 110 | 281 | 301) => moves = false,
+                ('G', 170 | 400 | 430 | 490 | 610 | 640 | 940) => {}
                 ('M', 30 | 40) => self.signals.spindle = Some(true),
                 ('M', 50) => self.signals.spindle = Some(false),
                 ('M', 2800 | 3000 | 3400) => servo = true,
                 ('M', 20 | 300) => goes_on = false,
-                ('M', 0 | 10 | 60 | 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
+                ('M', 0 | 10) => self.changes.pause(number),
+                ('M', 60) => changes_tool = true,
+                ('M', 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
                 // Modes of speed and of cycles, and the ends of modes that are refused.
                 ('G', 150 | 500 | 690 | 930 | 950 | 960 | 970 | 980 | 990) => {
                     self.skip(format!("{letter}{value}"), number);
@@ -189,6 +218,8 @@ impl Interpreter {
                 }
                 ('X' | 'Y', _) => has_place = true,
                 ('Z' | 'I' | 'J' | 'R' | 'F' | 'N' | 'P' | 'S' | 'T' | 'E' | 'H', _) => {}
+                // Beside G10, wherever it stands.
+                ('L', _) if words.contains(&('G', 10.0)) => {}
                 (letter, _) => self.skip(letter.to_string(), number),
             }
         }
@@ -197,19 +228,20 @@ impl Interpreter {
         } else if let Some(power) = value('S') {
             self.signals.power = Some(power);
         }
+        if moves && !is_setting {
+            self.signals.choice.call(&words);
+        }
+        if changes_tool {
+            self.changes.put_in(&mut self.signals.choice, number);
+        }
+        if goes_home {
+            self.go_home(&value, number);
+        }
+        if sets_system {
+            self.set_system(&value, number)?;
+        }
         if sets_position {
-            for (axis, letter) in ['X', 'Y', 'Z'].into_iter().enumerate() {
-                let now = if axis < 2 { self.moves.at()[axis] } else { self.height };
-                if let Some(value) = value(letter) {
-                    self.origin[axis] = now - value * self.unit;
-                    // Before the first move, this is where the drawing begins.
-                    if self.moves.len() == 0
-                        && let Some(unplaced) = self.unplaced.get_mut(axis)
-                    {
-                        *unplaced = None;
-                    }
-                }
-            }
+            self.set_origin(&value, number);
         }
         if sets_position && let Some(value) = value('E') {
             self.extruder.set(value);
@@ -224,6 +256,22 @@ impl Interpreter {
             self.advance(&value, number)?;
         }
         Ok(goes_on)
+    }
+
+    /// Moves to the home of the machine along the axes that a line names, or all. Before the first
+    /// move, that is where the drawing begins.
+    fn go_home(&mut self, value: &impl Fn(char) -> Option<f64>, number: usize) {
+        if self.moves.len() == 0 {
+            return;
+        }
+        let all = ['X', 'Y', 'Z'].into_iter().all(|letter| value(letter).is_none());
+        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
+            if all || value(letter).is_some() {
+                *unplaced = Some(u32::try_from(number).unwrap_or(u32::MAX));
+            }
+        }
+        // In a program without heights, no other one would follow.
+        self.signals.is_parked |= value('Z').is_some() && self.signals.height.is_some();
     }
 
     /// Moves to coordinates of the machine, which are no place of the drawing.
@@ -256,21 +304,16 @@ impl Interpreter {
         value: &impl Fn(char) -> Option<f64>,
         number: usize,
     ) -> Result<(), RefusalText> {
-        let (unit, is_relative, origin) = (self.unit, self.is_relative, self.origin);
-        let target = |letter, axis: usize, now: f64| match value(letter) {
-            None => now,
-            Some(value) if is_relative => now + value * unit,
-            Some(value) => origin[axis] + value * unit,
-        };
+        let (unit, is_relative) = (self.unit, self.is_relative);
         // Beside M, E is no way of the extruder.
         let pushes = value('E').filter(|_| value('M').is_none());
         let extrudes = pushes.is_some_and(|to| self.extruder.advance(to, is_relative));
         self.signals.extrudes = extrudes;
         let drills = self.motion == DRILLING;
-        if value('Z').is_some() && !drills {
+        if let Some(to) = value('Z').filter(|_| !drills) {
             self.signals.is_parked &= is_relative;
             let before = self.height;
-            self.height = target('Z', 2, self.height);
+            self.height = to * unit + if is_relative { before } else { self.lift };
             self.has_absolute_heights |= !is_relative;
             if self.height != before {
                 self.signals.growth = Some((self.height - before).signum());
@@ -278,7 +321,12 @@ impl Interpreter {
             self.signals.height = Some(self.height);
         }
         let at = self.moves.at();
-        let to = [target('X', 0, at[0]), target('Y', 1, at[1])];
+        let target = |letter, axis: usize| match value(letter) {
+            None => Ok(at[axis]),
+            Some(value) if is_relative => Ok(at[axis] + value * unit),
+            Some(value) => self.systems.place(axis, value * unit),
+        };
+        let to = [target('X', 0)?, target('Y', 1)?];
         let is_arc = matches!(self.motion, 2 | 3)
             && ['I', 'J', 'R'].into_iter().any(|it| value(it).is_some());
         if value('X').is_none() && value('Y').is_none() && !is_arc {
@@ -325,11 +373,13 @@ impl Interpreter {
             [from[0] + dx / 2.0 + dy * side, from[1] + dy / 2.0 - dx * side]
         } else {
             let offset = |letter, axis: usize| match value(letter) {
-                Some(value) if self.has_absolute_centres => self.origin[axis] + value * self.unit,
-                Some(value) => from[axis] + value * self.unit,
-                None => from[axis],
+                Some(value) if self.has_absolute_centres => {
+                    self.systems.place(axis, value * self.unit)
+                }
+                Some(value) => Ok(from[axis] + value * self.unit),
+                None => Ok(from[axis]),
             };
-            [offset('I', 0), offset('J', 1)]
+            [offset('I', 0)?, offset('J', 1)?]
         };
         let radius = distance(from, centre);
         if radius == 0.0 || (distance(to, centre) - radius).abs() > 0.005 * radius + 0.5 {
@@ -411,28 +461,17 @@ impl Format for GCode {
         if let Some((number, by)) = unplaced {
             let line = text.lines().nth(number - 1).unwrap_or_default();
             let reason = format!(
-                "the pen would draw from a place of the machine (G53 in line {by}), which is not \
-                 known here: let the program move to an X and a Y of the drawing before"
+                "the pen would draw from a place of the machine (line {by}), which is not known \
+                 here: let the program move to an X and a Y of the drawing before"
             );
             return Err(ReadError::Line { origin: origin(number - 1, line), reason });
         }
         let mut notes: Vec<String> = extruder::note(&interpreter.moves).into_iter().collect();
-        let mut pairs = interpreter.moves.iter().zip(drawn).filter(|(_, draws)| *draws).peekable();
-        let mut lines = (1..).zip(text.lines());
-        while let Some((first, _)) = pairs.next() {
-            let mut points = first.points.to_vec();
-            while let Some((next, _)) = pairs.next_if(|(it, _)| points.last() == it.points.first())
-            {
-                points.extend_from_slice(&next.points[1..]);
-            }
-            let line = lines.find(|(number, _)| *number == first.line);
-            plan.begin(first.line as usize, line.map_or("", |(_, text)| text));
-            plan.draw(points, None, 1);
-        }
         if !notes.is_empty() {
             // Temperatures, fans and the like.
             interpreter.unknown.retain(|word, _| word.starts_with('G'));
         }
+        notes.extend(interpreter.changes.draw(&interpreter.moves, drawn, &text, &mut plan));
         notes.extend(interpreter.notes());
         if plan.is_empty() {
             let mut reason = "there is nothing to draw in this G-code".to_owned();

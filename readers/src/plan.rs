@@ -225,8 +225,8 @@ fn left_out(count: usize, why: &str) -> Option<String> {
 }
 
 /// The most pens that a plotter has.
-#[cfg(any(feature = "dxf", feature = "svg"))]
-const MOST_PENS: u32 = 32;
+#[cfg(any(feature = "dxf", feature = "gcode", feature = "svg"))]
+pub(crate) const MOST_PENS: u32 = 32;
 
 /// The pen number in the name of a layer: `1`, `2 red`, `pen3`, `Layer 4`, `layer_5`. The number
 /// stands at the beginning, or after one word.

@@ -40,7 +40,7 @@ impl Format for Stl {
     fn recognises(&self, beginning: &[u8]) -> bool {
         let text = String::from_utf8_lossy(beginning);
         let mut words = text.lines().flat_map(words);
-        words.next() == Some("solid") && words.any(|word| word == "facet")
+        words.next().is_some_and(is_solid) && words.any(|word| word.eq_ignore_ascii_case("facet"))
     }
 
     fn may_be_binary(&self, _: &[u8]) -> bool {
@@ -77,11 +77,16 @@ fn words(line: &str) -> impl Iterator<Item = &str> {
     line.split('#').next().unwrap_or_default().split_ascii_whitespace()
 }
 
+/// Whether this is the first word of a text file. Some programs write all words in capitals.
+fn is_solid(word: &str) -> bool {
+    word.eq_ignore_ascii_case("solid")
+}
+
 /// Whether this is text whose first word is that of an STL.
 fn is_text(bytes: &[u8]) -> bool {
     let beginning = bytes.get(..4096).unwrap_or(bytes);
     let text = String::from_utf8_lossy(beginning);
-    !beginning.contains(&0) && text.lines().flat_map(words).next() == Some("solid")
+    !beginning.contains(&0) && text.lines().flat_map(words).next().is_some_and(is_solid)
 }
 
 /// What a file is if it is taken as a binary one.
@@ -205,6 +210,15 @@ mod tests {
             ["v 0 0 0", "v 0 1.5 0", "v 1 0 0", "v 0 0 1", "f 1 2 3", "f 1 3 4"].map(str::to_owned);
         assert_eq!(sent("a.stl", TEXT.as_bytes()), Ok(expected.to_vec()));
         assert_eq!(sent("a", TEXT.as_bytes()), Ok(expected.to_vec()), "known by its beginning");
+    }
+
+    #[test]
+    fn the_words_of_a_text_may_be_in_capitals() {
+        let capitals = TEXT.to_uppercase();
+        for name in ["a.stl", "a"] {
+            assert_eq!(sent(name, capitals.as_bytes()), sent("a.stl", TEXT.as_bytes()), "{name}");
+        }
+        assert!(sent("a.stl", TEXT.as_bytes()).is_ok());
     }
 
     #[test]

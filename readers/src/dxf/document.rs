@@ -93,6 +93,8 @@ pub(super) struct Document<'a> {
     pub(super) unit: Option<i64>,
     /// The layers that are not drawn, in capitals: names do not depend on them.
     hidden: HashSet<String>,
+    /// The layers that are shown but not plotted, in capitals.
+    unplotted: HashSet<String>,
     /// The blocks with their base points.
     blocks: HashMap<String, (Point, Vec<Entity<'a>>)>,
     /// The line types that are not continuous: the lengths of dashes, above 0, and gaps, below 0.
@@ -113,6 +115,12 @@ impl<'a> Document<'a> {
     /// Whether a layer is off or frozen.
     pub(super) fn is_hidden(&self, layer: &str) -> bool {
         self.hidden.contains(&layer.to_uppercase())
+    }
+
+    /// Whether a layer is shown on the screen only, as one with points of dimensions is.
+    pub(super) fn is_unplotted(&self, layer: &str) -> bool {
+        let layer = layer.to_uppercase();
+        layer == "DEFPOINTS" || self.unplotted.contains(&layer)
     }
 
     /// The block with this name: its base point and its entities.
@@ -210,6 +218,8 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
                         "LAYER" => {
                             let is_off = entry.number(62, 7.0)? < 0.0 || entry.flags()? & 1 == 1;
                             document.hidden.extend(is_off.then(|| name.clone()));
+                            let is_unplotted = entry.number(290, 1.0)? == 0.0;
+                            document.unplotted.extend(is_unplotted.then(|| name.clone()));
                             let line = entry.text(6);
                             document.types_of_layers.extend(line.map(|line| (name, line)));
                         }

@@ -1,6 +1,9 @@
 //! Tests of what DXF files draw.
 
+use super::Dxf;
 use crate::SourceFile;
+use crate::arrange::Arrangement;
+use crate::format::{Body, Contents, Format as _};
 use crate::lines::Lines as _;
 use crate::tests::{notes, sent};
 
@@ -209,6 +212,31 @@ fn what_is_not_drawn_is_counted() {
     );
     let line = text.lines().position(|line| line == "TEXT").expect("a text") + 1;
     assert!(said[1].ends_with(&format!("(the first in line {line})")), "{said:?}");
+}
+
+/// Programs show them on the screen: the points of dimensions, and what the user wants so.
+#[test]
+fn layers_that_are_not_plotted_are_drawn_only_if_they_are_named() {
+    let tables = "0 SECTION 2 TABLES 0 TABLE 2 LAYER 0 LAYER 2 Aid 62 7 70 0 290 0 \
+                  0 LAYER 2 own 62 7 70 0 290 1 0 ENDTAB 0 ENDSEC";
+    let line = |layer: &str, to: u32| format!("0 LINE 8 {layer} 10 0 20 0 11 {to} 21 0 ");
+    let entities: String =
+        [line("own", 1), line("AID", 2), line("DefPoints", 3), line("0", 4)].concat();
+    let text = dxf("4", tables, &entities);
+    let ends = |names: &[&str]| -> Vec<f64> {
+        let mut arrangement = Arrangement::default();
+        arrangement.layers.extend(names.iter().map(|name| (*name).to_owned()));
+        let contents = Dxf.read("a.dxf".to_owned(), text.clone().into(), &arrangement);
+        let Ok(Contents { body: Body::Plan(plan), .. }) = contents else { panic!("no plan") };
+        plan.strokes.iter().map(|stroke| stroke.points[1][0]).collect()
+    };
+    assert_eq!(ends(&[]), [1.0, 4.0]);
+    assert_eq!(ends(&["own"]), [1.0, 4.0]);
+    assert_eq!(ends(&["defpoints"]), [1.0, 3.0, 4.0]);
+    assert_eq!(ends(&["Aid", "Defpoints"]), [1.0, 2.0, 3.0, 4.0]);
+    let [said] = &notes("a.dxf", text.as_bytes())[..] else { panic!("one note") };
+    let expected = "2 entities on layers that are not to be plotted (--layer NAME draws one) are";
+    assert!(said.starts_with(expected), "{said}");
 }
 
 /// The rest of a file that was cut off is missing without a trace.

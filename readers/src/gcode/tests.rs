@@ -1,5 +1,7 @@
 //! Tests of reading G-code.
 
+use crate::arrange::Arrangement;
+use crate::format::{Body, Contents, Format};
 use crate::tests::{notes, sent};
 
 /// The strokes of a program: for each the points.
@@ -20,6 +22,14 @@ fn strokes(program: &str) -> Vec<Vec<[f64; 2]>> {
         }
     }
     strokes
+}
+
+/// The pens of the strokes of a program.
+fn pens(program: &str) -> Vec<u32> {
+    let format = super::GCode;
+    let contents = format.read("a.nc".to_owned(), program.into(), &Arrangement::default());
+    let Ok(Contents { body: Body::Plan(plan), .. }) = contents else { panic!("no plan") };
+    plan.strokes.iter().map(|stroke| stroke.pen).collect()
 }
 
 /// The same two strokes in the dialects of many programs.
@@ -143,6 +153,143 @@ fn units_modes_offsets_and_comments_are_obeyed() {
 }
 
 #[test]
+fn each_tool_draws_with_a_pen() {
+    let line = "G0 X0 Y0\nM3\nG1 X9 F900\nM5\n";
+    let program = |changes: [&str; 4]| changes.map(|it| format!("{it}\n{line}")).concat();
+    for (changes, expected) in [
+        // penup itself writes the number of a pen before the pause for it.
+        (["(penup 0.1.0)", "(pen 2)\nM0", "(pen 5)\nM0", "(pen 2)\nM0"], [1, 2, 5, 2]),
+        (["(pen 3)\nM0", "(pen 0)", "(pen 33)", "T7 M6"], [3, 3, 3, 3]),
+        // Of other programs the first tool that draws has the first pen.
+        (["T9\nT0", "T4", "", "T0"], [1, 2, 2, 1]),
+        (["", "N5 T2", "t0", "T1"], [1, 2, 3, 4]),
+        // A tool that is called is put in by M6.
+        (["T3\nM6\nT8", "", "M6 T8", "T3 M06 (BLUE)"], [1, 1, 2, 1]),
+        (["T5 M0", "T6 M0", "T6 M1", "T5 M0"], [1, 2, 2, 1]),
+        // These mean the temperature or the fan of an extruder.
+        (["T1", "M104 T0", "M106 T2", "T0 M109"], [1, 1, 1, 1]),
+        (["", "", "", "M2\nT5"], [1, 1, 1, 0]),
+    ] {
+        let expected: Vec<u32> = expected.into_iter().filter(|pen| *pen > 0).collect();
+        let program = program(changes);
+        assert_eq!(pens(&program), expected, "{program}");
+        let said = notes("a.nc", program.as_bytes());
+        assert!(said.iter().all(|it| it.starts_with("M10")), "{program}{said:?}");
+    }
+    // A stroke ends where another pen goes on.
+    let program = "T1\nG0 X1\nG1 X5\nT2\nG1 X9\n";
+    assert_eq!(pens(program), [1, 2]);
+    assert_eq!(strokes(program), [[[1.0, 0.0], [5.0, 0.0]], [[5.0, 0.0], [9.0, 0.0]]]);
+    let many: String = (1..40).map(|tool| format!("T{tool}\n{line}")).collect();
+    assert_eq!(pens(&many)[30..], [31, 32, 32, 32, 32, 32, 32, 32, 32]);
+    assert_eq!(
+        notes("a.nc", many.as_bytes()),
+        ["the program draws with 39 tools, and a plotter has 32 pens: pen 32 draws what the last \
+          of them do"]
+    );
+}
+
+/// So the plotter pauses for them alike, and `--pens` chooses them alike.
+#[cfg(feature = "hpgl")]
+#[test]
+fn pens_are_those_of_the_same_drawing_in_hp_gl() {
+    let program = "(pen 2)\nM0\nG0 X10 Y10\nG1 X20\n(pen 4)\nM0\nG0 X0 Y5\nG1 X7\n";
+    let plot = b"IN;SP2;PU400,400;PD800,400;SP4;PU0,200;PD280,200;PU;SP0;";
+    assert_eq!(sent("a.nc", program.as_bytes()), sent("a.plt", plot));
+    assert!(sent("a.nc", program.as_bytes()).is_ok());
+}
+
+#[test]
+fn a_pause_between_strokes_is_told() {
+    let line = "G0 X0 Y0\nG1 X9\n";
+    let told = |count: &str| {
+        format!(
+            "{count} not followed (from line 4 on): if the pen is changed there, draw the parts of \
+             the program as files of their own"
+        )
+    };
+    for pause in ["M0", "M00 (blue)", "M1 Blue, please", "G4 P1 M0", "M6"] {
+        let program = format!("{pause}\n{line}{pause}\n{line}{pause}\n{line}{pause}\nM2\n");
+        assert_eq!(notes("a.nc", program.as_bytes()), [told("2 pauses are")], "{pause}");
+        let program = format!("T3 M6\n{line}{pause}\n{line}{pause}\n");
+        let expected = if pause == "M6" { vec![] } else { vec![told("1 pause is")] };
+        assert_eq!(notes("a.nc", program.as_bytes()), expected, "{pause}");
+    }
+}
+
+/// An L, drawn as a part of a program is.
+const PART: &str = "G0 X0 Y0\nG1 Y20\nG0 X0 Y0\nG1 X10\n";
+
+/// The strokes of an L at so much further right and up.
+fn part(x: f64, y: f64) -> [Vec<[f64; 2]>; 2] {
+    [vec![[x, y], [x, y + 20.0]], vec![[x, y], [x + 10.0, y]]]
+}
+
+#[test]
+fn systems_of_coordinates_lie_where_the_program_sets_them() {
+    let (own, other) = (part(0.0, 0.0), part(50.0, -5.0));
+    let both = [own.clone(), other].concat();
+    let set = "G10 L2 P1 X-300 Y-200\nG10 L2 P2 X-250 Y-205\n";
+    for program in [
+        format!("{set}{PART}G55\n{PART}G54\nG0 X0 Y0\n"),
+        // The system at the beginning is that of the drawing, whichever it is.
+        format!("G55\nG10 L2 P0 X-300 Y-200\nG10 L2 P9 X-250 Y-205\n{PART}G59.3\n{PART}"),
+        format!("G54\n{set}G10 L2 P1 X-200 Y-210\nG55\n{PART}G10 L2 P2 X-200 Y-210\n{PART}"),
+        format!("{PART}G0 X0 Y0\nG10 L20 P2 X-50 Y5\nG55\n{PART}"),
+        format!("G20\nG10 L2 P1 X0 Y0\nG21\nG10 L2 P2 X50 Y-5\nG92 X0 Y0\n{PART}G55\n{PART}"),
+        // What the pen is told of where it is makes its place known again.
+        format!("{PART}G55\nG10 L20 P2 X-40 Y5\n{PART}"),
+        format!("{PART}G55\nG92 X-40 Y5\n{PART}"),
+    ] {
+        assert_eq!(strokes(&program), both, "{program}");
+        assert_eq!(notes("a.nc", program.as_bytes()), [""; 0], "{program}");
+    }
+    // A system before the first move, and one that is chosen again, change nothing.
+    for program in [
+        format!("G52 X0 Y0\nG54\nG55\n{PART}G55\nG54\nG55\n{PART}G54\nM30\n"),
+        format!("G10 L20 P2 X7 Y7\n{PART}G54\n{PART}G59.1\nG91\nG54\nG90\n"),
+        format!("{PART}G55\nG92 X3\nG54\nG92.1\n{PART}"),
+    ] {
+        assert_eq!(strokes(&program), [own.clone(), own.clone()].concat(), "{program}");
+    }
+    let arc = "G90.1\nG10 L2 P1 X0 Y0\nG10 L2 P2 X10 Y0\nG0 X20 Y10\nG55\nG2 X20 Y10 I15 J10\n";
+    let drawn = strokes(arc).concat();
+    assert!(drawn.iter().all(|[x, y]| ((x - 25.0).hypot(y - 10.0) - 5.0).abs() < 0.002));
+}
+
+#[test]
+fn a_move_in_coordinates_without_a_known_place_is_refused() {
+    for (before, line, by) in [
+        ("G55\n", 6, "G55 in line 5 chose coordinates"),
+        ("G59.1\n", 6, "G59.1 in line 5"),
+        ("G10 L2 P2 X9 Y9\nG55\n", 7, "G55 in line 6"),
+        ("G10 L2 P1 X9\n", 6, "G10 L2 in line 5"),
+        ("G55\nG92 X0 Y0\nG54\n", 8, "G54 in line 7"),
+        ("G53 G0 X0 Y0\nG92 X0 Y0\n", 7, "G92 in line 6"),
+    ] {
+        let error = sent("a.nc", format!("{PART}{before}{PART}").as_bytes()).expect_err("refused");
+        assert!(error.starts_with(&format!("a.nc:{line}: {by}")), "{error}");
+    }
+    for (line, expected) in [
+        ("G10 L2 P1 R30", "R turns the coordinates"),
+        ("G54.1 P3", "G54.1 changes where the pen goes"),
+        ("G52 X0 Y5", "G52 changes where the pen goes"),
+    ] {
+        let error = sent("a.nc", format!("{line}\n{PART}").as_bytes()).expect_err("refused");
+        assert!(error.starts_with(&format!("a.nc:1: {expected}")), "{error}");
+    }
+    // Tools are no systems, nor are there more than nine; a printer draws its thread back.
+    let tools = format!("G10 L1 P1 R3\nG10 L20 P11 X5\nG10\nG11\n{PART}");
+    assert_eq!(
+        notes("a.nc", tools.as_bytes()),
+        [
+            "G10 L1 has no meaning for a drawing (line 1)",
+            "G10 L20 has no meaning for a drawing (line 2)",
+        ]
+    );
+}
+
+#[test]
 fn arcs_stay_within_their_circle() {
     for (arc, centre) in [
         ("G2 X20 Y10 I5 J0", [15.0, 10.0]),
@@ -189,6 +336,22 @@ fn what_is_not_obeyed_is_counted_and_what_cannot_be_drawn_refused() {
         assert!(error.starts_with(reason), "{error}");
     }
     assert!(sent("known by its beginning", b"G21\nG0 X5\nG1 X9\n").is_ok());
+}
+
+/// C, Python and Java write small numbers as `1.2e-05`. Slicers put a space before E.
+#[test]
+fn an_exponent_belongs_to_its_number() {
+    let line = [[[0.0, 0.0], [0.0, 10.0], [25.0, 10.0]]];
+    for last in ["X2.5e+01 Y1.0E+1", "X250E-1Y10", "X 2 . 5e+1 Y10", "x2.5e+001 y10"] {
+        assert_eq!(strokes(&format!("G0 X1.2e-05 Y-1e-7\nG1 X1.2e-05 Y10\n{last}\n")), line);
+    }
+    // The words E of a printer: of these moves the first alone extrudes.
+    for other in ["X30 E-4", "X30 e -4", "X30E-0.4", "X30E0", "X30E -4", "X30E-1234"] {
+        let program = format!("M83\nG92E-1\nG0 X10\nG1 X20 E1\nG1 {other}\nG1E-2\n");
+        assert_eq!(strokes(&program), [[[10.0, 0.0], [20.0, 0.0]]], "{other}");
+    }
+    let error = sent("a.nc", b"G1 X5\nX1e+999\n").expect_err("refused");
+    assert!(error.starts_with("a.nc:2: \"X1e+999\" is no number"), "{error}");
 }
 
 /// A square of two layers and a move without ink, as PrusaSlicer (M83) and Cura (M82) write it.
@@ -240,6 +403,33 @@ fn a_move_in_the_coordinates_of_the_machine_is_not_drawn() {
     }
     let known_again = "G0 X1\nG1 X5\nG53 G0 X0 Y0\nG0 X9 Y0\nG1 Y9\n";
     assert_eq!(strokes(known_again), [[[1.0, 0.0], [5.0, 0.0]], [[9.0, 0.0], [9.0, 9.0]]]);
+}
+
+/// Printers home before they begin, and mills in the middle, to have room for a new tool.
+#[test]
+fn home_is_a_place_of_the_machine_after_the_first_move() {
+    let first = vec![[10.0, 10.0], [20.0, 10.0]];
+    for (home, after, second) in [
+        ("G28", "G0 X30 Y5\nG1 X40", [[30.0, 5.0], [40.0, 5.0]]),
+        ("G91 G28 Z0\nG90", "G0 X30 Y5\nG1 X40", [[30.0, 5.0], [40.0, 5.0]]),
+        ("G28 X", "G0 X30\nG1 Y9", [[30.0, 10.0], [30.0, 9.0]]),
+        ("G30 Y0", "G0 Y5\nG1 X40", [[20.0, 5.0], [40.0, 5.0]]),
+    ] {
+        let program = format!("G28\nG0 X10 Y10\nG1 X20\n{home}\n{after}\nG28\n");
+        assert_eq!(strokes(&program), [first.clone(), second.to_vec()], "{program}");
+        assert_eq!(notes("a.nc", program.as_bytes()), [""; 0], "{program}");
+    }
+    for (home, after) in [("G28", "G91\nG1 X5"), ("G30 X0", "G0 Y9\nG1 X9"), ("G28 Y", "G1 X9")] {
+        let program = format!("G0 X10 Y10\nG1 X20\n{home}\n{after}\n");
+        let error = sent("a.nc", program.as_bytes()).expect_err("refused");
+        assert!(
+            error.contains("would draw from a place of the machine (line 3), which"),
+            "{error}"
+        );
+    }
+    // It lifts the pen as well.
+    let lifted = "G0 Z5\nG0 X10 Y10\nG1 Z-1\nG1 X20\nG91 G28 Z0\nG90\nG1 X30\nG1 Z-1\nG1 X40\n";
+    assert_eq!(strokes(lifted), [first, vec![[30.0, 10.0], [40.0, 10.0]]]);
 }
 
 #[test]

@@ -9,6 +9,8 @@ pub(super) enum Line {
     Words(Vec<(char, f64)>),
     /// A line that orders nothing.
     Skipped,
+    /// A pause, which may have a message (`M0`, `M1`).
+    Pause,
     /// A command of this name that takes no words, but text or named values.
     Command(String),
 }
@@ -70,7 +72,7 @@ pub(super) fn parse(text: &str) -> Result<Line, RefusalText> {
     }
     let code = name.strip_prefix('M').and_then(|code| code.parse().ok());
     if code.is_some_and(|code| WITH_TEXT.contains(&code)) {
-        return Ok(if code > Some(1) { Line::Command(name) } else { Line::Skipped });
+        return Ok(if code > Some(1) { Line::Command(name) } else { Line::Pause });
     }
     let takes_values = rest.split_whitespace().skip(1).all(|word| word.contains('='));
     if letters.len() > 1 && name.len() > 2 && takes_values {
@@ -138,25 +140,50 @@ fn without_comments(text: &str) -> String {
     kept
 }
 
+/// A letter of a line, and whether whitespace stands before it.
+type Letter = (char, bool);
+
+/// The length of the exponent at the beginning of what follows a number: `e-05`, as programs write
+/// it that do not think of the word E. That of a 3D printer has whitespace before it, no sign, or a
+/// point.
+fn exponent(after: &[Letter]) -> usize {
+    let [('e' | 'E', false), ('+' | '-', false), digits @ ..] = after else { return 0 };
+    let count = digits.iter().take_while(|(it, spaced)| it.is_ascii_digit() && !spaced).count();
+    let goes_on = digits.get(count).is_some_and(|(it, _)| it.is_ascii_digit() || *it == '.');
+    if (1..=3).contains(&count) && !goes_on { 2 + count } else { 0 }
+}
+
 /// The words of a line: letters in capitals and their numbers.
 fn words(text: &str) -> Result<Vec<(char, f64)>, RefusalText> {
-    let letters: Vec<char> = text.chars().filter(|letter| !letter.is_whitespace()).collect();
+    let mut letters: Vec<Letter> = Vec::new();
+    let mut is_spaced = false;
+    for letter in text.chars() {
+        if !letter.is_whitespace() {
+            letters.push((letter, is_spaced));
+        }
+        is_spaced = letter.is_whitespace();
+    }
     let mut words = Vec::new();
     let mut without_number = Vec::new();
     let mut rest = letters.as_slice();
-    while let [letter, after @ ..] = rest {
-        let is_number = |letter: &char| letter.is_ascii_digit() || "+-.".contains(*letter);
-        let end = after.iter().position(|it| !is_number(it)).unwrap_or(after.len());
+    while let [(letter, _), after @ ..] = rest {
+        let is_number = |(letter, _): &Letter| letter.is_ascii_digit() || "+-.".contains(*letter);
+        let mut end = after.iter().position(|it| !is_number(it)).unwrap_or(after.len());
+        // `G1E-5` turns the extruder back.
+        if end > 0 && !matches!(letter, 'G' | 'g' | 'M' | 'm') {
+            end += after.get(end..).map_or(0, exponent);
+        }
         let (number, next) = after.split_at(end);
-        let number: String = number.iter().collect();
+        let number: String = number.iter().map(|(letter, _)| letter).collect();
         if !letter.is_ascii_alphabetic() {
             return Err(format!("\"{letter}\" is no word of G-code"));
         }
         if number.is_empty() {
             without_number.push(letter.to_ascii_uppercase());
         }
-        let value = if number.is_empty() { Ok(0.0) } else { number.parse() };
-        let value = value.map_err(|_| format!("\"{letter}{number}\" is no number"))?;
+        let value = if number.is_empty() { Some(0.0) } else { number.parse().ok() };
+        let value = value.filter(|value: &f64| value.is_finite());
+        let value = value.ok_or_else(|| format!("\"{letter}{number}\" is no number"))?;
         words.push((letter.to_ascii_uppercase(), value));
         rest = next;
     }
