@@ -1,8 +1,8 @@
 //! Checks that in the Pico's image every function is there that `boards/pico.x` wants side by side
 //! or in RAM.
 //!
-//! The sections `.hot` and `.hot_in_ram` of that memory map list functions by patterns over their
-//! mangled names, because the library forbids the attribute that would place them. A pattern that
+//! The sections `.hot`, `.hot_with_jerk` and `.hot_in_ram` of that memory map list functions by
+//! patterns over their mangled names, because the library forbids the attribute that would place them. A pattern that
 //! matches nothing causes no error of the linker: the function then lies elsewhere, and planning
 //! becomes slower. It happens when a module is renamed, or when the compiler inlines the function.
 //! Nor does the linker know that the functions must fit into the cache together.
@@ -13,6 +13,9 @@ use object::{Object, ObjectSection, ObjectSymbol};
 /// The name of the section in flash, in the memory map and in the image.
 const IN_FLASH: &str = ".hot";
 
+/// The name of the section in flash with what a limit on jerk needs besides.
+const WITH_JERK: &str = ".hot_with_jerk";
+
 /// The name of the section in RAM, in the memory map and in the image.
 const IN_RAM: &str = ".hot_in_ram";
 
@@ -20,13 +23,13 @@ const IN_RAM: &str = ".hot_in_ram";
 /// this size that lies side by side has a place of its own there.
 const CACHE_BYTES: u64 = 16 << 10;
 
-/// Checks both sections of the image `elf` against the memory map `map`.
+/// Checks the sections of the image `elf` against the memory map `map`.
 ///
 /// # Errors
 /// The map lacks one of the sections or its patterns, a pattern matches no function in its section,
-/// or the section in flash is larger than the cache.
+/// or a section in flash is larger than the cache.
 pub fn check(elf: &object::File, map: &str) -> Result<()> {
-    for name in [IN_FLASH, IN_RAM] {
+    for name in [IN_FLASH, WITH_JERK, IN_RAM] {
         let section = elf.section_by_name(name);
         let section = section.with_context(|| format!("the image has no section {name}"))?;
         ensure!(
