@@ -2,10 +2,11 @@
 //! or in RAM.
 //!
 //! The sections `.hot`, `.hot_with_jerk` and `.hot_in_ram` of that memory map list functions by
-//! patterns over their mangled names, because the library forbids the attribute that would place them. A pattern that
-//! matches nothing causes no error of the linker: the function then lies elsewhere, and planning
-//! becomes slower. It happens when a module is renamed, or when the compiler inlines the function.
-//! Nor does the linker know that the functions must fit into the cache together.
+//! patterns over their mangled names, because the library forbids the attribute that would place
+//! them. A pattern that matches nothing causes no error of the linker: the function then lies
+//! elsewhere, and planning becomes slower. It happens when a module is renamed, or when the
+//! compiler inlines the function. Nor does the linker know that the functions must fit into the
+//! cache together.
 
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection, ObjectSymbol};
