@@ -1,6 +1,7 @@
 //! How long the emulated Raspberry Pi Pico takes from `$plot` to the first ink at its pins, by the
-//! very image that is flashed: `pico_first_ink [SCENE]...`. The image is built by `cargo xtask
-//! build --board pico`; `PENUP_IMAGE` names another one.
+//! very image that is flashed, and for how long at most nothing moves in the minute after that,
+//! while the order of the strokes is found and improved: `pico_first_ink [SCENE]...`. The image is
+//! built by `cargo xtask build --board pico`; `PENUP_IMAGE` names another one.
 //!
 //! A short jog comes before the job, which begins when that has ended. So both times are those of
 //! pins.
@@ -21,19 +22,24 @@ const SCENES: [(&str, &str); 4] = [
 ];
 
 fn main() -> Result<(), Box<dyn Error>> {
-    println!("| scene | first ink, s |");
-    println!("|---|---|");
+    println!("| scene | first ink, s | longest rest, s |");
+    println!("|---|---|---|");
     let wanted: Vec<String> = std::env::args().skip(1).collect();
     for (scene, eye) in SCENES {
         if wanted.is_empty() || wanted.iter().any(|name| name == scene) {
-            println!("| {scene} | {:.2} |", measure(scene, eye)?.as_secs_f64());
+            let [ink, rest] = measure(scene, eye)?.map(|time| time.as_secs_f64());
+            println!("| {scene} | {ink:.2} | {rest:.2} |");
         }
     }
     Ok(())
 }
 
-/// The time from `$plot` to the first ink, with which the run ends.
-fn measure(scene: &str, eye: &str) -> Result<Duration, Box<dyn Error>> {
+/// The time for which the drawing is watched.
+const WATCHED: Duration = Duration::from_secs(60);
+
+/// The time from `$plot` to the first ink, and the longest time after that between two changes of
+/// the pins.
+fn measure(scene: &str, eye: &str) -> Result<[Duration; 2], Box<dyn Error>> {
     let image = std::env::var_os("PENUP_IMAGE").map_or_else(|| image_path("pico"), Into::into);
     let mut uart = Line::to(Box::new(Pico::start(&image)?))?;
     uart.emulator.plug_usb_in()?;
@@ -51,11 +57,17 @@ fn measure(scene: &str, eye: &str) -> Result<Duration, Box<dyn Error>> {
     }
     line.emulator.send(b"$J=G91 X0.1 F600\n$plot\n")?;
     let (mut machine, mut begun, mut first_ink) = (Machine::default(), None, None);
-    while first_ink.is_none() {
+    let (mut last, mut longest_rest) = (None, Duration::ZERO);
+    while first_ink.zip(last).is_none_or(|(ink, last)| last < ink + WATCHED) {
         line.status()?;
         let mut is_jog = true;
         for change in line.emulator.pin_changes()? {
             let at = change.at;
+            if first_ink.is_some() {
+                let rest = last.map_or(Duration::ZERO, |last| at.saturating_sub(last));
+                longest_rest = longest_rest.max(rest);
+                last = Some(at);
+            }
             match machine.change(change).map(|event| event.kind) {
                 // The jog takes a tenth of a second at most.
                 Some(MachineEventKind::Step { .. })
@@ -71,5 +83,5 @@ fn measure(scene: &str, eye: &str) -> Result<Duration, Box<dyn Error>> {
         }
     }
     let took = first_ink.zip(begun).map(|(ink, begun)| ink.saturating_sub(begun));
-    took.ok_or_else(|| "no ink".into())
+    Ok([took.ok_or("no ink")?, longest_rest])
 }

@@ -7,7 +7,7 @@
 use penup::board_table::PICO;
 use penup::boards::host::{CutFlash, Stamped};
 use penup::machine::{Contacts, JobSize, State};
-use penup::plotter::Unobserved;
+use penup::plotter::{Board as _, Unobserved};
 use penup::stage::NeverCancel;
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_early,
@@ -143,17 +143,23 @@ fn other_jobs_are_drawn_as_always() {
 
 /// Sends `bytes` while the order is computed, and returns the plotter once `$plot` is answered.
 fn disturbed(bytes: &[u8], milliseconds: u64) -> (Bench, String) {
+    let (bench, answer, _) = disturbed_at(bytes, milliseconds);
+    (bench, answer)
+}
+
+/// As [`disturbed`]. Returns when the bytes were sent, too.
+fn disturbed_at(bytes: &[u8], milliseconds: u64) -> (Bench, String, u64) {
     let mut bench = loaded(&lattice(), true);
     bench.board.set_work_ticks(MILLISECOND);
     let at = bench.board.trace().now() + milliseconds * MILLISECOND;
     bench.board.receive_meanwhile(at, bytes);
     let answer = bench.say("$plot\n");
-    (bench, answer)
+    (bench, answer, at)
 }
 
 #[test]
 fn the_status_tells_what_the_machine_does() {
-    let (mut bench, answer) = disturbed(b"?", 2500);
+    let (mut bench, answer, begun) = disturbed_at(b"?", 2500);
     let status = answer.lines().find(|line| line.starts_with('<')).expect("a report");
     assert!(status.starts_with("<Run|MPos:"), "{status}");
     // No line is read before the order is known, so a sender must not wait for an answer.
@@ -169,7 +175,6 @@ fn the_status_tells_what_the_machine_does() {
     let left: u32 =
         status.split_once("|Left:").and_then(|(_, left)| left.parse().ok()).expect("a time");
     assert!(done >= 1, "{status}");
-    let begun = bench.board.trace().now();
     bench.finish();
     let took = (bench.board.trace().now() - begun) / 25_000_000;
     let size = bench.plotter.machine().status().job;
@@ -197,18 +202,55 @@ fn a_job_is_held_and_goes_on() {
 
 #[test]
 fn a_job_is_given_up_while_its_order_is_computed() {
-    let (mut bench, answer) = disturbed(b"\x18", 3200);
-    assert!(answer.contains("error:"), "{answer}");
-    bench.finish();
-    assert_eq!(bench.plotter.machine().state(), State::Idle);
-    let strokes = drawn(&bench.board.trace().changes()).len();
-    assert!((1..30).contains(&strokes), "{strokes}");
-    // The next job is drawn whole.
-    let before = bench.board.trace().changes().len();
-    let answer = bench.say("$plot\n");
-    assert!(answer.ends_with("ok\n"), "{answer}");
-    bench.finish();
-    assert!(bench.board.trace().changes().len() > before + 1000);
+    let (whole, _) = draw(&lattice(), true, MILLISECOND);
+    let whole = ink(&drawn(&whole.board.trace().changes()));
+    // While it is found, and while it is improved.
+    for (milliseconds, is_answered) in [(2100, false), (5000, true), (12_000, true)] {
+        let (mut bench, answer) = disturbed(b"\x18", milliseconds);
+        assert_eq!(answer.ends_with("ok\n"), is_answered, "{milliseconds} {answer}");
+        bench.finish();
+        assert_eq!(bench.plotter.machine().state(), State::Idle);
+        let strokes = drawn(&bench.board.trace().changes()).len();
+        assert!((1..60).contains(&strokes), "{strokes}");
+        // The next job is drawn whole.
+        let answer = bench.say("$plot\n");
+        assert!(answer.ends_with("ok\n"), "{answer}");
+        bench.finish();
+        let again = drawn(&bench.board.trace().changes()).split_off(strokes);
+        assert!(ink(&again) == whole, "{milliseconds}");
+    }
+}
+
+/// The order of the strokes that the pen has not reached is improved while it draws. Lines are
+/// answered meanwhile, and what is told of the order is true of it in the end.
+#[test]
+fn the_order_is_improved_while_the_pen_draws() {
+    let mut bench = loaded(&lattice(), true);
+    bench.board.set_work_ticks(MILLISECOND);
+    bench.board.receive(b"$plot\n");
+    let (mut reports, mut heard) = (Vec::new(), String::new());
+    let mut asked = false;
+    for _ in 0..200_000 {
+        let is_busy = bench.plotter.poll(&mut bench.board);
+        bench.board.wait();
+        if !is_busy && heard.ends_with("ok\n") && bench.plotter.machine().is_stopped() {
+            break;
+        }
+        heard += &bench.heard();
+        let report = *bench.plotter.job().report();
+        if heard.ends_with("ok\n") && reports.last() != Some(&report) {
+            reports.push(report);
+            asked = false;
+        }
+        if !asked && reports.len() == 1 {
+            asked = true;
+            bench.board.receive(b"$model\n");
+        }
+    }
+    assert!(reports.len() >= 2, "{reports:?}");
+    assert!(reports.is_sorted_by(|a, b| a.pen_up > b.pen_up), "{reports:?}");
+    assert_eq!(reports.last(), Some(bench.plotter.job().report()));
+    assert!(heard.contains("[JOB:"), "{heard}");
 }
 
 /// While the lines are found, the pen travels to where it will begin. It can be held and the job be

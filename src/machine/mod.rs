@@ -44,8 +44,6 @@ pub use kinematics::{Anchors, CutPositions, Kinematics, SegmentEnd};
 pub use path::PendingTarget;
 pub use path::{JobSize, Path, TapePath, Target, TargetList};
 pub use pulser::{Axes, EventRing, PinOrder, Pins, Pulser, PulserState, StepQueue, Tick};
-#[cfg(feature = "early-ink")]
-pub use settings::StrokeTime;
 pub use settings::{SETTINGS, Setting, SettingError, SettingInfo, Settings, Value};
 pub use state::{Alarm, MachineError, State};
 pub use status::Status;

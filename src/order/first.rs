@@ -17,9 +17,7 @@
 use super::metric::length;
 use super::network::{Anchor, pen_segments};
 use super::partition::Partition;
-use super::{
-    EXACT_POINTS, Effort, Leg, Options, OrderError, Report, Shape, check, measure, order_pens,
-};
+use super::{EXACT_POINTS, Leg, Options, OrderError, Report, Shape, check, measure, order_pens};
 use crate::array::MapEach;
 use crate::drawing::{Drawing, PagePoint, Segment};
 use crate::index::Index;
@@ -39,10 +37,6 @@ const GREEDY_MICROSECONDS: u64 = 600;
 /// The microseconds of everything else in the order, for each odd point.
 const POINT_MICROSECONDS: u64 = 1500;
 
-/// The time in milliseconds by which the pen is busy longer than the order is estimated to take.
-/// The order is improved during that time, so it costs no time.
-const SPARE_MILLISECONDS: u64 = 4000;
-
 /// The choice of the strokes that are drawn first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FirstStrokes {
@@ -55,16 +49,26 @@ pub struct FirstStrokes {
     pub parts: u32,
     /// About how many strokes are left besides them.
     pub strokes_left: u32,
-    /// The milliseconds for which the pen is busy with them beyond those that the order takes
-    /// anyway.
-    pub spare_milliseconds: u32,
+    /// How long strokes take, by which it is told later how many keep the pen busy.
+    pub time: StrokeTime,
 }
 
-/// Estimates how long the pen is busy with strokes.
-pub trait StrokeDurations {
+/// How long the pen is busy with strokes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct StrokeTime {
+    /// The speed with the pen down; 0 counts as no time.
+    pub steps_per_second: u32,
+    /// The milliseconds that lowering and raising the pen take.
+    pub stroke_milliseconds: u32,
+}
+
+impl StrokeTime {
     /// Returns the milliseconds that this many strokes take, without the moves between them. Their
     /// total length is given in 1/256 steps.
-    fn milliseconds(&self, strokes: u32, length: u64) -> u64;
+    pub(super) fn milliseconds(self, strokes: u32, length: u64) -> u64 {
+        let drawn = ((length >> 8) * 1000).checked_div(self.steps_per_second.into());
+        u64::from(strokes) * u64::from(self.stroke_milliseconds) + drawn.unwrap_or(0)
+    }
 }
 
 /// The connected parts of what a pen draws. A part is known by its lowest point.
@@ -190,11 +194,11 @@ pub fn choose_first<I: Index>(
     points: &[PagePoint],
     segments: &mut [Segment<I>],
     options: Options,
-    meanwhile: &dyn StrokeDurations,
+    time: StrokeTime,
     scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
 ) -> Result<FirstStrokes, OrderError> {
-    match choose(points, segments, options, meanwhile, scratch, cancel) {
+    match choose(points, segments, options, time, scratch, cancel) {
         // Where memory is short, the whole order is computed before the pen begins.
         Err(OrderError::Scratch(_)) => Ok(FirstStrokes::default()),
         chosen => chosen,
@@ -209,7 +213,7 @@ fn choose<I: Index>(
     points: &[PagePoint],
     segments: &mut [Segment<I>],
     options: Options,
-    meanwhile: &dyn StrokeDurations,
+    time: StrokeTime,
     mut scratch: Scratch<'_>,
     cancel: &mut dyn Cancel,
 ) -> Result<FirstStrokes, OrderError> {
@@ -229,7 +233,7 @@ fn choose<I: Index>(
         mark_odd(drawing, pen, is_odd);
         let parts = Parts::new(drawing, pen, is_odd, &mut scratch)?;
         corner = parts.corner;
-        while milliseconds < order_takes + SPARE_MILLISECONDS {
+        while milliseconds < order_takes {
             cancel.check()?;
             let Some((part, odd_points, length)) = parts.nearest() else { break };
             let of_part = (odd_points / 2).max(1);
@@ -239,7 +243,7 @@ fn choose<I: Index>(
             if let Some(far) = parts.far.get_mut(part) {
                 *far = CHOSEN;
             }
-            milliseconds += meanwhile.milliseconds(of_part, length);
+            milliseconds += time.milliseconds(of_part, length);
             strokes += of_part;
             odd += odd_points;
             first.parts += 1;
@@ -255,9 +259,8 @@ fn choose<I: Index>(
     }
     let (chosen, _) = segments.split_at_mut(first.segments);
     arrange(points, chosen, corner, options, scratch, cancel)?;
-    let spare = milliseconds.saturating_sub(order_takes);
-    first.spare_milliseconds = u32::try_from(spare).unwrap_or(u32::MAX);
     first.odd_points = odd;
+    first.time = time;
     let strokes_left = all_odd.saturating_sub(odd.into()) / 2;
     first.strokes_left = u32::try_from(strokes_left).unwrap_or(u32::MAX).max(1);
     Ok(first)
@@ -278,12 +281,11 @@ fn arrange<I: Index>(
     let drawing = Drawing { points, segments: &*segments };
     let options = Options { shape: Shape::OpenPath, ..options };
     let mut report = Report::default();
-    let anchor = Anchor::new(corner, 0);
+    let anchor = Anchor::new(corner);
     order_pens(drawing, options, anchor, scratch, cancel, tour, &mut report)?;
     for (slot, leg) in arranged.iter_mut().zip(tour) {
         if let Some(segment) = segments.get(leg.segment()) {
-            let [from, to] = [segment.from(), segment.to()];
-            let [from, to] = if leg.reversed() { [to, from] } else { [from, to] };
+            let [from, to] = ends(segment, *leg);
             *slot = Segment::new(from, to).inked(segment.line_type(), segment.pen());
         }
     }
@@ -318,13 +320,7 @@ pub fn order_rest<I: Index>(
     let (before, segments) =
         drawing.segments.split_at_checked(count).ok_or(OrderError::TourLength)?;
     let end = before.last().and_then(|last| drawing.points.get(last.to().get()));
-    let free_units = match options.effort {
-        Effort::Auto(time_model) => {
-            u64::from(first.spare_milliseconds) * u64::from(time_model.units_per_second) / 1000
-        }
-        Effort::Units(_) => 0,
-    };
-    let anchor = end.map_or_else(Anchor::default, |&end| Anchor::new(end, free_units));
+    let anchor = end.map_or_else(Anchor::default, |&end| Anchor::new(end));
     let options = Options { shape: Shape::OpenPath, ..options };
     let mut report = Report::default();
     let others = Drawing { segments, ..drawing };
@@ -332,24 +328,48 @@ pub fn order_rest<I: Index>(
     for leg in rest.iter_mut() {
         *leg = Leg::new(I::new(leg.segment() + count), leg.reversed());
     }
-    for legs in [drawn, rest] {
-        measure(drawing, legs, Shape::OpenPath, &mut report);
-    }
-    let begin = rest.first().and_then(|leg| {
-        let segment = drawing.segments.get(leg.segment())?;
-        drawing.points.get(if leg.reversed() { segment.to() } else { segment.from() }.get())
-    });
-    if let Some((&end, &begin)) = end.zip(begin).filter(|(end, begin)| end != begin) {
-        report.lifts += 1;
-        report.pen_up += u64::from(length(end, begin));
-    }
     report.odd_points += first.odd_points;
     report.components += first.parts;
-    // The least length of the rest says nothing of the whole.
-    report.bound = 0;
-    report.optimal = false;
-    Ok(report)
+    Ok(measure_all(drawing, drawn, rest, report))
+}
+
+/// Measures an open path that consists of two parts, and returns its report. What is not measured
+/// is as in `report`. No lower bound of the length is known of the whole.
+pub(super) fn measure_all<I: Index>(
+    drawing: Drawing<'_, I>,
+    drawn: &[Leg<I>],
+    rest: &[Leg<I>],
+    report: Report,
+) -> Report {
+    let mut all = Report {
+        odd_points: report.odd_points,
+        components: report.components,
+        ..Report::default()
+    };
+    for legs in [drawn, rest] {
+        measure(drawing, legs, Shape::OpenPath, &mut all);
+    }
+    let end = drawn.last().and_then(|leg| end_of(drawing, *leg));
+    let begin = rest.first().and_then(|leg| end_of(drawing, leg.flipped()));
+    if let Some((end, begin)) = end.zip(begin).filter(|(end, begin)| end != begin) {
+        all.lifts += 1;
+        all.pen_up += u64::from(length(end, begin));
+    }
+    Report { bound: 0, optimal: false, ..all }
+}
+
+/// Returns the points at which a leg begins and ends.
+pub(super) fn ends<I: Index>(segment: &Segment<I>, leg: Leg<I>) -> [I; 2] {
+    let [from, to] = [segment.from(), segment.to()];
+    if leg.reversed() { [to, from] } else { [from, to] }
+}
+
+/// Returns the point at which a leg ends.
+pub(super) fn end_of<I: Index>(drawing: Drawing<'_, I>, leg: Leg<I>) -> Option<PagePoint> {
+    let segment = drawing.segments.get(leg.segment())?;
+    let [_, end] = ends(segment, leg);
+    drawing.points.get(end.get()).copied()
 }
 
 #[cfg(test)]
-mod tests;
+pub(super) mod tests;

@@ -86,42 +86,26 @@ pub(super) struct Tour<'t, I> {
 
 /// Shortens `tour.route` as far as the budget allows. Does nothing if there is too little memory.
 #[inline(never)] // Inlined in its only caller, the code would be larger.
-pub(super) fn improve<I: Index>(
+pub(super) fn improve<'t, I: Index>(
     network: Network<'_, I>,
-    tour: Tour<'_, I>,
-    mut scratch: Scratch<'_>,
+    tour: Tour<'t, I>,
+    mut scratch: Scratch<'t>,
     work_budget: &mut WorkBudget<'_>,
 ) -> Result<(), OrderError> {
     let Tour { route, open, bound, mate, start, strokes_only, effort, lift_cost } = tour;
-    let legs = route.len() + usize::from(open);
-    let fits = |per_station: &usize| {
-        scratch_bytes(network, legs, *per_station) <= scratch.available_bytes()
-    };
-    let Some(per_station) = NEIGHBOURS.into_iter().find(fits) else {
-        return Ok(());
-    };
     if route_moves(network, route, open).sum::<u64>() == bound {
         return Ok(());
     }
-    let neighbours = Neighbours::new(network, per_station, &mut scratch, work_budget)?;
-    let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
+    let Some(mut best) = Best::new(network, route, open, &mut scratch, work_budget)? else {
+        return Ok(());
+    };
+    let Best { neighbours, moves, .. } = best;
+    let cycle = scratch.take(best.route.len() + usize::from(open))?;
     let first = match effort {
         Effort::Auto(time_model) => Until::Exchanged(time_model),
         Effort::Units(units) => {
             Until::Spent(u64::from(moves) * u64::from(units) / FIRST_TOUR_SHARE)
         }
-    };
-    let cycle: &mut [Leg<I>] = scratch.take(legs)?;
-    let mut best = Best {
-        network,
-        neighbours,
-        open,
-        lift_cost: 0,
-        moves,
-        cost: u64::MAX,
-        route,
-        kicks: Kicks::new(),
-        spent: 0,
     };
     best.restore(cycle);
     let mut pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
@@ -166,6 +150,35 @@ pub(super) fn improve<I: Index>(
     (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
     best.restore(cycle);
     best.work_on(cycle, last, scratch, work_budget)?;
+    Ok(())
+}
+
+/// Shortens an open `route`, which is a good one already, by annealing with this many units of work
+/// at this cost of a lift. Does nothing if that finds nothing shorter, or if there is too little
+/// memory.
+#[cfg(feature = "early-ink")]
+#[inline(never)] // Inlined in its only caller, the code would be larger.
+pub(super) fn improve_further<'r, I: Index>(
+    network: Network<'_, I>,
+    route: &'r mut [Leg<I>],
+    units: u64,
+    lift_cost: u32,
+    mut scratch: Scratch<'r>,
+    work_budget: &mut WorkBudget<'_>,
+) -> Result<(), OrderError> {
+    if let Some(mut best) = Best::new(network, route, true, &mut scratch, work_budget)? {
+        let cycle = scratch.take(best.route.len() + 1)?;
+        best.lift_cost = lift_cost;
+        // Only what is shorter is kept.
+        let begin = best.route.first().map(|&leg| network.start(leg));
+        let first_move = network.anchor().zip(begin);
+        let first_move = first_move.map(|(from, to)| u64::from(network.distance(from, to)));
+        let moves = route_moves(network, best.route, true).filter(|&length| length > 0);
+        let lift = u64::from(lift_cost) + 1;
+        best.cost = first_move.into_iter().chain(moves).map(|length| length + lift).sum();
+        best.restore(cycle);
+        best.work_on(cycle, Until::Annealed(units), scratch, work_budget)?;
+    }
     Ok(())
 }
 
@@ -225,7 +238,40 @@ struct Best<'b, 'a, I> {
     spent: u64,
 }
 
-impl<I: Index> Best<'_, '_, I> {
+impl<'b, 'a, I: Index> Best<'b, 'a, I> {
+    /// Begins with `route`, and finds the neighbours of its stations. `None` if there is too little
+    /// memory for the search.
+    #[inline(always)] // Adds no frame to the stack.
+    fn new(
+        network: Network<'a, I>,
+        route: &'b mut [Leg<I>],
+        open: bool,
+        scratch: &mut Scratch<'b>,
+        work_budget: &mut WorkBudget<'_>,
+    ) -> Result<Option<Self>, OrderError> {
+        let legs = route.len() + usize::from(open);
+        let fits = |per_station: &usize| {
+            scratch_bytes(network, legs, *per_station) <= scratch.available_bytes()
+        };
+        let Some(per_station) = NEIGHBOURS.into_iter().find(fits) else {
+            return Ok(None);
+        };
+        let neighbours = Neighbours::new(network, per_station, scratch, work_budget)?;
+        let moves = route_moves(network, route, open).filter(|&length| length > 0).count() as u32;
+        let (kicks, cost) = (Kicks::new(), u64::MAX);
+        Ok(Some(Self {
+            network,
+            neighbours,
+            open,
+            lift_cost: 0,
+            moves,
+            cost,
+            route,
+            kicks,
+            spent: 0,
+        }))
+    }
+
     /// Makes a tour of the pen-up moves `mate`, part by part, the nearest part next. It starts at
     /// the entrance nearest to `corner`, if one is given (or to the anchor, if there is one), and
     /// otherwise at `start`.
@@ -323,9 +369,7 @@ impl<I: Index> Best<'_, '_, I> {
             if let Some(Window { units, least_gain }) = window
                 && window_begin - work_budget.left() >= units
             {
-                let free_units = self.network.free_units();
-                let is_free = || until.budget() - work_budget.left() < free_units;
-                if window_gain < least_gain && (free_units == 0 || !is_free()) {
+                if window_gain < least_gain {
                     break;
                 }
                 (window_gain, window_begin) = (0, work_budget.left());

@@ -29,6 +29,8 @@ mod euler;
 mod exchange;
 #[cfg(feature = "early-ink")]
 mod first;
+#[cfg(feature = "early-ink")]
+mod later;
 mod greedy;
 mod improve;
 mod incidence;
@@ -47,7 +49,9 @@ mod remaining;
 mod search;
 
 #[cfg(feature = "early-ink")]
-pub use first::{FirstStrokes, StrokeDurations, choose_first, first_legs, order_rest};
+pub use first::{FirstStrokes, StrokeTime, choose_first, first_legs, order_rest};
+#[cfg(feature = "early-ink")]
+pub use later::{Released, improve_rest};
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
 

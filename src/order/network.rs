@@ -35,6 +35,10 @@ const fn bytes_a_stop<I>() -> usize {
 enum Stops {
     /// Only the points of those parts that have no odd point, which may be entered anywhere.
     Few,
+    /// Those, and the points where a stroke ends if the segments are drawn one after another, each
+    /// from its `from` end.
+    #[cfg(feature = "early-ink")]
+    StrokeEnds,
     /// All points where two segments meet.
     All,
 }
@@ -66,27 +70,13 @@ pub(super) struct Anchor {
     /// The place; `None` if the pen may begin anywhere.
     #[cfg(feature = "early-ink")]
     place: Option<PagePoint>,
-    /// The units of work that are done while the strokes before are drawn, so that the pen waits
-    /// for none of them.
-    #[cfg(feature = "early-ink")]
-    free_units: u64,
 }
 
 impl Anchor {
-    /// The path begins at `place`, and this many units of work are done while the strokes before
-    /// are drawn.
+    /// The path begins at `place`.
     #[cfg(feature = "early-ink")]
-    pub const fn new(place: PagePoint, free_units: u64) -> Self {
-        Self { place: Some(place), free_units }
-    }
-
-    /// The units of work for which the pen does not wait.
-    #[inline(always)] // Without the feature, what depends on it is left out.
-    pub const fn free_units(self) -> u64 {
-        #[cfg(feature = "early-ink")]
-        return self.free_units;
-        #[cfg(not(feature = "early-ink"))]
-        0
+    pub const fn new(place: PagePoint) -> Self {
+        Self { place: Some(place) }
     }
 
     /// The place; `None` if the pen may begin anywhere.
@@ -108,8 +98,32 @@ impl<'a, I: Index> Network<'a, I> {
         anchor: Anchor,
         scratch: &mut Scratch<'a>,
     ) -> Result<Self, OutOfScratch> {
-        let (mut stations, mut chains, mut stops) = (0, 0, Stops::Few);
-        for wanted in [Stops::Few, Stops::All] {
+        Self::with_stops(drawing, pen, Stops::Few, anchor, scratch)
+    }
+
+    /// Makes the network of segments that `pen` draws one after another, each from its `from` end.
+    /// Every stroke then is a run of chains, which have the numbers 0, 1, 2 and so on in the order
+    /// in which they are drawn.
+    #[cfg(feature = "early-ink")]
+    pub fn of_strokes(
+        drawing: Drawing<'a, I>,
+        pen: u8,
+        anchor: Anchor,
+        scratch: &mut Scratch<'a>,
+    ) -> Result<Self, OutOfScratch> {
+        Self::with_stops(drawing, pen, Stops::StrokeEnds, anchor, scratch)
+    }
+
+    /// Makes the network with at least the stations of `least`.
+    fn with_stops(
+        drawing: Drawing<'a, I>,
+        pen: u8,
+        least: Stops,
+        anchor: Anchor,
+        scratch: &mut Scratch<'a>,
+    ) -> Result<Self, OutOfScratch> {
+        let (mut stations, mut chains, mut stops) = (0, 0, least);
+        for wanted in [least, Stops::All] {
             let available = scratch.available_bytes();
             let mut lent = scratch.reborrow();
             let survey = Survey::new(drawing, pen, wanted, &mut lent)?;
@@ -117,7 +131,7 @@ impl<'a, I: Index> Network<'a, I> {
             let (points, ends) = (degrees().count(), degrees().sum::<usize>());
             let is_worth_it =
                 ends / 2 <= MOST_STOPS * chains && points * bytes_a_stop::<I>() <= available;
-            if wanted == Stops::Few || is_worth_it {
+            if wanted == least || is_worth_it {
                 (stations, chains, stops) = (points, ends / 2, wanted);
             }
         }
@@ -144,12 +158,6 @@ impl<'a, I: Index> Network<'a, I> {
     #[inline(always)] // Without the feature `early-ink`, what depends on it is left out.
     pub fn anchor(&self) -> Option<I> {
         self.anchor.place().map(|_| even_part())
-    }
-
-    /// The units of work for which the pen does not wait, because it draws meanwhile.
-    #[inline(always)] // Without the feature `early-ink`, what depends on it is left out.
-    pub fn free_units(&self) -> u64 {
-        self.anchor.free_units()
     }
 
     /// Returns where on the page a station lies; the anchor lies where the pen comes from.
@@ -266,6 +274,16 @@ fn next_leg<I: Index>(segments: &[Segment<I>], across: &[I], leg: Leg<I>) -> Leg
     Leg::new(number, segments[number.get()].from() != point)
 }
 
+/// Marks a point as the end of a stroke, in place of what is known of its segments: no chain goes
+/// on there. No exclusive or of two numbers is [`Index::NONE`], because segments have numbers below
+/// [`Leg::LIMIT`].
+#[cfg(feature = "early-ink")]
+fn mark_stroke_end<I: Index>(across: &mut [I], point: I) {
+    if let Some(across) = across.get_mut(point.get()) {
+        *across = I::NONE;
+    }
+}
+
 /// What is known of each point of the drawing while the chains are built.
 struct Survey<'s, 'a, I> {
     /// The segments of the drawing, those of other pens included.
@@ -276,7 +294,8 @@ struct Survey<'s, 'a, I> {
     stops: Stops,
     /// For each point the number of its segments, with the flag [`has_odd`].
     degree: &'s mut [I],
-    /// For each point the exclusive or of the numbers of its segments.
+    /// For each point the exclusive or of the numbers of its segments, or [`Index::NONE`] if a
+    /// stroke ends there.
     across: &'s mut [I],
     /// For each point, the lowest point of its connected part.
     part: &'s mut [I],
@@ -308,6 +327,18 @@ impl<'s, 'a, I: Index> Survey<'s, 'a, I> {
                 degree[lowest.get()] = degree[lowest.get()] | has_odd();
             }
         }
+        #[cfg(feature = "early-ink")]
+        if stops == Stops::StrokeEnds {
+            let mut before = I::NONE;
+            for (_, segment) in pen_segments(drawing.segments, pen) {
+                if before != segment.from() {
+                    mark_stroke_end(across, before);
+                    mark_stroke_end(across, segment.from());
+                }
+                before = segment.to();
+            }
+            mark_stroke_end(across, before);
+        }
         Ok(Self { segments: drawing.segments, pen, stops, degree, across, part })
     }
 
@@ -321,9 +352,19 @@ impl<'s, 'a, I: Index> Survey<'s, 'a, I> {
         let lowest = self.part[point.get()];
         match self.degree(point) {
             0 => false,
-            2 => self.stops == Stops::All || self.degree[lowest.get()] & has_odd() == I::ZERO,
+            2 => {
+                self.stops == Stops::All
+                    || self.degree[lowest.get()] & has_odd() == I::ZERO
+                    || self.is_stroke_end(point)
+            }
             _ => true,
         }
+    }
+
+    /// Whether a point, at which two segments meet, is marked as the end of a stroke.
+    #[inline(always)] // Without the feature, what depends on it is left out.
+    fn is_stroke_end(&self, point: I) -> bool {
+        cfg!(feature = "early-ink") && self.across[point.get()] == I::NONE
     }
 
     /// Returns the numbers of the points that are stations, the lowest first.

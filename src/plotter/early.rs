@@ -14,20 +14,20 @@
 //! while the machine is at rest with the pen raised, and only then the other strokes are drawn.
 //! After a loss of power before that, the same order is computed again.
 
-use super::job::{Begun, Pipeline, Unordered};
+use super::job::{Begun, OrderStep, Pipeline, Unordered};
 use super::listener::{Listener, MeasuredStrokes};
 use super::{Board, Cursor, Inner, Job, Observer, REPLY_BYTES, Reply, Unobserved, records, report};
 use crate::drawing::PagePoint;
 use crate::index::Index;
-use crate::machine::{JobSize, Machine, Measured, State, StrokeTime, TargetList};
-use crate::order::{self, Effort, Method, Shape};
+use crate::machine::{JobSize, Machine, Measured, State, TargetList};
+use crate::order::{self, Effort, Method, Shape, StrokeTime};
 use crate::protocol::{CommandError, RealTime};
 use crate::stage::{Aborted, Cancel, Stage};
 
 /// The number of targets that are measured in one turn of the main loop.
 const TARGETS_A_TURN: u32 = 64;
 
-/// A job whose order is known, but not released yet.
+/// A job whose order is known, but not released yet, or still being improved.
 #[derive(Debug)]
 pub(super) struct Pending<I> {
     /// The job with its order.
@@ -222,18 +222,16 @@ impl<I: Index> Inner<'_, I> {
             return Ok(());
         }
         let measured = self.begin_first(job, listener)?;
-        let ordered = self.order_meanwhile(job, listener);
-        match ordered {
-            Ok(job) => {
-                let (cursor, measured) = (Cursor::default(), Some(measured));
-                self.pending = Some(Pending { job, cursor, measured, size: JobSize::default() });
-                Ok(())
-            }
-            Err(error) => {
-                self.machine.abort();
-                Err(error)
-            }
-        }
+        self.change_overrides(core::mem::take(&mut listener.overrides));
+        self.act(core::mem::take(&mut listener.requests));
+        // The pen leaves before the order is begun, which asks for the first time only when it has
+        // taken its memory.
+        self.plan(None, listener.board);
+        listener.board.begin_steps();
+        let job = self.order_meanwhile(job, listener.board)?;
+        let (cursor, measured) = (Cursor::default(), Some(measured));
+        self.pending = Some(Pending { job, cursor, measured, size: JobSize::default() });
+        Ok(())
     }
 
     /// Computes the drawing of `$plot`, in place of the last job, while the pen travels to where it
@@ -330,36 +328,34 @@ impl<I: Index> Inner<'_, I> {
         Ok(measured)
     }
 
-    /// Computes the order of the strokes while the machine draws the first ones.
+    /// Carries out the next step of the computation of the order, while the machine draws the
+    /// strokes that are released, and releases some more of them. Gives the job up if that fails.
     ///
     /// # Errors
-    /// The [`CommandError`] to reply with; the machine may still draw.
-    #[inline(always)] // Adds no frame to the stack.
+    /// The [`CommandError`] to reply with.
+    #[inline(never)] // Its two callers share one copy of the code.
     fn order_meanwhile<B: Board>(
         &mut self,
         job: Job<I>,
-        listener: &mut Listener<'_, B>,
+        board: &mut B,
     ) -> Result<Job<I>, CommandError> {
-        self.change_overrides(core::mem::take(&mut listener.overrides));
-        self.act(core::mem::take(&mut listener.requests));
-        // The pen leaves before the order is begun, which asks for the first time only when it has
-        // taken its memory.
-        self.plan(None, listener.board);
-        listener.board.begin_steps();
         let words = core::mem::take(&mut self.words);
-        let board = &mut *listener.board;
-        let ordered = job.ordered_by(words, |begun, scratch, rest, unordered| {
-            let Unordered { first, options } = unordered;
+        let ordered = job.order_further(words, |step: OrderStep<'_, I>, scratch, rest| {
+            let begun = step.begun;
             let mut meanwhile = OrderCancel { inner: self, board, begun, status_due: false };
-            let Begun { drawing, drawn } = begun;
-            order::order_rest(drawing, first, drawn, options, scratch, &mut meanwhile, rest)
+            step.run(scratch, &mut meanwhile, rest)
         });
         self.words = words;
+        match ordered {
+            Ok(job) if job.unordered().is_some() => self.job = job,
+            Ok(_) => {}
+            Err(_) => self.machine.abort(),
+        }
         ordered
     }
 
-    /// Measures a job whose order has become known, and releases its strokes once the board has
-    /// kept the order. Returns whether there was anything to do.
+    /// Improves the order of a job, as long as that pays, then measures the job, and releases all
+    /// of its strokes once the board has kept the order. Returns whether there was anything to do.
     #[inline(always)] // It is called in every turn of the main loop.
     pub(super) fn follow_order<B: Board>(&mut self, board: &mut B) -> bool {
         self.pending.is_some() && self.release(board)
@@ -372,6 +368,14 @@ impl<I: Index> Inner<'_, I> {
             // The job was given up. It is kept without the order, which can be computed again.
             self.pending = None;
             return false;
+        }
+        if let Some(Pending { job, .. }) = self.pending
+            && job.unordered().is_some()
+        {
+            let ordered = self.order_meanwhile(job, board).ok();
+            self.pending =
+                self.pending.take().zip(ordered).map(|(pending, job)| Pending { job, ..pending });
+            return true;
         }
         let Some(pending) = &mut self.pending else { return false };
         if let Some(measured) = &mut pending.measured {

@@ -209,7 +209,7 @@ pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotS
 /// the drawing alone. When the order is known, it is added: the number of strokes, the figures, and
 /// the legs.
 #[cfg(feature = "early-ink")]
-const BEGUN_LAYOUT: u32 = u32::from_le_bytes(*b"job2");
+const BEGUN_LAYOUT: u32 = u32::from_le_bytes(*b"job3");
 /// Number of words before the drawing of a job whose order is not known yet.
 #[cfg(feature = "early-ink")]
 const BEGUN_HEADER: usize = JOB_HEADER + UNORDERED_WORDS;

@@ -11,8 +11,6 @@
 mod motion;
 mod table;
 
-#[cfg(feature = "early-ink")]
-pub use motion::StrokeTime;
 pub use table::{SETTINGS, Setting, SettingInfo};
 
 use super::Kinematics;

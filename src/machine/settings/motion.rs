@@ -6,6 +6,8 @@ use crate::machine::{Kinematics, Tool};
 use crate::motion::{BrakeRule, Limits, LimitsError, MotionSettings, PathLength};
 #[cfg(feature = "input-shaping")]
 use crate::motion::{Resonance, ShaperKind, Shaping};
+#[cfg(feature = "early-ink")]
+use crate::order::StrokeTime;
 use crate::order::TimeModel;
 
 impl Settings {
@@ -70,17 +72,17 @@ impl Settings {
         (limits.brake(longest_step, queue), is_less.then_some(held))
     }
 
-    /// Returns the durations of strokes.
+    /// Returns how long strokes take.
     #[cfg(feature = "early-ink")]
     pub fn stroke_time(&self) -> StrokeTime {
         let MotionSettings { steps_per_mm, draw_mm_per_min, .. } = self.motion_settings();
         let [speed, per_mm] = [draw_mm_per_min, steps_per_mm[0]]
             .map_each(|value| u64::from(value.to_bits().unsigned_abs()));
         let per_minute = (speed * per_mm) >> (2 * Value::FRAC_NBITS);
-        StrokeTime {
-            steps_per_second: (per_minute / 60).max(1),
-            stroke_milliseconds: Tool::stroke_milliseconds(self),
-        }
+        let [steps_per_second, stroke_milliseconds] =
+            [(per_minute / 60).max(1), Tool::stroke_milliseconds(self)]
+                .map_each(|number| u32::try_from(number).unwrap_or(u32::MAX));
+        StrokeTime { steps_per_second, stroke_milliseconds }
     }
 
     /// Returns how fast the pen travels on the page, and how many units of work on the order count
@@ -178,23 +180,5 @@ impl Settings {
             direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),
             queue_steps: u32::MAX,
         }
-    }
-}
-
-/// The durations of strokes.
-#[cfg(feature = "early-ink")]
-#[derive(Debug, Clone, Copy)]
-pub struct StrokeTime {
-    /// The speed with the pen down, at least 1.
-    steps_per_second: u64,
-    /// The milliseconds that lowering and raising the pen take.
-    stroke_milliseconds: u64,
-}
-
-#[cfg(feature = "early-ink")]
-impl crate::order::StrokeDurations for StrokeTime {
-    fn milliseconds(&self, strokes: u32, length: u64) -> u64 {
-        let drawn = ((length >> 8) * 1000).checked_div(self.steps_per_second);
-        u64::from(strokes) * self.stroke_milliseconds + drawn.unwrap_or(0)
     }
 }

@@ -5,16 +5,12 @@ use crate::stage::{Aborted, NeverCancel};
 use std::vec::Vec;
 
 /// A pen for which each stroke takes this many milliseconds.
-struct Pen(u64);
-
-impl StrokeDurations for Pen {
-    fn milliseconds(&self, strokes: u32, _: u64) -> u64 {
-        u64::from(strokes) * self.0
-    }
+pub(crate) fn pen(stroke_milliseconds: u32) -> StrokeTime {
+    StrokeTime { steps_per_second: 0, stroke_milliseconds }
 }
 
 /// Cancels after this many calls.
-struct CancelAfter(u32);
+pub(crate) struct CancelAfter(pub u32);
 
 impl Cancel for CancelAfter {
     fn check(&mut self) -> Result<(), Aborted> {
@@ -24,7 +20,11 @@ impl Cancel for CancelAfter {
 }
 
 /// Polylines of one to four segments at random places, drawn by pens 0 to `pens` - 1.
-fn polylines<I: Index>(count: u32, pens: u8, seed: u32) -> (Vec<PagePoint>, Vec<Segment<I>>) {
+pub(crate) fn polylines<I: Index>(
+    count: u32,
+    pens: u8,
+    seed: u32,
+) -> (Vec<PagePoint>, Vec<Segment<I>>) {
     let mut state = seed;
     let mut below = |limit: i32| {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -48,7 +48,7 @@ fn polylines<I: Index>(count: u32, pens: u8, seed: u32) -> (Vec<PagePoint>, Vec<
 }
 
 /// The numbers of the points at both ends of each leg, in the order of the tour.
-fn path<I: Index>(segments: &[Segment<I>], tour: &[Leg<I>]) -> Vec<[u32; 2]> {
+pub(crate) fn path<I: Index>(segments: &[Segment<I>], tour: &[Leg<I>]) -> Vec<[u32; 2]> {
     let ends = |leg: &Leg<I>| {
         let segment = segments[leg.segment()];
         let ends = [segment.from().into(), segment.to().into()];
@@ -59,16 +59,16 @@ fn path<I: Index>(segments: &[Segment<I>], tour: &[Leg<I>]) -> Vec<[u32; 2]> {
 
 /// Orders such a drawing. Returns the segments as they were before and are now, the choice, the
 /// tour, and the report.
-type Ordered<I> = (Vec<Segment<I>>, Vec<Segment<I>>, FirstStrokes, Vec<Leg<I>>, Report);
+pub(crate) type Ordered<I> = (Vec<Segment<I>>, Vec<Segment<I>>, FirstStrokes, Vec<Leg<I>>, Report);
 
-fn order_all<I: Index>(count: u32, pens: u8, seed: u32, options: Options) -> Ordered<I> {
+pub(crate) fn order_all<I: Index>(count: u32, pens: u8, seed: u32, options: Options) -> Ordered<I> {
     let (points, before) = polylines::<I>(count, pens, seed);
     let mut segments = before.clone();
     let mut memory = std::vec![0; (1 << 17) * size_of::<I>()];
     let scratch = Scratch::new(&mut memory);
     let cancel = &mut NeverCancel;
     let first =
-        choose_first(&points, &mut segments, options, &Pen(500), scratch, cancel).expect("room");
+        choose_first(&points, &mut segments, options, pen(500), scratch, cancel).expect("room");
     let mut tour = std::vec![Leg::new(I::ZERO, false); segments.len()];
     let (drawn, rest) = tour.split_at_mut(first.segments);
     first_legs(drawn);
@@ -155,7 +155,7 @@ fn nothing_is_chosen_where_it_does_not_pay() {
     let mut memory = std::vec![0; 1 << 17];
     let scratch = Scratch::new(&mut memory);
     let options = Options::default();
-    let first = choose_first(&points, &mut star, options, &Pen(500), scratch, &mut NeverCancel);
+    let first = choose_first(&points, &mut star, options, pen(500), scratch, &mut NeverCancel);
     assert_eq!(first.expect("room").segments, 0);
 }
 
@@ -165,7 +165,7 @@ fn memory_that_is_short_and_an_abort_are_told() {
     let options = Options::default();
     let mut memory = [0; 64];
     let scratch = Scratch::new(&mut memory);
-    let pen = &Pen(500);
+    let pen = pen(500);
     let first = choose_first(&points, &mut segments, options, pen, scratch, &mut NeverCancel);
     assert_eq!(first, Ok(FirstStrokes::default()));
     let mut memory = std::vec![0; 1 << 17];
@@ -173,61 +173,21 @@ fn memory_that_is_short_and_an_abort_are_told() {
     let first = choose_first(&points, &mut segments, options, pen, scratch, &mut CancelAfter(3));
     assert_eq!(first, Err(OrderError::Aborted));
 }
-/// Says the same of any strokes.
-struct Always(u64);
-
-impl StrokeDurations for Always {
-    fn milliseconds(&self, _: u32, _: u64) -> u64 {
-        self.0
-    }
-}
 
 #[test]
-fn strokes_are_chosen_until_they_take_as_long_as_the_order_and_a_second_more() {
+fn strokes_are_chosen_until_they_take_as_long_as_the_order() {
     let (points, before) = polylines::<u16>(600, 1, 1);
     let mut memory = std::vec![0; 1 << 17];
     let drawing = Drawing { points: &points, segments: &before };
     let scratch = Scratch::new(&mut memory);
     let (order_takes, _) = milliseconds_to_order(drawing, scratch, &mut NeverCancel).expect("room");
-    let enough = order_takes + SPARE_MILLISECONDS;
+    // Rounded up, so that four strokes take just long enough.
+    let enough = u32::try_from(order_takes).expect("a number").next_multiple_of(4);
     for (each, parts) in [(enough / 4, 4), (enough / 4 + 1, 4), (enough / 4 - 1, 5)] {
         let mut segments = before.clone();
         let (scratch, options) = (Scratch::new(&mut memory), Options::default());
-        // An order that takes a multiple of four is needed for the first row.
-        assert_eq!(enough % 4, 0);
-        let pen = Always(each);
-        let first = choose_first(&points, &mut segments, options, &pen, scratch, &mut NeverCancel);
+        let pen = pen(each);
+        let first = choose_first(&points, &mut segments, options, pen, scratch, &mut NeverCancel);
         assert_eq!(first.expect("room").parts, parts, "{each} of {enough}");
     }
-}
-
-/// Counts the calls.
-struct Calls(u32);
-
-impl Cancel for Calls {
-    fn check(&mut self) -> Result<(), Aborted> {
-        self.0 += 1;
-        Ok(())
-    }
-}
-
-#[test]
-fn while_the_pen_is_busy_the_rest_is_improved_for_longer() {
-    let (points, mut segments) = polylines::<u16>(600, 1, 3);
-    let mut memory = std::vec![0; 1 << 17];
-    let options = Options::default();
-    let scratch = Scratch::new(&mut memory);
-    let first = choose_first(&points, &mut segments, options, &Pen(500), scratch, &mut NeverCancel)
-        .expect("room");
-    let [short, long] = [0, 60_000].map(|spare_milliseconds| {
-        let mut tour = std::vec![Leg::new(0, false); segments.len()];
-        let (drawn, rest) = tour.split_at_mut(first.segments);
-        first_legs(drawn);
-        let drawing = Drawing { points: &points, segments: &segments };
-        let (first, mut calls) = (FirstStrokes { spare_milliseconds, ..first }, Calls(0));
-        let scratch = Scratch::new(&mut memory);
-        let report = order_rest(drawing, first, drawn, options, scratch, &mut calls, rest);
-        (report.expect("an order").pen_up, calls.0)
-    });
-    assert!(long.0 < short.0 && long.1 > 2 * short.1, "{short:?} {long:?}");
 }

@@ -20,16 +20,16 @@ pub(super) use scale::fit;
 pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP};
 pub use strokes::{Cursor, Strokes};
 #[cfg(feature = "early-ink")]
-pub(super) use unordered::{Begun, UNORDERED_WORDS};
+pub(super) use unordered::{Begun, OrderStep, UNORDERED_WORDS};
 
 #[cfg(not(feature = "early-ink"))]
 use crate::drawing::Drawing;
 use crate::drawing::Stored;
 use crate::index::Index;
 use crate::machine::StrokeEnds;
-#[cfg(feature = "early-ink")]
-use crate::order::FirstStrokes;
 use crate::order::{self, Leg};
+#[cfg(feature = "early-ink")]
+use crate::order::{FirstStrokes, Released};
 use crate::stage::Scratch;
 #[cfg(not(feature = "early-ink"))]
 use crate::stage::items;
@@ -70,6 +70,9 @@ pub(super) struct Unordered {
     pub(super) first: FirstStrokes,
     /// The options of the order.
     pub(super) options: order::Options,
+    /// The strokes that may be drawn already. If they are more than the first ones, the others have
+    /// an order, which is still being improved.
+    pub(super) released: Released,
 }
 
 /// A drawing and the order of its strokes, both of which lie in the working memory.

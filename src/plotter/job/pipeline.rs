@@ -10,13 +10,13 @@ use super::{Job, Observer};
 use crate::drawing::Stored;
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::index::Index;
-#[cfg(feature = "early-ink")]
-use crate::machine::StrokeTime;
 use crate::model::Model;
 #[cfg(feature = "early-ink")]
 use crate::order::FirstStrokes;
 #[cfg(not(feature = "early-ink"))]
 use crate::order::Leg;
+#[cfg(feature = "early-ink")]
+use crate::order::StrokeTime;
 use crate::order::{self, TimeModel};
 use crate::plotter::VisibilityMode;
 use crate::protocol::CommandError;
@@ -95,7 +95,7 @@ impl<I: Index> Pipeline<'_, I> {
         }
         let order = options.order(*steps, *time_model);
         let first = match early {
-            Some(time) => {
+            &mut Some(time) => {
                 let (points, segments, scratch) =
                     stored.split_mut(words).map_err(CommandError::DrawingTooLarge)?;
                 order::choose_first(points, segments, order, time, scratch, *cancel)?
@@ -104,7 +104,7 @@ impl<I: Index> Pipeline<'_, I> {
         };
         let Found { degenerate_faces, joined_edges, .. } = *found;
         let report = order::Report::default();
-        let unordered = Some(Unordered { first, options: order });
+        let unordered = Some(Unordered::new(first, order));
         Ok(Job { stored, legs, report, unordered, degenerate_faces, joined_edges })
     }
 

@@ -3,27 +3,36 @@
 use super::{Job, Unordered};
 use crate::drawing::Drawing;
 use crate::index::Index;
-use crate::order::{self, Effort, FirstStrokes, Leg, Method, Options, Shape, TimeModel};
+use crate::order::{
+    self, Effort, FirstStrokes, Leg, Method, Options, OrderError, Released, Report, Shape,
+    StrokeTime, TimeModel,
+};
 use crate::protocol::CommandError;
-use crate::stage::{Cancel, Scratch, items};
+use crate::stage::{Cancel, OutOfScratch, Scratch, items};
 
 /// The part of a job that the machine may read while the order of the job is being computed.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::plotter) struct Begun<'d, I> {
     /// The drawing.
     pub drawing: Drawing<'d, I>,
-    /// The legs of its first strokes.
+    /// The legs of the strokes that are released.
     pub drawn: &'d [Leg<I>],
 }
 
 /// The number of words of an [`Unordered`].
-pub(in crate::plotter) const UNORDERED_WORDS: usize = 11;
+pub(in crate::plotter) const UNORDERED_WORDS: usize = 12;
 
 impl Unordered {
+    /// The order is not known yet, but for the first strokes.
+    pub(in crate::plotter) fn new(first: FirstStrokes, options: Options) -> Self {
+        Self { first, options, released: Released::first(first.segments) }
+    }
+
     /// This as numbers, which [`Unordered::from_words`] reads.
     pub(in crate::plotter) fn words(self) -> [u32; UNORDERED_WORDS] {
-        let Self { first, options } = self;
-        let FirstStrokes { segments, odd_points, parts, strokes_left, spare_milliseconds } = first;
+        let Self { first, options, .. } = self;
+        let FirstStrokes { segments, odd_points, parts, strokes_left, time } = first;
+        let StrokeTime { steps_per_second, stroke_milliseconds } = time;
         let Options { method, effort, lift_cost, .. } = options;
         let method = match method {
             Method::Auto => 0,
@@ -43,7 +52,8 @@ impl Unordered {
             odd_points,
             parts,
             strokes_left,
-            spare_milliseconds,
+            steps_per_second,
+            stroke_milliseconds,
             method,
             lift_cost,
             kind,
@@ -55,9 +65,10 @@ impl Unordered {
 
     /// Restores the value from these words; `None` if they hold none. The path is open.
     pub(in crate::plotter) fn from_words(words: [u32; UNORDERED_WORDS]) -> Option<Self> {
-        let [segments, odd_points, parts, strokes_left, spare_milliseconds, rest @ ..] = words;
+        let [segments, odd_points, parts, strokes_left, rest @ ..] = words;
         let segments = usize::try_from(segments).ok()?;
-        let [method, lift_cost, kind, speed, acceleration, units_per_second] = rest;
+        let [steps_per_second, stroke_milliseconds, method, lift_cost, kind, rest @ ..] = rest;
+        let [speed, acceleration, units_per_second] = rest;
         let method = match method {
             0 => Method::Auto,
             1 => Method::Greedy,
@@ -69,9 +80,10 @@ impl Unordered {
             1 => Effort::Units(speed),
             _ => return None,
         };
-        let first = FirstStrokes { segments, odd_points, parts, strokes_left, spare_milliseconds };
+        let time = StrokeTime { steps_per_second, stroke_milliseconds };
+        let first = FirstStrokes { segments, odd_points, parts, strokes_left, time };
         let options = Options { method, shape: Shape::OpenPath, effort, lift_cost };
-        Some(Self { first, options })
+        Some(Self::new(first, options))
     }
 }
 
@@ -87,7 +99,7 @@ impl<I: Index> Job<I> {
         if let Some(begun) = begun {
             return (begun, true);
         }
-        let legs = self.unordered.map_or(self.legs, |unordered| unordered.first.segments);
+        let legs = self.unordered.map_or(self.legs, |unordered| unordered.released.legs);
         let behind = words.get(self.drawing_words()..);
         let drawn = behind.and_then(|rest| items::<Leg<I>>(rest, legs)).unwrap_or(&[]);
         // The job's memory was filled, so the drawing is there. Otherwise there are no strokes.
@@ -138,39 +150,85 @@ impl<I: Index> Job<I> {
         words: &mut [u64],
         cancel: &mut dyn Cancel,
     ) -> Result<Self, CommandError> {
-        self.ordered_by(words, |begun, scratch, rest, Unordered { first, options }| {
-            let Begun { drawing, drawn } = begun;
-            if drawn.is_empty() {
-                return order::order(drawing, options, scratch, cancel, rest);
-            }
-            order::order_rest(drawing, first, drawn, options, scratch, cancel, rest)
-        })
+        let from_the_first = |Unordered { first, options, .. }| Unordered::new(first, options);
+        let mut job = Self { unordered: self.unordered.map(from_the_first), ..self };
+        while job.unordered.is_some() {
+            job =
+                job.order_further(words, |step, scratch, rest| step.run(scratch, cancel, rest))?;
+        }
+        Ok(job)
     }
 
-    /// Computes the order as [`Job::ordered`] does, by `order`. It gets what the machine may draw
-    /// meanwhile, working memory, and where the legs of the other strokes go.
+    /// Carries out the next step of the computation of the order, by `run`, and releases the
+    /// strokes that may be drawn then. The first step finds an order and each further one improves
+    /// it. `run` gets working memory and the legs of the strokes that are not released yet.
     ///
     /// # Errors
     /// The [`CommandError`] to reply with.
     #[inline(always)] // Adds no frame to the stack.
-    pub(in crate::plotter) fn ordered_by(
+    pub(in crate::plotter) fn order_further(
         self,
         words: &mut [u64],
-        order: impl FnOnce(
-            Begun<'_, I>,
-            Scratch<'_>,
-            &mut [Leg<I>],
-            Unordered,
-        ) -> Result<order::Report, order::OrderError>,
+        run: impl FnOnce(OrderStep<'_, I>, Scratch<'_>, &mut [Leg<I>]) -> Result<Report, OrderError>,
     ) -> Result<Self, CommandError> {
         let Some(unordered) = self.unordered else { return Ok(self) };
+        let Unordered { first, options, released } = unordered;
         let (drawing, mut scratch) =
             self.stored.split(words).map_err(CommandError::DrawingTooLarge)?;
-        let tour = scratch.take::<Leg<I>>(self.legs).map_err(CommandError::DrawingTooLarge)?;
-        let (drawn, rest) = tour.split_at_mut(unordered.first.segments.min(tour.len()));
-        order::first_legs(drawn);
-        let begun = Begun { drawing, drawn };
-        let report = order(begun, scratch, rest, unordered)?;
-        Ok(Self { report, unordered: None, ..self })
+        let out_of_scratch = OutOfScratch {
+            needed: Scratch::bytes_for::<Leg<I>>(self.legs),
+            available: scratch.available_bytes(),
+        };
+        // What a former step has written there stays.
+        let tour = scratch.take_filled(|legs: &mut [Leg<I>]| {
+            if legs.len() < self.legs { Err(out_of_scratch) } else { Ok(self.legs) }
+        });
+        let tour = tour.map_err(CommandError::DrawingTooLarge)?;
+        let (drawn, rest) = tour.split_at_mut(released.legs.min(self.legs));
+        if released == Released::first(first.segments) {
+            order::first_legs(drawn);
+        }
+        let step = OrderStep { begun: Begun { drawing, drawn }, unordered, report: self.report };
+        let report = run(step, scratch, rest)?;
+        let has_first = first.segments > 0;
+        let more = released.more(drawing, tour, options, first.time, [self.report, report]);
+        let more = more.filter(|_| has_first);
+        let unordered = more.map(|released| Unordered { released, ..unordered });
+        Ok(Self { report, unordered, ..self })
+    }
+}
+
+/// One step of the computation of an order, which finds one or improves it.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::plotter) struct OrderStep<'d, I> {
+    /// The part of the job that the machine may read meanwhile.
+    pub begun: Begun<'d, I>,
+    /// What the order is computed from.
+    unordered: Unordered,
+    /// The report of the order as it is.
+    report: Report,
+}
+
+impl<I: Index> OrderStep<'_, I> {
+    /// Carries out this step. Changes the legs of the strokes that are not released yet, and
+    /// returns the report of the whole order.
+    ///
+    /// # Errors
+    /// See [`OrderError`].
+    pub fn run(
+        self,
+        scratch: Scratch<'_>,
+        cancel: &mut dyn Cancel,
+        rest: &mut [Leg<I>],
+    ) -> Result<Report, OrderError> {
+        let Self { begun: Begun { drawing, drawn }, unordered, report } = self;
+        let Unordered { first, options, released } = unordered;
+        if drawn.is_empty() {
+            order::order(drawing, options, scratch, cancel, rest)
+        } else if released == Released::first(first.segments) {
+            order::order_rest(drawing, first, drawn, options, scratch, cancel, rest)
+        } else {
+            order::improve_rest(drawing, drawn, report, options, scratch, cancel, rest)
+        }
     }
 }
