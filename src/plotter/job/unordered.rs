@@ -166,11 +166,14 @@ impl<I: Index> Job<I> {
     /// # Errors
     /// The [`CommandError`] to reply with.
     #[inline(always)] // Adds no frame to the stack.
-    pub(in crate::plotter) fn order_further(
+    pub(in crate::plotter) fn order_further<F>(
         self,
         words: &mut [u64],
-        run: impl FnOnce(OrderStep<'_, I>, Scratch<'_>, &mut [Leg<I>]) -> Result<Report, OrderError>,
-    ) -> Result<Self, CommandError> {
+        run: F,
+    ) -> Result<Self, CommandError>
+    where
+        F: FnOnce(OrderStep<'_, I>, Scratch<'_>, &mut [Leg<I>]) -> Result<Report, OrderError>,
+    {
         let Some(unordered) = self.unordered else { return Ok(self) };
         let Unordered { first, options, released } = unordered;
         let (drawing, mut scratch) =
