@@ -1,5 +1,5 @@
 //! How long the emulated Raspberry Pi Pico takes from `$plot` to the first ink at its pins, by the
-//! very image that is flashed, and for how long at most nothing moves in the minute after that,
+//! very image that is flashed, and for how long at most nothing moves in the 30 s after that,
 //! while the order of the strokes is found and improved: `pico_first_ink [SCENE]...`. The image is
 //! built by `cargo xtask build --board pico`; `PENUP_IMAGE` names another one.
 //!
@@ -35,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// The time for which the drawing is watched.
-const WATCHED: Duration = Duration::from_secs(60);
+const WATCHED: Duration = Duration::from_secs(30);
 
 /// The time from `$plot` to the first ink, and the longest time after that between two changes of
 /// the pins.

@@ -93,7 +93,7 @@ fn the_drawing_is_the_same_as_without() {
     assert_eq!(late.plotter.job().report().odd_points, early.plotter.job().report().odd_points);
 }
 
-/// The order is told as soon as it is known, while the first strokes are still being drawn.
+/// The order is told as soon as one is known, while the first strokes are still being drawn.
 #[test]
 fn the_measures_are_told_before_the_other_strokes_begin() {
     let lines = lattice();
@@ -110,7 +110,17 @@ fn the_measures_are_told_before_the_other_strokes_begin() {
     let early = measures(&heard);
     assert!(early.len() == 2 && !early[0].starts_with("[JOB:odd points 0"), "{early:?}");
     bench.finish();
-    assert_eq!(measures(&bench.say("$model\n")), early);
+    let late = measures(&bench.say("$model\n"));
+    assert_eq!(late[0], early[0]);
+    // The moves with the pen up become shorter until the order is not improved any more.
+    let lengths = [&early, &late].map(|lines| {
+        let (down, rest) = lines[1].split_once(" mm, up ").expect("two lengths");
+        let (up, _) = rest.split_once(" mm").expect("a length");
+        (down.to_owned(), up.parse::<f64>().expect("a number"))
+    });
+    let [(early_down, early_up), (late_down, late_up)] = lengths;
+    assert_eq!(early_down, late_down);
+    assert!(late_up <= early_up && late_up > 0.98 * early_up, "{early_up} {late_up}");
 }
 
 /// A preview computes the job without drawing it.
@@ -207,7 +217,9 @@ fn a_job_is_given_up_while_its_order_is_computed() {
     // While it is found, and while it is improved.
     for (milliseconds, is_answered) in [(2100, false), (5000, true), (12_000, true)] {
         let (mut bench, answer) = disturbed(b"\x18", milliseconds);
-        assert_eq!(answer.ends_with("ok\n"), is_answered, "{milliseconds} {answer}");
+        let answer = answer + &bench.heard();
+        assert_eq!(answer.contains("ok\n"), is_answered, "{milliseconds} {answer}");
+        assert_eq!(answer.matches("Grbl").count(), 1, "{milliseconds} {answer}");
         bench.finish();
         assert_eq!(bench.plotter.machine().state(), State::Idle);
         let strokes = drawn(&bench.board.trace().changes()).len();
@@ -221,36 +233,36 @@ fn a_job_is_given_up_while_its_order_is_computed() {
     }
 }
 
-/// The order of the strokes that the pen has not reached is improved while it draws. Lines are
-/// answered meanwhile, and what is told of the order is true of it in the end.
+/// The order of the strokes that the pen has not reached is improved while it draws. A line is
+/// answered before that is finished.
 #[test]
 fn the_order_is_improved_while_the_pen_draws() {
     let mut bench = loaded(&lattice(), true);
     bench.board.set_work_ticks(MILLISECOND);
     bench.board.receive(b"$plot\n");
-    let (mut reports, mut heard) = (Vec::new(), String::new());
-    let mut asked = false;
+    let (mut reports, mut heard, mut answered_with) = (Vec::new(), String::new(), None);
     for _ in 0..200_000 {
         let is_busy = bench.plotter.poll(&mut bench.board);
         bench.board.wait();
+        heard += &bench.heard();
         if !is_busy && heard.ends_with("ok\n") && bench.plotter.machine().is_stopped() {
             break;
         }
-        heard += &bench.heard();
         let report = *bench.plotter.job().report();
         if heard.ends_with("ok\n") && reports.last() != Some(&report) {
+            if reports.is_empty() {
+                bench.board.receive(b"$model\n");
+            }
             reports.push(report);
-            asked = false;
         }
-        if !asked && reports.len() == 1 {
-            asked = true;
-            bench.board.receive(b"$model\n");
+        if heard.contains("[JOB:") && answered_with.is_none() {
+            answered_with = Some(reports.len());
         }
     }
     assert!(reports.len() >= 2, "{reports:?}");
     assert!(reports.is_sorted_by(|a, b| a.pen_up > b.pen_up), "{reports:?}");
     assert_eq!(reports.last(), Some(bench.plotter.job().report()));
-    assert!(heard.contains("[JOB:"), "{heard}");
+    assert_eq!(answered_with, Some(1), "{heard}");
 }
 
 /// While the lines are found, the pen travels to where it will begin. It can be held and the job be

@@ -354,8 +354,29 @@ impl<I: Index> Inner<'_, I> {
         ordered
     }
 
-    /// Improves the order of a job, as long as that pays, then measures the job, and releases all
-    /// of its strokes once the board has kept the order. Returns whether there was anything to do.
+    /// Whether the order of the job that is drawn is still being improved.
+    pub(super) fn is_improving(&self) -> bool {
+        self.pending.as_ref().is_some_and(|pending| pending.job.unordered().is_some())
+    }
+
+    /// Improves the order of a job once, and lets the machine draw some more of its strokes. Gives
+    /// the job up if that fails.
+    ///
+    /// # Errors
+    /// [`CommandError::Aborted`].
+    #[inline(never)] // Keeps its frame off the stack while other stages run.
+    pub(super) fn improve_order<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
+        let Some(Pending { job, .. }) = self.pending else { return Ok(()) };
+        let ordered = self.order_meanwhile(job, board);
+        match (&mut self.pending, ordered) {
+            (Some(pending), Ok(job)) => pending.job = job,
+            (pending, _) => *pending = None,
+        }
+        ordered.map(|_| ())
+    }
+
+    /// Measures a job whose order is not improved any more, and releases all of its strokes once
+    /// the board has kept the order. Returns whether there was anything to do.
     #[inline(always)] // It is called in every turn of the main loop.
     pub(super) fn follow_order<B: Board>(&mut self, board: &mut B) -> bool {
         self.pending.is_some() && self.release(board)
@@ -369,15 +390,10 @@ impl<I: Index> Inner<'_, I> {
             self.pending = None;
             return false;
         }
-        if let Some(Pending { job, .. }) = self.pending
-            && job.unordered().is_some()
-        {
-            let ordered = self.order_meanwhile(job, board).ok();
-            self.pending =
-                self.pending.take().zip(ordered).map(|(pending, job)| Pending { job, ..pending });
-            return true;
-        }
         let Some(pending) = &mut self.pending else { return false };
+        if pending.job.unordered().is_some() {
+            return false;
+        }
         if let Some(measured) = &mut pending.measured {
             let mut strokes = pending.job.strokes(self.words, &mut pending.cursor, None);
             for _ in 0..TARGETS_A_TURN {

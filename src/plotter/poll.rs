@@ -54,6 +54,10 @@ impl<I: Index> Plotter<'_, I> {
             if self.tend_parts(board) {
                 return true;
             }
+            #[cfg(feature = "early-ink")]
+            if self.improve_order(board) {
+                return true;
+            }
             return planned || requests != RealTime::default();
         };
         self.inner.busy_at = board.microseconds();
@@ -126,6 +130,22 @@ impl<I: Index> Plotter<'_, I> {
             self.reset(board);
         }
         tended != PartsProgress::Idle
+    }
+
+    /// Improves the order of the strokes that the pen has not reached. Returns whether there was one
+    /// to improve.
+    #[cfg(feature = "early-ink")]
+    #[inline(always)] // It is called in every turn of the main loop.
+    fn improve_order<B: Board>(&mut self, board: &mut B) -> bool {
+        if !self.inner.is_improving() {
+            return false;
+        }
+        let improved = self.inner.improve_order(board);
+        // In an alarm, the machine has reported why.
+        if improved.is_err() && !matches!(self.inner.machine.state(), State::Alarm(_)) {
+            self.reset(board);
+        }
+        true
     }
 
     /// Replies to the line that has been carried out, and notes its outcome for repeated lines.
