@@ -76,6 +76,15 @@ struct Interpreter {
     unknown: BTreeMap<String, (usize, usize)>,
 }
 
+/// Whether the S of these words is the power of the spindle, and not a temperature, the speed of a
+/// fan or the time of a dwell. `is_setting` tells whether an unknown word stands before the
+/// coordinates.
+fn is_power(words: &[(char, f64)], is_setting: bool) -> bool {
+    let has = |word: (char, f64)| words.contains(&word);
+    let is_other = is_setting || has(('G', 4.0)) || has(('M', 106.0));
+    has(('M', 3.0)) || has(('M', 4.0)) || !is_other
+}
+
 /// The reason why a line is refused, as text.
 type RefusalText = String;
 
@@ -225,7 +234,7 @@ impl Interpreter {
         }
         if servo {
             self.signals.servo = value('S').or(self.signals.servo);
-        } else if let Some(power) = value('S') {
+        } else if let Some(power) = value('S').filter(|_| is_power(&words, is_setting)) {
             self.signals.power = Some(power);
         }
         if moves && !is_setting {
@@ -311,7 +320,12 @@ impl Interpreter {
         self.signals.extrudes = extrudes;
         let drills = self.motion == DRILLING;
         if let Some(to) = value('Z').filter(|_| !drills) {
-            self.signals.is_parked &= is_relative;
+            if self.signals.is_parked && is_relative {
+                let line = u32::try_from(number).unwrap_or(u32::MAX);
+                self.signals.unknown_height.get_or_insert(line);
+            } else {
+                (self.signals.is_parked, self.signals.unknown_height) = (false, None);
+            }
             let before = self.height;
             self.height = to * unit + if is_relative { before } else { self.lift };
             self.has_absolute_heights |= !is_relative;
@@ -463,6 +477,15 @@ impl Format for GCode {
             let reason = format!(
                 "the pen would draw from a place of the machine (line {by}), which is not known \
                  here: let the program move to an X and a Y of the drawing before"
+            );
+            return Err(ReadError::Line { origin: origin(number - 1, line), reason });
+        }
+        if let Some((number, by)) = signals::unknown_height(&interpreter.moves) {
+            let line = text.lines().nth(number - 1).unwrap_or_default();
+            let reason = format!(
+                "the Z of line {by} is a distance from a height of the machine, so it is not known \
+                 here whether the pen is down: let the program give that height in the coordinates \
+                 of the drawing (G90)"
             );
             return Err(ReadError::Line { origin: origin(number - 1, line), reason });
         }

@@ -23,6 +23,8 @@ pub(super) struct Signals {
     /// Whether the pen has been lifted to a height of the machine (`G53`, `G28`), and to no other
     /// since.
     pub is_parked: bool,
+    /// The line that has changed the height by a distance since the pen was lifted so.
+    pub unknown_height: Option<u32>,
     /// The line of the `G53` or `G28` because of which it is not known where the move begins or
     /// ends.
     pub unplaced: Option<u32>,

@@ -44,6 +44,16 @@ pub(super) fn inked(moves: &Moves, has_absolute_heights: bool) -> Vec<bool> {
     draws.into_iter().zip(moves.iter()).map(|(draws, it)| draws && !it.signals.is_parked).collect()
 }
 
+/// The line of the first move by G1 to G3 of which it is not known whether the pen is down, and the
+/// line that has changed the height. What extrudes needs no height.
+pub(super) fn unknown_height(moves: &Moves) -> Option<(usize, u32)> {
+    if moves.iter().any(|it| it.signals.extrudes) {
+        return None;
+    }
+    let mut feeds = moves.iter().filter(|it| !it.is_rapid);
+    feeds.find_map(|it| Some((it.line as usize, it.signals.unknown_height?)))
+}
+
 /// Whether the moves are at more than two heights.
 fn drift(moves: &Moves) -> bool {
     let mut heights: Vec<f64> = moves.iter().filter_map(|it| it.signals.height).collect();

@@ -433,6 +433,41 @@ fn home_is_a_place_of_the_machine_after_the_first_move() {
 }
 
 #[test]
+fn a_distance_from_a_height_of_the_machine_is_no_height() {
+    let begin = "G0 Z5\nG0 X10 Y10\nG1 Z-1\nG1 X20\n";
+    let line = [[[10.0, 10.0], [20.0, 10.0]]];
+    for (end, expected) in [
+        ("G53 G0 Z0\nG91\nG0 X5\nG1 Z-6\nG1 X5\n", "a.nc:9: the Z of line 8 is a distance"),
+        ("G91 G28 Z0\nG1 Z-6\nG1 Z-1\nG2 X5 I2.5\n", "a.nc:8: the Z of line 6 is a distance"),
+    ] {
+        let program = format!("{begin}{end}");
+        let error = sent("a.nc", program.as_bytes()).expect_err("no height").to_string();
+        assert!(error.starts_with(expected), "{error}");
+    }
+    // Neither travels nor a height of the drawing, whatever comes before it.
+    let travels = format!("{begin}G53 G0 Z0\nG91\nG1 Z-1\nG0 X5\nG90\n");
+    assert_eq!(strokes(&travels), line);
+    assert_eq!(strokes(&format!("{travels}G1 Z5\nG1 X0\n")), line);
+    assert_eq!(strokes(&format!("{travels}G0 X40\nG1 Z-1\nG1 X50\n")).len(), 2);
+}
+
+#[test]
+fn a_temperature_or_a_time_is_no_power() {
+    // The servo of a spindle's pin goes up and down by the power.
+    let program = |between: &str| {
+        format!(
+            "M3 S90\n{between}G1 X10 Y10\nS30\nG1 X20\nS90\nG1 X30\nS30\n{between}G1 X40\nS90\n\
+             G1 X0 Y0\n"
+        )
+    };
+    let drawn = strokes(&program(""));
+    assert_eq!(drawn.len(), 2);
+    for between in ["M104 S200\n", "M106 S255\n", "G4 S2\n", "S200 M104\n"] {
+        assert_eq!(strokes(&program(between)), drawn, "{between}");
+    }
+}
+
+#[test]
 fn what_changes_where_the_pen_goes_is_refused_and_never_left_out() {
     for (line, expected) in [
         ("M98 P1000", "M98 calls a subprogram, which is not followed"),
