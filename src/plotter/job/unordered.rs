@@ -76,6 +76,8 @@ impl Unordered {
             _ => return None,
         };
         let effort = match kind {
+            // No board counts more work as a second.
+            0 if units_per_second > TimeModel::BOARD => return None,
             0 => Effort::Auto(TimeModel { speed, acceleration, units_per_second }),
             1 => Effort::Units(speed),
             _ => return None,
