@@ -56,10 +56,17 @@ fn measure(scene: &str, eye: &str) -> Result<[Duration; 2], Box<dyn Error>> {
         }
     }
     line.emulator.send(b"$J=G91 X0.1 F600\n$plot\n")?;
-    let (mut machine, mut begun, mut first_ink) = (Machine::default(), None, None);
-    let (mut last, mut longest_rest) = (None, Duration::ZERO);
+    let (mut machine, mut begun, mut first_ink) =
+        (Machine::default(), None::<Duration>, None::<Duration>);
+    let (mut last, mut longest_rest) = (None::<Duration>, Duration::ZERO);
+    let mut told = false;
     while first_ink.zip(last).is_none_or(|(ink, last)| last < ink + WATCHED) {
         line.status()?;
+        if let Some((ink, begun)) = first_ink.zip(begun).filter(|_| !told) {
+            told = true;
+            let took = ink.saturating_sub(begun);
+            eprintln!("{scene}: first ink after {took:.1?}; watching it for 30 s (some minutes)");
+        }
         let mut is_jog = true;
         for change in line.emulator.pin_changes()? {
             let at = change.at;

@@ -37,7 +37,7 @@ pub struct Released {
     pub legs: usize,
     /// How often the order of the others was improved.
     rounds: u32,
-    /// The last of these rounds that changed nothing.
+    /// How many rounds in succession, the last ones, changed nothing.
     in_vain: u32,
 }
 
@@ -49,7 +49,8 @@ impl Released {
 
     /// Releases some more strokes of `tour`, so that the order of those behind them can be
     /// improved. `None` if that does not pay any more: the order then stays as it is. The last
-    /// round has changed the report of the order from `before` to `after`.
+    /// step of the computation has changed the report of the order from `before` to `after`; before
+    /// the first one there is none, and `before` does not count.
     pub fn more<I: Index>(
         self,
         drawing: Drawing<'_, I>,
@@ -58,7 +59,8 @@ impl Released {
         time: StrokeTime,
         [before, after]: [Report; 2],
     ) -> Option<Self> {
-        let in_vain = if before == after { self.in_vain + 1 } else { 0 };
+        let is_in_vain = self.rounds > 0 && before == after;
+        let in_vain = if is_in_vain { self.in_vain + 1 } else { 0 };
         let is_auto = matches!(options.effort, Effort::Auto(_));
         if !is_auto || self.rounds == MOST_ROUNDS || in_vain == MOST_IN_VAIN {
             return None;

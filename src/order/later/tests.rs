@@ -113,8 +113,10 @@ fn strokes_are_released_until_they_keep_the_pen_busy() {
     let spent = Released { rounds: MOST_ROUNDS, ..released };
     let reports = [Report::default(), report];
     assert_eq!(spent.more(drawing, &tour, options, pen(800), reports), None);
-    // One round changed nothing, then a second one.
-    let once = released.more(drawing, &tour, options, pen(800), [report; 2]).expect("more");
+    // Before the first round there is nothing to compare with. Then one round changes nothing, and
+    // a second one.
+    let first = released.more(drawing, &tour, options, pen(800), [report; 2]).expect("more");
+    let once = first.more(drawing, &tour, options, pen(800), [report; 2]).expect("more");
     assert_eq!(once.more(drawing, &tour, options, pen(800), [report; 2]), None);
     assert!(once.more(drawing, &tour, options, pen(800), reports).is_some());
     // The strokes of a second pen have an order of their own.
