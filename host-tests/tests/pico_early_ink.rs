@@ -12,7 +12,9 @@ use std::error::Error;
 
 #[test]
 fn the_pen_begins_before_the_order_is_known() -> Result<(), Box<dyn Error>> {
-    let lines = job_lines("lattice4.obj", &["$212=20", "$213=20", "$page=40x40", "$margin=5"]);
+    // The drawing comes right behind a move, which the board must begin by itself then.
+    let options = ["$212=20", "$213=20", "$page=40x40", "$margin=5", "$J=G91 X2 F1200"];
+    let lines = job_lines("lattice4.obj", &options);
     let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
     uart.emulator.plug_usb_in()?;
     let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));

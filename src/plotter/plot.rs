@@ -9,6 +9,8 @@ use super::reply::Reply;
 use super::{Board, Cursor, Inner, Job, Observer, records};
 use crate::index::Index;
 use crate::machine::State;
+#[cfg(feature = "early-ink")]
+use crate::machine::TargetList;
 use crate::order::TimeModel;
 use crate::protocol::{CommandError, RealTime};
 use crate::stage::{Aborted, Cancel};
@@ -135,6 +137,13 @@ impl<I: Index> Inner<'_, I> {
     fn settle<B: Board>(&mut self, listener: &mut Listener<'_, B>) -> Result<(), Aborted> {
         while !self.machine.is_stopped() {
             listener.check()?;
+            // The moves may have come just before, so that nothing has begun them yet, and nobody
+            // else counts what the pins have done.
+            #[cfg(feature = "early-ink")]
+            {
+                self.machine.fill(&mut TargetList::new(&[]), listener.board.queue());
+                listener.board.begin_steps();
+            }
             listener.board.wait_briefly();
         }
         Ok(())
