@@ -132,8 +132,8 @@ impl<I: Index> Plotter<'_, I> {
         tended != PartsProgress::Idle
     }
 
-    /// Improves the order of the strokes that the pen has not reached. Returns whether there was one
-    /// to improve.
+    /// Improves the order of the strokes that the pen has not reached. Returns whether there was
+    /// one to improve.
     #[cfg(feature = "early-ink")]
     #[inline(always)] // It is called in every turn of the main loop.
     fn improve_order<B: Board>(&mut self, board: &mut B) -> bool {
