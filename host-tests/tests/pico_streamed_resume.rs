@@ -113,24 +113,33 @@ fn a_drawing_that_is_sent_goes_on_after_cuts() -> TestResult {
     let (whole, time) = SMALL.undisturbed()?;
     eprintln!("{} strokes, {time:?}, {:?}", whole.len(), begun.elapsed());
     let mut random = Random::new(2101);
-    let mut cuts = 0;
-    let runs = SMALL.with_cuts(|board| {
-        cuts += 1;
-        match cuts {
-            1 | 3 => {
-                let after = time / 8 + time * random.below(100) as u32 / 2000;
-                board.cut_power_after(after)?;
+    let mut most_runs = 0;
+    // On a busy computer the power may fail before the client has opened the port, which then draws
+    // as if nothing had been. Such a drawing is judged as well, but it is no test of going on.
+    for _ in 0..5 {
+        let mut cuts = 0;
+        let runs = SMALL.with_cuts(|board| {
+            cuts += 1;
+            match cuts {
+                1 | 3 => {
+                    let after = time / 8 + time * random.below(100) as u32 / 2000;
+                    board.cut_power_after(after)?;
+                }
+                // Each stroke clears bits of a page, and a page is 256 bytes.
+                2 => board.cut_power_in_flash(3 * 256 + random.below(256))?,
+                _ => {}
             }
-            // Each stroke clears bits of a page, and a page is 256 bytes.
-            2 => board.cut_power_in_flash(3 * 256 + random.below(256))?,
-            _ => {}
+            Ok(cuts <= 3)
+        })?;
+        let twice = assert_one_drawing(&whole, &runs);
+        assert!(twice <= 3, "{twice}");
+        assert_eq!(ink(runs.iter().flatten()), ink(&whole));
+        most_runs = most_runs.max(runs.len());
+        if most_runs >= 3 {
+            break;
         }
-        Ok(cuts <= 3)
-    })?;
-    assert!(runs.len() >= 3, "two cuts and more");
-    let twice = assert_one_drawing(&whole, &runs);
-    assert!(twice <= 3, "{twice}");
-    assert_eq!(ink(runs.iter().flatten()), ink(&whole));
+    }
+    assert!(most_runs >= 3, "two cuts and more");
     eprintln!("{:?}", begun.elapsed());
     Ok(())
 }
