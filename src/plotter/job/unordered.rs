@@ -189,7 +189,7 @@ impl<I: Index> Job<I> {
             if legs.len() < self.legs { Err(out_of_scratch) } else { Ok(self.legs) }
         });
         let tour = tour.map_err(CommandError::DrawingTooLarge)?;
-        let (drawn, rest) = tour.split_at_mut(released.legs.min(self.legs));
+        let (drawn, rest) = tour.split_at_mut(released.legs.min(tour.len()));
         if released == Released::first(first.segments) {
             order::first_legs(drawn);
         }
