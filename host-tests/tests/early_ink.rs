@@ -265,6 +265,24 @@ fn the_order_is_improved_while_the_pen_draws() {
     assert_eq!(answered_with, Some(1), "{heard}");
 }
 
+/// A status that is asked for while the output is full is sent when there is room, also where the
+/// computation has ended meanwhile.
+#[test]
+fn a_status_waits_for_room_beyond_the_end_of_the_computation() {
+    let mut bench = loaded(&lattice(), true);
+    bench.board.set_work_ticks(MILLISECOND);
+    let now = bench.board.trace().now();
+    bench.board.set_full_during(now + MILLISECOND..u64::MAX);
+    bench.board.receive_meanwhile(now + 1000 * MILLISECOND, b"?");
+    let answer = bench.say("$plot\n");
+    assert!(answer.ends_with("ok\n") && !answer.contains('<'), "{answer}");
+    assert!(bench.board.trace().now() > now + 1000 * MILLISECOND && bench.board.has_read_all());
+    bench.board.set_full_during(0..0);
+    bench.work(1);
+    let heard = bench.heard();
+    assert_eq!(heard.matches('<').count(), 1, "{heard}");
+}
+
 /// While the lines are found, the pen travels to where it will begin. It can be held and the job be
 /// given up meanwhile, and a limit switch stops it.
 #[test]

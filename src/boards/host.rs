@@ -93,6 +93,8 @@ pub struct HostBoard<'q> {
     state: &'q PulserState,
     /// The number of ticks that sending a byte takes; 0 if no baud rate is set.
     byte_ticks: u64,
+    /// The ticks during which the output has no room.
+    full_during: Range<u64>,
     /// The records in flash, if the board has flash.
     kept: Option<FlashRecords<CutFlash>>,
     /// How long it takes to write to the flash while a job is drawn, in ticks.
@@ -137,6 +139,7 @@ impl<'q> HostBoard<'q> {
             stop_reads: 0..0,
             state,
             byte_ticks: 0,
+            full_during: 0..0,
             kept: None,
             write_ticks: 0,
             #[cfg(feature = "early-ink")]
@@ -217,6 +220,11 @@ impl<'q> HostBoard<'q> {
         }
     }
 
+    /// Lets nobody read what the board sends during these ticks, in which it has no room for more.
+    pub fn set_full_during(&mut self, ticks: Range<u64>) {
+        self.full_during = ticks;
+    }
+
     /// Sets the baud rate for sending. Without it, sending takes no time.
     pub fn set_baud(&mut self, baud: u32) {
         self.byte_ticks = u64::from(10 * crate::motion::TICKS_PER_SECOND / baud);
@@ -275,6 +283,10 @@ impl Board for HostBoard<'_> {
 
     fn take_real_time(&mut self) -> RealTime {
         core::mem::take(&mut self.requests)
+    }
+
+    fn has_room(&mut self, _: usize) -> bool {
+        !self.full_during.contains(&self.trace().now())
     }
 
     fn reply_to(&mut self, replies: Replies) {

@@ -16,7 +16,7 @@
 
 use super::job::{Begun, OrderStep, Pipeline, Unordered};
 use super::listener::{Listener, MeasuredStrokes};
-use super::{Board, Cursor, Inner, Job, Observer, REPLY_BYTES, Reply, Unobserved, records, report};
+use super::{Board, Cursor, Inner, Job, Observer, Reply, Unobserved, records, report};
 use crate::drawing::PagePoint;
 use crate::index::Index;
 use crate::machine::{JobSize, Machine, Measured, State, TargetList};
@@ -139,14 +139,12 @@ struct OrderCancel<'h, 'm, B: Board, I> {
     board: &'h mut B,
     /// The part of the job that the machine may read.
     begun: Begun<'h, I>,
-    /// Whether a status report waits for room in the output.
-    status_due: bool,
 }
 
 impl<B: Board, I: Index> Cancel for OrderCancel<'_, '_, B, I> {
     #[inline(never)] // Keeps its frame off the stack while the order is computed.
     fn check(&mut self) -> Result<(), Aborted> {
-        let Self { inner, board, begun, status_due } = self;
+        let Self { inner, board, begun } = self;
         let requests = board.take_real_time();
         let settings = Some(inner.machine.settings());
         report::greet_opened(inner.machine.state(), inner.resumption, settings, *board);
@@ -160,9 +158,7 @@ impl<B: Board, I: Index> Cancel for OrderCancel<'_, '_, B, I> {
         inner.note_progress(*board);
         inner.plan(Some(*begun), *board);
         board.begin_steps();
-        *status_due |= requests.has(RealTime::STATUS);
-        if *status_due && board.has_room(REPLY_BYTES) {
-            *status_due = false;
+        if inner.takes_status(requests, *board) {
             inner.report_status("|Stage:order", *board);
         }
         match inner.machine.state() {
@@ -342,7 +338,7 @@ impl<I: Index> Inner<'_, I> {
         let words = core::mem::take(&mut self.words);
         let ordered = job.order_further(words, |step: OrderStep<'_, I>, scratch, rest| {
             let begun = step.begun;
-            let mut meanwhile = OrderCancel { inner: self, board, begun, status_due: false };
+            let mut meanwhile = OrderCancel { inner: self, board, begun };
             step.run(scratch, &mut meanwhile, rest)
         });
         self.words = words;

@@ -122,8 +122,6 @@ pub struct Plotter<'m, I = u16> {
     /// Everything that carries out a line. It is separate from the lines, which stay borrowed
     /// meanwhile.
     inner: Inner<'m, I>,
-    /// Whether a status report was asked for and waits for room in the output.
-    status_due: bool,
     /// The state of HP-GL, which may take the place of lines.
     #[cfg(feature = "hpgl")]
     hpgl: hpgl::HpGl<'m>,
@@ -180,6 +178,8 @@ struct Inner<'m, I> {
     /// The time of the last movement, as [`Board::microseconds`] tells it.
     #[cfg(feature = "driver-pins")]
     moved_at: u32,
+    /// Whether a status report was asked for and waits for room in the output.
+    status_due: bool,
     /// The counters that decide when status reports contain the parts that are only sent now and
     /// then.
     report_counts: ReportCounts,
@@ -216,7 +216,6 @@ impl<'m, I: Index> Plotter<'m, I> {
             numberings: [Numbering::default(), Numbering::default()],
             port: 0,
             label: Label::default(),
-            status_due: false,
             #[cfg(feature = "hpgl")]
             hpgl,
             inner: Inner {
@@ -247,6 +246,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 busy_at: 0,
                 #[cfg(feature = "driver-pins")]
                 moved_at: 0,
+                status_due: false,
                 report_counts: ReportCounts::default(),
                 task: None,
                 alarm_reported: None,

@@ -170,9 +170,7 @@ impl<I: Index> Plotter<'_, I> {
             self.reset(board);
         }
         self.inner.act(requests);
-        self.status_due |= requests.has(RealTime::STATUS);
-        if self.status_due && board.has_room(REPLY_BYTES) {
-            self.status_due = false;
+        if self.inner.takes_status(requests, board) {
             // Writing the report takes 10 ms, and so may what was done since the queue was last
             // filled.
             self.inner.plan(BegunJob::default(), board);

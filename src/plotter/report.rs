@@ -3,12 +3,12 @@
 use super::grbl::{rate, whole};
 use super::reply::Reply;
 use super::resume::Resumption;
-use super::{Board, Inner, Job, records};
+use super::{Board, Inner, Job, REPLY_BYTES, records};
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
 use crate::machine::{Alarm, Setting, Settings, State, Value};
 use crate::order;
-use crate::protocol::AlarmEntry;
+use crate::protocol::{AlarmEntry, RealTime};
 
 /// The number of bytes that a port receives before any is read.
 const RECEIVE_BYTES: usize = 255;
@@ -158,6 +158,14 @@ impl<I: Index> Inner<'_, I> {
              {proof}]"
         ));
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
+    }
+
+    /// Whether a status report is to be written now: one was asked for, by `requests` or before, and
+    /// the output has room for it. The request is done with then; otherwise it waits, also where
+    /// what is computed ends meanwhile.
+    pub fn takes_status<B: Board>(&mut self, requests: RealTime, board: &mut B) -> bool {
+        self.status_due |= requests.has(RealTime::STATUS);
+        self.status_due && board.has_room(REPLY_BYTES) && core::mem::take(&mut self.status_due)
     }
 
     /// Writes Grbl's status report, with penup's own fields at its end, and `stage` behind them. It

@@ -13,7 +13,7 @@ use crate::plotter::listener::Listener;
 use crate::plotter::reply::Reply;
 use crate::plotter::streamed::Streamed;
 use crate::plotter::{
-    BegunJob, Board, Cursor, Inner, Job, PlotOptions, REPLY_BYTES, VisibilityMode, report, title,
+    BegunJob, Board, Cursor, Inner, Job, PlotOptions, VisibilityMode, report, title,
 };
 use crate::protocol::{CommandError, RealTime, StoredModelError, StreamedTarget};
 use crate::stage::{Aborted, Cancel};
@@ -154,7 +154,7 @@ impl<I: Index> Inner<'_, I> {
         let at = Some(self.parts.last.target.point);
         // The machine goes on meanwhile, and does not use this memory.
         let words = core::mem::take(&mut self.words);
-        let mut server = PartCancel { inner: self, board, is_status_due: false, ends: None };
+        let mut server = PartCancel { inner: self, board, ends: None };
         let part = next_part(model, search, steps, order, words, at, &mut server);
         let ends = server.ends;
         self.words = words;
@@ -222,8 +222,6 @@ struct PartCancel<'s, 'm, I, B> {
     inner: &'s mut Inner<'m, I>,
     /// The board.
     board: &'s mut B,
-    /// Whether a status report was asked for and waits for room in the output.
-    is_status_due: bool,
     /// The reason why the computation is to end, if it is.
     ends: Option<EarlyEnd>,
 }
@@ -231,7 +229,7 @@ struct PartCancel<'s, 'm, I, B> {
 impl<I: Index, B: Board> Cancel for PartCancel<'_, '_, I, B> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn check(&mut self) -> Result<(), Aborted> {
-        let Self { inner, board, is_status_due, ends } = self;
+        let Self { inner, board, ends } = self;
         let requests = board.take_real_time();
         let settings = Some(inner.machine.settings());
         report::greet_opened(inner.machine.state(), inner.resumption, settings, *board);
@@ -244,9 +242,7 @@ impl<I: Index, B: Board> Cancel for PartCancel<'_, '_, I, B> {
         inner.watch(*board);
         inner.plan(BegunJob::default(), *board);
         board.start_steps();
-        *is_status_due |= requests.has(RealTime::STATUS);
-        if *is_status_due && board.has_room(REPLY_BYTES) {
-            *is_status_due = false;
+        if inner.takes_status(requests, *board) {
             inner.report_status("|Stage:visibility", *board);
         }
         if matches!(inner.machine.state(), State::Run | State::Hold { .. }) {
