@@ -1,6 +1,6 @@
 //! Jobs on the board in memory whose power fails, and the ink that they leave on the paper.
 
-use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH, Stamped};
+use penup::boards::host::{CutArea, CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH, Stamped};
 use penup::machine::{EventRing, PulserState};
 use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, Plotter, start};
 use penup_client::emulator::{Machine, MachineEventKind};
@@ -114,12 +114,42 @@ pub fn switch_on_early<const WORDS: usize>(
     work_ticks: Option<u64>,
     work: impl FnOnce(&mut Powered<'_, '_>),
 ) -> (CutFlash, Vec<Stamped>) {
-    let mut memory = Box::new(Memory::<1024, 4096, WORDS, PORTS>::new());
+    let mut memory = Memory::<1024, 4096, WORDS, PORTS>::new();
+    let (flash, _, changes) = powered(&mut memory, flash, None, work_ticks, work);
+    (flash, changes)
+}
+
+/// Switches a board on that has little memory and this flash for a model, which takes the models
+/// that do not fit. So many ticks pass in a millisecond of computing. Otherwise as [`switch_on`];
+/// returns the model's flash, too.
+///
+/// # Panics
+/// Panics if `work` takes a flash of the board away.
+pub fn switch_on_small(
+    flash: CutFlash,
+    model: CutArea,
+    work_ticks: u64,
+    work: impl FnOnce(&mut Powered<'_, '_>),
+) -> (CutFlash, CutArea, Vec<Stamped>) {
+    let mut memory = Memory::<20, 60, 4000, PORTS>::new();
+    let (flash, model, changes) = powered(&mut memory, flash, Some(model), Some(work_ticks), work);
+    (flash, model.expect("the board has flash for models"), changes)
+}
+
+/// Switches a board with this memory on, lets `work` use it, and cuts the power.
+fn powered<const VERTICES: usize, const CORNERS: usize, const WORDS: usize>(
+    memory: &mut Memory<VERTICES, CORNERS, WORDS, PORTS>,
+    flash: CutFlash,
+    model: Option<CutArea>,
+    work_ticks: Option<u64>,
+    work: impl FnOnce(&mut Powered<'_, '_>),
+) -> (CutFlash, Option<CutArea>, Vec<Stamped>) {
     let mut blocks = EMPTY_LOOKAHEAD;
     let mut ring = EventRing::<QUEUE_LENGTH>::new();
     let pins = PulserState::new();
     let mut board = HostBoard::new(&mut ring, &pins);
     board.set_flash(flash);
+    board.set_model_flash(model);
     // A millisecond, which is more than a page takes typically.
     board.set_write_ticks(25_000);
     let memory = memory.lend(&mut blocks);
@@ -128,7 +158,8 @@ pub fn switch_on_early<const WORDS: usize>(
     let mut plotter = plotter.with_early_ink(work_ticks.is_some());
     work(&mut Powered { board: &mut board, plotter: &mut plotter });
     let changes = board.trace().changes();
-    (board.take_flash().expect("the board has flash"), changes)
+    let model = board.set_model_flash(None);
+    (board.take_flash().expect("the board has flash"), model, changes)
 }
 
 /// The strokes that the pins have drawn: the points of the pen while it was down, beginning at the

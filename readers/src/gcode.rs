@@ -61,6 +61,8 @@ struct Interpreter {
     systems: Systems,
     /// What G92 has added to heights.
     lift: f64,
+    /// What G92 has added last to heights, which `G92.3` adds again.
+    kept_lift: f64,
     height: f64,
     signals: Signals,
     moves: Moves,
@@ -97,6 +99,7 @@ impl Interpreter {
             unit: 1.0,
             systems: Systems::new(),
             lift: 0.0,
+            kept_lift: 0.0,
             height: 0.0,
             signals: Signals::default(),
             moves: Moves::from([0.0; 2]),
@@ -170,9 +173,17 @@ impl Interpreter {
                 ('G', 901) => self.has_absolute_centres = true,
                 ('G', 911) => self.has_absolute_centres = false,
                 ('G', 920) => (moves, sets_position) = (false, true),
-                ('G', 921) => {
-                    self.systems.unset(&("G92.1".to_owned(), number));
+                ('G', 921 | 922) => {
+                    let forgets = code == 921;
+                    self.systems.unset(forgets, &(format!("{letter}{value}"), number));
                     self.lift = 0.0;
+                    if forgets {
+                        self.kept_lift = 0.0;
+                    }
+                }
+                ('G', 923) => {
+                    self.systems.restore(&(format!("{letter}{value}"), number));
+                    self.lift = self.kept_lift;
                 }
                 ('G', 180 | 190) => return Err("arcs in other planes are not drawn".to_owned()),
                 // The end of a shift.

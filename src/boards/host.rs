@@ -424,6 +424,12 @@ impl Board for HostBoard<'_> {
     /// # Panics
     /// The returned writer panics if something moves.
     #[cfg(feature = "tiles")]
+    fn start_steps(&mut self) {
+        #[cfg(feature = "early-ink")]
+        self.begin_steps();
+    }
+
+    #[cfg(feature = "tiles")]
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         let state = self.state;
         let flash = self.model_flash.as_mut()?;

@@ -184,6 +184,18 @@ impl Decimal {
         if self.exponent < 0 { value / rest } else { value * rest }
     }
 
+    /// The mantissa and the exponent, of which [`Decimal::from_parts`] makes the number again.
+    pub const fn parts(self) -> (i64, i16) {
+        (self.mantissa, self.exponent)
+    }
+
+    /// The number with this mantissa and this exponent; `None` if no text has it.
+    pub fn from_parts(mantissa: i64, exponent: i32) -> Option<Self> {
+        let exponent = i16::try_from(exponent).ok()?;
+        (mantissa.unsigned_abs() < MANTISSA_LIMIT.unsigned_abs())
+            .then_some(Self { mantissa, exponent })
+    }
+
     /// Whether the number is below 0.
     pub const fn is_negative(self) -> bool {
         self.mantissa < 0

@@ -6,6 +6,8 @@ use super::Unobserved;
 use super::job::Pipeline;
 use super::listener::{Listener, MeasuredStrokes};
 use super::reply::Reply;
+#[cfg(feature = "resume")]
+use super::resume::StoppedJob;
 use super::{Board, Cursor, Inner, Job, Observer, records};
 use crate::index::Index;
 use crate::machine::State;
@@ -63,7 +65,7 @@ impl<I: Index> Inner<'_, I> {
         let begun = match drawing {
             _ if self.settle(&mut listener).is_err() => Err(CommandError::Aborted),
             #[cfg(feature = "tiles")]
-            Drawing::Model if self.is_in_flash() => self.plot_stored(&mut listener),
+            Drawing::Model if self.is_in_flash() => self.plot_stored(None, &mut listener),
             #[cfg(feature = "early-ink")]
             Drawing::Model => self.plot_model(&mut listener),
             #[cfg(not(feature = "early-ink"))]
@@ -72,6 +74,10 @@ impl<I: Index> Inner<'_, I> {
                 self.keep_begun(listener.board);
                 Ok(())
             }),
+            #[cfg(feature = "tiles")]
+            Drawing::LastJob if let Some(parts) = self.parts_again(listener.board) => {
+                self.plot_stored(Some(parts), &mut listener)
+            }
             Drawing::LastJob => self.load(listener.board).and_then(|()| {
                 #[cfg(feature = "early-ink")]
                 self.complete_order(&mut listener)?;
@@ -81,11 +87,15 @@ impl<I: Index> Inner<'_, I> {
             }),
             #[cfg(feature = "resume")]
             Drawing::Stopped { at_origin } => {
-                self.load_stopped(at_origin, listener.board).and_then(|drawn| {
-                    let Some(drawn) = drawn else { return Ok(()) };
-                    #[cfg(feature = "early-ink")]
-                    self.complete_order(&mut listener)?;
-                    self.begin_rest(drawn, &mut listener)
+                self.load_stopped(at_origin, listener.board).and_then(|stopped| match stopped {
+                    StoppedJob::Loaded(drawn) => {
+                        #[cfg(feature = "early-ink")]
+                        self.complete_order(&mut listener)?;
+                        self.begin_rest(drawn, &mut listener)
+                    }
+                    StoppedJob::Sent => Ok(()),
+                    #[cfg(feature = "tiles")]
+                    StoppedJob::InParts(parts) => self.plot_stored(Some(parts), &mut listener),
                 })
             }
         };

@@ -4,15 +4,21 @@
 use super::job::FIGURES;
 #[cfg(feature = "early-ink")]
 use super::job::{UNORDERED_WORDS, Unordered};
+#[cfg(feature = "tiles")]
+use super::options::{KeptOptions, PlotOptions};
 use super::program::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
 use super::{Board, Job, NotStored, Record, Reply, Stored};
 use crate::array::MapEach;
 use crate::fixed::Length;
 use crate::index::Index;
 use crate::machine::{SETTINGS, Setting, Settings, Value};
+#[cfg(feature = "tiles")]
+use crate::order::TimeModel;
 use crate::protocol::CommandError;
 #[cfg(feature = "early-ink")]
 use crate::storage::PAGE_BYTES;
+#[cfg(feature = "tiles")]
+use bytemuck::Zeroable as _;
 
 /// Size of a kept setting: two bytes for its number, four for its value.
 const SETTING_BYTES: usize = 6;
@@ -202,6 +208,57 @@ pub(super) fn save_job<B: Board, I: Index>(
 #[cfg(all(feature = "stream", feature = "resume"))]
 pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotStored> {
     board.save(Record::Job, &[&STREAMED_LAYOUT.to_le_bytes(), &id.to_le_bytes()])
+}
+
+/// A mark in place of [`JOB_LAYOUT`] for a drawing that is computed and drawn part by part. What it
+/// is computed from is kept besides the model: the speed, the acceleration and the work of a second
+/// by which the order is chosen, and the options.
+#[cfg(feature = "tiles")]
+const PARTS_LAYOUT: u32 = u32::from_le_bytes(*b"jobp");
+
+/// Keeps, in place of the last job, what a drawing in parts is computed from.
+///
+/// # Errors
+/// [`NotStored`]: the previous job is still kept.
+#[cfg(feature = "tiles")]
+#[inline(never)] // Keeps its frame off the stack while the stages run.
+pub(super) fn save_parts<B: Board>(
+    options: &PlotOptions,
+    time_model: TimeModel,
+    board: &mut B,
+) -> Result<(), NotStored> {
+    let TimeModel { speed, acceleration, units_per_second } = time_model;
+    let head = [PARTS_LAYOUT, speed, acceleration, units_per_second].map(u32::to_le_bytes);
+    let options = KeptOptions::from(options);
+    board.save(Record::Job, &[head.as_flattened(), bytemuck::bytes_of(&options)])
+}
+
+/// Loads what the drawing in parts that was kept last is computed from: sets the options, and
+/// returns by what its order is chosen. `None` if the last job is another one; the options then stay
+/// as they are.
+#[cfg(feature = "tiles")]
+#[inline(never)] // Keeps its frame off the stack while the stages run.
+pub(super) fn load_parts<B: Board>(options: &mut PlotOptions, board: &mut B) -> Option<TimeModel> {
+    let mut found = None;
+    board.load(Record::Job, &mut |record| {
+        let (mut head, mut kept) = ([[0; 4]; 4], KeptOptions::zeroed());
+        if record.read(head.as_flattened_mut()) != size_of_val(&head)
+            || record.read(bytemuck::bytes_of_mut(&mut kept)) != size_of_val(&kept)
+        {
+            return;
+        }
+        let [layout, speed, acceleration, units_per_second] = head.map(u32::from_le_bytes);
+        // No machine is faster, and no board counts more work as a second.
+        let is_known = layout == PARTS_LAYOUT
+            && speed < 1 << 22
+            && acceleration < 1 << 27
+            && units_per_second <= TimeModel::BOARD;
+        if let Some(kept) = kept.options().filter(|_| is_known) {
+            *options = kept;
+            found = Some(TimeModel { speed, acceleration, units_per_second });
+        }
+    });
+    found
 }
 
 /// A mark at the beginning of a kept job of which only the drawing and the first strokes are known.

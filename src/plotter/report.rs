@@ -256,8 +256,12 @@ impl<I: Index> Inner<'_, I> {
         if self.machine.underruns() != 0 {
             reply.part(format_args!("|Late:{}", self.machine.underruns()));
         }
-        if let Some([done, all]) = stopped {
-            reply.part(format_args!("|Stopped:{done}/{all}"));
+        match stopped {
+            // The number of strokes of a drawing in parts is not known before its end.
+            #[cfg(feature = "tiles")]
+            Some([done, u32::MAX]) => reply.part(format_args!("|Stopped:{done}/?")),
+            Some([done, all]) => reply.part(format_args!("|Stopped:{done}/{all}")),
+            None => {}
         }
         #[cfg(feature = "stream")]
         if let Some([taken, all, room]) = streamed {

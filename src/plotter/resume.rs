@@ -9,6 +9,9 @@
 //! are drawn and by which number its sender knows it. `$stream` tells both, so that the sender can
 //! go on there.
 //!
+//! Of a drawing that is computed and drawn part by part, what it is computed from is kept, and how
+//! many strokes are drawn. Its parts are computed again, and those that are drawn are left out.
+//!
 //! After a restart the machine does not know where the pen is. It must be homed, or the user puts
 //! the pen at the origin by hand and says so.
 //!
@@ -19,20 +22,29 @@ mod with_feature;
 #[cfg(not(feature = "resume"))]
 mod without_feature;
 
+#[cfg(feature = "tiles")]
+pub(super) use with_feature::KeptParts;
+#[cfg(feature = "resume")]
+pub(super) use with_feature::StoppedJob;
+
 /// What is known of a job that can be resumed.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Resumption {
-    /// How many strokes of the kept job are drawn, and how many there are; `None` if there is no
-    /// job of which that is kept.
+    /// How many strokes of the kept job are drawn, and how many there are: `u32::MAX` as long as
+    /// that is not known. `None` if there is no job of which that is kept.
     #[cfg(feature = "resume")]
     progress: Option<[u32; 2]>,
     /// How many strokes are noted at once, less one: more than one stroke in jobs that are sent
     /// and have more strokes than the flash notes.
     #[cfg(feature = "resume")]
     more_at_once: u32,
-    /// The number of strokes of a job that is sent that were drawn before its sender resumed it.
+    /// The number of strokes that were drawn before the job was resumed, of a job that is sent or
+    /// that is computed part by part.
     #[cfg(feature = "resume")]
     drawn_before: u32,
+    /// Whether the job is computed part by part.
+    #[cfg(feature = "tiles")]
+    in_parts: bool,
     /// Whether the position of the pen is not known since the job stopped.
     #[cfg(feature = "resume")]
     is_lost: bool,

@@ -30,6 +30,8 @@ pub struct LogProgress {
     pub parts: u32,
     /// The number of points within its parts that are passed, counted over the whole work.
     pub points: u32,
+    /// Whether all parts are done that the log has room for.
+    pub is_full: bool,
 }
 
 /// Where a log lies in flash.
@@ -127,8 +129,8 @@ impl Log {
         }
         read_surely(flash, self.start + HEADER_BYTES as u32, notes).ok()?;
         (sum == checksum(of, notes)).then(|| {
-            let noted = LogProgress { parts: self.count(flash), points: self.count_points(flash) };
-            (notes.len(), noted)
+            let (parts, points) = (self.count(flash), self.count_points(flash));
+            (notes.len(), LogProgress { parts, points, is_full: parts >= self.limit() })
         })
     }
 
@@ -269,11 +271,12 @@ mod tests {
             LOG.note(&mut flash, parts, next).unwrap();
             LOG.note_points(&mut flash, points, next_points).unwrap();
             (parts, points) = (next, next_points);
-            assert_eq!(read(&mut flash), LogProgress { parts, points });
+            let is_full = parts == LOG.limit();
+            assert_eq!(read(&mut flash), LogProgress { parts, points, is_full });
         }
         // Notes of a page less its head are too long by a byte, and leave the log as it was.
         assert!(LOG.begin(&mut flash, 7, &[0; 241]).is_err());
-        assert_eq!(read(&mut flash), LogProgress { parts, points });
+        assert_eq!(read(&mut flash), LogProgress { parts, points, is_full: true });
         // Another state has another log, and a page with another mark is none.
         assert!(LOG.read(&mut flash, 8, &mut [0; NOTE_BYTES]).is_none());
         flash.bytes[4096] ^= 1;

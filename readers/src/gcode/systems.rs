@@ -20,6 +20,8 @@ struct Axis {
     zero: Option<f64>,
     /// The part of it that G92 has added.
     added: Option<f64>,
+    /// What G92 has added last, which `G92.3` adds again.
+    kept: Option<f64>,
     /// Where the systems lie in the drawing.
     places: [Option<f64>; COUNT],
     /// Where the systems lie in coordinates of the machine.
@@ -47,6 +49,7 @@ impl Axis {
         Self {
             zero: Some(0.0),
             added: Some(0.0),
+            kept: Some(0.0),
             places,
             offsets: [None; COUNT],
             machine: None,
@@ -176,16 +179,28 @@ impl Systems {
             if to.is_some() {
                 let zero = difference(at, to);
                 axis.added = difference(zero, axis.places[self.active]);
+                axis.kept = axis.added;
                 axis.settle(self.active, by);
                 axis.zero = zero;
             }
         }
     }
 
-    /// Carries out `G92.1`, the end of G92.
-    pub fn unset(&mut self, by: &Command) {
+    /// Carries out the end of G92, for good (`G92.1`) or until `G92.3` restores it (`G92.2`).
+    pub fn unset(&mut self, forgets: bool, by: &Command) {
         for axis in &mut self.axes {
             axis.added = Some(0.0);
+            if forgets {
+                axis.kept = axis.added;
+            }
+            axis.settle(self.active, by);
+        }
+    }
+
+    /// Carries out `G92.3`: what G92 has added last is in force again.
+    pub fn restore(&mut self, by: &Command) {
+        for axis in &mut self.axes {
+            axis.added = axis.kept;
             axis.settle(self.active, by);
         }
     }
@@ -229,6 +244,7 @@ impl Interpreter {
         self.systems.set(to, at, &("G92".to_owned(), number));
         if let Some(value) = value('Z') {
             self.lift = self.height - value * self.unit;
+            self.kept_lift = self.lift;
         }
         self.place_begin(to);
     }

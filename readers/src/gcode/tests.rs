@@ -150,6 +150,17 @@ fn units_modes_offsets_and_comments_are_obeyed() {
     assert_eq!(strokes(inches), [[[25.4, 25.4], [63.5, 25.4], [63.5, 27.4]]]);
     let offset = "G0 X10 Y10\nG92 X0 Y0\nG1 X5\nG92.1\nG1 X0 Y0\n";
     assert_eq!(strokes(offset), [[[10.0, 10.0], [15.0, 10.0], [0.0, 0.0]]]);
+    // The offset is suspended and restored, along each axis and for heights.
+    let again = "G0 Z5\nG0 X10 Y10\nG92 X0 Z0\nG1 Z-6\nG1 X5\nG92.2\nG1 X0 Y0\nG92.3\nG1 X1 Y1\n\
+                 G0 Z0\nG0 X9\nG92.2\nG1 Z-1\nG1 X1\nG92.1\nG92.3\nG1 X2 Y2\nG0 Z5\n";
+    assert_eq!(
+        strokes(again),
+        [
+            vec![[10.0, 10.0], [15.0, 10.0], [0.0, 0.0], [11.0, 1.0]],
+            vec![[19.0, 1.0], [1.0, 1.0], [2.0, 2.0]]
+        ]
+    );
+    assert_eq!(notes("a.nc", again.as_bytes()), [""; 0]);
 }
 
 #[test]

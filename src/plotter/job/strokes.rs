@@ -229,6 +229,18 @@ impl<I: Index> Path for Strokes<'_, I> {
 
 #[cfg(feature = "resume")]
 impl<I: Index> Strokes<'_, I> {
+    /// Reads the path to its end. Returns the number of its strokes, as the machine counts them, and
+    /// where it ends.
+    #[cfg(feature = "tiles")]
+    pub fn count_strokes(&mut self) -> (u32, Option<PagePoint>) {
+        let (mut inked, mut pen, mut strokes, mut end) = (false, 0, 0u32, None);
+        while let Some(Target { point, ink }) = self.next_target() {
+            strokes += u32::from(ink.is_some() && (!inked || self.pen() != pen));
+            (inked, pen, end) = (ink.is_some(), self.pen(), Some(point));
+        }
+        (strokes, end)
+    }
+
     /// Lets the path begin with this stroke, counted from 0 as the machine counts them. Returns
     /// whether there is such a stroke; if not, the path is at its end.
     pub fn begin_at(&mut self, stroke: u32) -> bool {

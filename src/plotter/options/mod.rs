@@ -3,12 +3,16 @@
 //! [`OPTIONS`] has one row for each option. A new option is a field of [`PlotOptions`] with its
 //! default, and a row; the stage that obeys it reads the field.
 
+#[cfg(feature = "tiles")]
+mod kept;
 mod row;
 mod table;
 #[cfg(test)]
 mod tests;
 mod values;
 
+#[cfg(feature = "tiles")]
+pub(super) use kept::KeptOptions;
 pub use row::{Flag, PlotOption};
 pub use table::OPTIONS;
 pub use values::{HiddenLines, ProjectionChoice, VisibilityMode};

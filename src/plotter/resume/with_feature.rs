@@ -4,6 +4,8 @@ use super::Resumption;
 use crate::checksum::Crc32;
 use crate::index::Index;
 use crate::machine::{Path, Setting, Settings, State, Value};
+#[cfg(feature = "tiles")]
+use crate::order::TimeModel;
 #[cfg(feature = "early-ink")]
 use crate::plotter::NotStored;
 use crate::plotter::listener::MeasuredStrokes;
@@ -37,12 +39,23 @@ const PLACING: [Setting; 16] = [
 const LAYOUT: u32 = u32::from_le_bytes(*b"run2");
 /// The mark of the notes of a job that is sent while it is drawn.
 const STREAMED: u32 = u32::from_le_bytes(*b"str1");
+/// The mark of the notes of a drawing that is computed and drawn part by part. Its number of strokes
+/// is not known when it begins.
+#[cfg(feature = "tiles")]
+const PARTS: u32 = u32::from_le_bytes(*b"prt1");
+/// So many first strokes of a drawing in parts are noted one by one.
+#[cfg(feature = "tiles")]
+const ONE_BY_ONE: u32 = 1 << 14;
+/// So many of the others are noted at once.
+#[cfg(feature = "tiles")]
+const LATER_AT_ONCE: u32 = 32;
 /// The most strokes that are noted at once.
 #[cfg(feature = "stream")]
 const MOST_AT_ONCE: u32 = 1 << 12;
 /// Number of words before the settings: layout, version, strokes, whether the model is known,
 /// and the checksums of model and options. For a job that is sent the last three are how many
-/// strokes are noted at once, the number by which its sender knows it, and 0.
+/// strokes are noted at once, the number by which its sender knows it, and 0. For a drawing in parts
+/// they are 0, the checksum of the model, and 0.
 const HEAD: usize = 6;
 /// Size of the notes in words: each setting takes two.
 const WORDS: usize = HEAD + 2 * PLACING.len();
@@ -86,6 +99,28 @@ fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -
     notes
 }
 
+/// What `$resume` has found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::plotter) enum StoppedJob {
+    /// The job lies in the working memory, and this much of it is drawn.
+    Loaded(LogProgress),
+    /// Its sender has the strokes. The plotter knows no more than that the pen is at the origin.
+    Sent,
+    /// The job is computed again part by part, and this much of it is drawn.
+    #[cfg(feature = "tiles")]
+    InParts(KeptParts),
+}
+
+/// A drawing in parts that goes on or is drawn again. The options are those with which it began.
+#[cfg(feature = "tiles")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in crate::plotter) struct KeptParts {
+    /// By what the order of each part is chosen.
+    pub time_model: TimeModel,
+    /// The number of strokes that are drawn; `None` to begin anew.
+    pub drawn: Option<u32>,
+}
+
 impl Resumption {
     /// How many strokes of a job that has stopped are drawn, and how many there are.
     pub(in crate::plotter) fn stopped(&self, state: State) -> Option<[u32; 2]> {
@@ -112,10 +147,20 @@ impl Resumption {
     /// Reports a job that has stopped, if there is one.
     pub(in crate::plotter) fn report<B: Board>(&self, state: State, board: &mut B) {
         let Some([done, all]) = self.stopped(state) else { return };
-        Reply(board).line(format_args!(
-            "[MSG:a job stopped at stroke {} of {all}: $resume goes on]",
-            done + 1
-        ));
+        let mut reply = Reply(board);
+        reply.part(format_args!("[MSG:a job stopped at stroke {}", done.saturating_add(1)));
+        if all != u32::MAX {
+            reply.part(format_args!(" of {all}"));
+        }
+        reply.line(format_args!(": $resume goes on]"));
+    }
+
+    /// The number of all strokes of a drawing in parts has become known.
+    #[cfg(feature = "tiles")]
+    pub(in crate::plotter) fn end_parts(&mut self, strokes: u32) {
+        if let Some([_, all]) = &mut self.progress {
+            *all = strokes.saturating_add(self.drawn_before);
+        }
     }
 }
 
@@ -197,6 +242,13 @@ impl<I: Index> Inner<'_, I> {
         let is_end = self.resumption.progress.is_some_and(|[_, all]| strokes == all);
         // The last few strokes count as soon as all of them are drawn.
         let parts = if is_end { strokes.div_ceil(at_once) } else { strokes / at_once };
+        #[cfg(feature = "tiles")]
+        let parts = match self.resumption.in_parts {
+            false => parts,
+            // The log's whole room says that the drawing is complete.
+            true if is_end => u32::MAX,
+            true => noted_in_parts(strokes),
+        };
         if board.note_progress(parts).is_err() {
             self.machine.end_log();
             self.resumption.progress = None;
@@ -221,8 +273,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Loads the job that has stopped, and returns how much of it is drawn. With `at_origin`
-    /// the user has put the pen at the origin. `None` if its sender has the strokes, and the
-    /// plotter knows no more than that the pen is at the origin.
+    /// the user has put the pen at the origin.
     ///
     /// # Errors
     /// [`CommandError::NothingToResume`] if no job has stopped, or the reason why it cannot go
@@ -232,7 +283,7 @@ impl<I: Index> Inner<'_, I> {
         &mut self,
         at_origin: bool,
         board: &mut B,
-    ) -> Result<Option<LogProgress>, CommandError> {
+    ) -> Result<StoppedJob, CommandError> {
         let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
         let all = all_strokes(&notes, board);
         if done(&notes, noted) >= all {
@@ -248,10 +299,19 @@ impl<I: Index> Inner<'_, I> {
             }
             self.machine.declare_origin()?;
             self.resumption.is_lost = false;
-            return Ok(None);
+            return Ok(StoppedJob::Sent);
         }
         if self.resumption.is_lost && !at_origin {
             return Err(CommandError::PositionUnknown);
+        }
+        #[cfg(feature = "tiles")]
+        if is_in_parts(&notes) {
+            let parts = self.load_parts(word(&notes, 4), Some(done(&notes, noted)), board)?;
+            if at_origin {
+                self.machine.declare_origin()?;
+            }
+            self.resumption.is_lost = false;
+            return Ok(StoppedJob::InParts(parts));
         }
         self.copy_words = 0;
         self.job = Default::default();
@@ -262,7 +322,89 @@ impl<I: Index> Inner<'_, I> {
         }
         let progress = Some([noted.parts, all]);
         self.resumption = Resumption { progress, ..Resumption::default() };
-        Ok(Some(noted))
+        Ok(StoppedJob::Loaded(noted))
+    }
+
+    /// Loads what a drawing in parts of the model with this checksum is computed from, of which so
+    /// many strokes are drawn. Its options are in force then.
+    ///
+    /// # Errors
+    /// [`CommandError::OtherModel`] if the flash holds another model or none, or
+    /// [`CommandError::NoJobKept`].
+    #[cfg(feature = "tiles")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    fn load_parts<B: Board>(
+        &mut self,
+        model: u32,
+        drawn: Option<u32>,
+        board: &mut B,
+    ) -> Result<KeptParts, CommandError> {
+        if self.stored_checksum(board) != Some(model) {
+            return Err(CommandError::OtherModel);
+        }
+        let time_model = records::load_parts(&mut self.options, board);
+        Ok(KeptParts { time_model: time_model.ok_or(CommandError::NoJobKept)?, drawn })
+    }
+
+    /// If the last job is a drawing in parts of the model in flash, what it is computed from, so
+    /// that it is drawn again. Its options are in force then.
+    #[cfg(feature = "tiles")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn parts_again<B: Board>(&mut self, board: &mut B) -> Option<KeptParts> {
+        let (notes, _) = read(board).filter(|(notes, _)| is_in_parts(notes))?;
+        self.load_parts(word(&notes, 4), None, board).ok()
+    }
+
+    /// Nothing is left to draw of a drawing in parts. If it was `kept`, the power went just behind
+    /// its end, which is noted now.
+    ///
+    /// # Errors
+    /// [`CommandError::NothingToPlot`] if nothing was drawn before, either.
+    #[cfg(feature = "tiles")]
+    #[inline(never)] // Called seldom: inlined, it would only fill the cache.
+    pub(in crate::plotter) fn nothing_left<B: Board>(
+        &mut self,
+        kept: Option<KeptParts>,
+        board: &mut B,
+    ) -> Result<(), CommandError> {
+        self.parts.end();
+        kept.and_then(|kept| kept.drawn).ok_or(CommandError::NothingToPlot)?;
+        if board.note_progress(u32::MAX).is_err() {
+            refuse(board);
+        }
+        self.resumption = Resumption::default();
+        Reply(board).line(format_args!("[MSG:nothing is left to draw: the drawing is complete]"));
+        Ok(())
+    }
+
+    /// Begins to keep how far a drawing in parts comes that has just begun, of the model with this
+    /// checksum, or goes on with what is kept of it. Nothing may move yet.
+    #[cfg(feature = "tiles")]
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(in crate::plotter) fn keep_parts<B: Board>(
+        &mut self,
+        model: u32,
+        time_model: TimeModel,
+        kept: Option<KeptParts>,
+        board: &mut B,
+    ) {
+        self.resumption = Resumption::default();
+        if !board.keeps_progress() {
+            return;
+        }
+        let drawn = kept.and_then(|kept| kept.drawn);
+        if drawn.is_none() {
+            let notes = begin_notes(self.machine.settings(), PARTS, u32::MAX, [0, model, 0]);
+            let is_kept =
+                kept.is_some() || records::save_parts(&self.options, time_model, board).is_ok();
+            if !is_kept || board.begin_progress(notes.as_flattened(), 0).is_err() {
+                return refuse(board);
+            }
+        }
+        self.machine.log_strokes(0);
+        let drawn = drawn.unwrap_or(0);
+        self.resumption.progress = Some([drawn, u32::MAX]);
+        (self.resumption.drawn_before, self.resumption.in_parts) = (drawn, true);
     }
 
     /// Checks that what a job depends on is as it was when the job began.
@@ -313,7 +455,7 @@ impl<I: Index> Inner<'_, I> {
         let (mut points, distance) = (0, self.machine.point_distance());
         if drawn.points > 0 && distance > 0 {
             let length = |ends| self.machine.length(ends);
-            let LogProgress { parts, points: passed } = drawn;
+            let LogProgress { parts, points: passed, .. } = drawn;
             points = strokes.strokes.begin_at_point(parts, passed, distance, &length);
         }
         self.machine.start_rest(&mut strokes, whole)?;
@@ -353,7 +495,7 @@ impl<I: Index> Inner<'_, I> {
                 progress: Some([drawn, all]),
                 more_at_once: word(&notes, 3).saturating_sub(1),
                 drawn_before: drawn,
-                is_lost: false,
+                ..Resumption::default()
             };
             return;
         }
@@ -408,10 +550,33 @@ fn is_streamed(notes: &Notes) -> bool {
     word(notes, 0) == STREAMED
 }
 
+/// Whether the notes are those of a drawing in parts.
+#[cfg(feature = "tiles")]
+fn is_in_parts(notes: &Notes) -> bool {
+    word(notes, 0) == PARTS
+}
+
+/// The number of bits of the log that say that so many strokes of a drawing in parts are drawn.
+#[cfg(feature = "tiles")]
+fn noted_in_parts(strokes: u32) -> u32 {
+    strokes.min(ONE_BY_ONE) + strokes.saturating_sub(ONE_BY_ONE) / LATER_AT_ONCE
+}
+
+/// The number of strokes of a drawing in parts of which so many bits of the log say that they are
+/// drawn.
+#[cfg(feature = "tiles")]
+fn drawn_in_parts(noted: u32) -> u32 {
+    noted.min(ONE_BY_ONE) + noted.saturating_sub(ONE_BY_ONE) * LATER_AT_ONCE
+}
+
 /// Returns the number of strokes of a job with these notes that are drawn, according to its
 /// log.
 fn done(notes: &Notes, noted: LogProgress) -> u32 {
     let (strokes, at_once) = (word(notes, 2), word(notes, 3));
+    #[cfg(feature = "tiles")]
+    if is_in_parts(notes) {
+        return if noted.is_full { u32::MAX } else { drawn_in_parts(noted.parts) };
+    }
     if is_streamed(notes) { noted.parts.saturating_mul(at_once).min(strokes) } else { noted.parts }
 }
 
@@ -421,6 +586,8 @@ fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
     let (length, noted) = board.progress(notes.as_flattened_mut())?;
     let layout = word(&notes, 0);
     let is_known = layout == LAYOUT || layout == STREAMED;
+    #[cfg(feature = "tiles")]
+    let is_known = is_known || layout == PARTS;
     (length == size_of::<Notes>() && is_known).then_some((notes, noted))
 }
 
@@ -428,7 +595,7 @@ fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
 /// notes have an estimate, and the order the number.
 fn all_strokes<B: Board>(notes: &Notes, board: &mut B) -> u32 {
     #[cfg(feature = "early-ink")]
-    if !is_streamed(notes)
+    if word(notes, 0) == LAYOUT
         && let Some(strokes) = records::strokes_of_added_order(board)
     {
         return strokes;

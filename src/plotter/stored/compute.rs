@@ -5,7 +5,7 @@ use crate::drawing::StepsPerMillimetre;
 use crate::drawing::{Bounds, LineType, PackedLine, PagePoint, Stored, build_graph};
 use crate::index::Index;
 use crate::model::{Positions, StoredModel};
-use crate::order::{self, Leg};
+use crate::order::{self, Leg, TimeModel};
 use crate::plotter::Unobserved;
 use crate::plotter::job::{Collector, Job, PageSink, fit, move_to_front};
 use crate::plotter::options::{HiddenLines, PlotOptions};
@@ -35,7 +35,7 @@ const POSITIONS_BETWEEN_CHECKS: usize = 256;
 pub(super) fn prepare(
     model: &StoredModel<'_>,
     options: &PlotOptions,
-    steps: StepsPerMillimetre,
+    (steps, time_model): (StepsPerMillimetre, TimeModel),
     words: &mut [u64],
     search: &mut Option<DrawingSearch>,
     cancel: &mut dyn Cancel,
@@ -86,8 +86,17 @@ pub(super) fn prepare(
     let pens = of_model | of_hidden | u32::from(has_title);
     let pen = pens.trailing_zeros() as u8;
     let pens = pens & pens.wrapping_sub(1);
-    *search =
-        Some(DrawingSearch { view, map, options: *options, tiles, pens, pen, around, has_title });
+    *search = Some(DrawingSearch {
+        view,
+        map,
+        options: *options,
+        tiles,
+        pens,
+        pen,
+        around,
+        has_title,
+        time_model,
+    });
     Ok([least, greatest])
 }
 
@@ -122,12 +131,12 @@ pub(super) fn next_part<I: Index>(
     model: &StoredModel<'_>,
     search: &mut DrawingSearch,
     steps: StepsPerMillimetre,
-    order: order::Options,
     words: &mut [u64],
     at: Option<PagePoint>,
     cancel: &mut dyn Cancel,
 ) -> Result<Option<Computed<I>>, CommandError> {
     let begin = search.tiles.index_words();
+    let order = search.options.order(steps, search.time_model);
     loop {
         let count = if !search.tiles.is_over() {
             find_lines(model, search, words, cancel)?

@@ -196,6 +196,14 @@ impl<I: Index> Inner<'_, I> {
         Ok(model)
     }
 
+    /// The checksum of the model in flash, if it is complete.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn stored_checksum<B: Board>(&self, board: &mut B) -> Option<u32> {
+        let (area, _) = board.model_flash()?;
+        let model = matches!(self.large, FlashModel::Whole).then(|| StoredModel::new(area));
+        Some(model.flatten()?.checksum())
+    }
+
     /// Writes the part of the reply to `$model` that tells of a model in flash, or of the room
     /// there. A model that is still coming is completed. Returns the checksum of the model.
     #[inline(never)] // Keeps its frame off the stack while the stages run.

@@ -7,6 +7,7 @@
 
 use crate::drawing::{PageMap, PagePoint};
 use crate::machine::{JobSize, Target};
+use crate::order::TimeModel;
 use crate::plotter::job::{Cursor, Job};
 use crate::plotter::options::PlotOptions;
 use crate::plotter::streamed::Streamed;
@@ -33,6 +34,8 @@ pub(super) struct DrawingSearch {
     pub around: [i32; 3],
     /// Whether the title has still to be drawn.
     pub has_title: bool,
+    /// By what the order of each part is chosen. Other speeds that the user sets do not affect it.
+    pub time_model: TimeModel,
 }
 
 /// A part whose strokes lie in the working memory, in their order.

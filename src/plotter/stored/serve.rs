@@ -8,15 +8,15 @@ use crate::fixed::Millimetres;
 use crate::index::Index;
 use crate::machine::{JobSize, Path, State, StrokeEnds};
 use crate::model::StoredModel;
-use crate::order;
 use crate::plotter::listener::Listener;
 use crate::plotter::reply::Reply;
+use crate::plotter::resume::KeptParts;
 use crate::plotter::streamed::Streamed;
-use crate::plotter::{
-    BegunJob, Board, Cursor, Inner, Job, PlotOptions, VisibilityMode, report, title,
-};
+use crate::plotter::{BegunJob, Board, Cursor, Inner, Job, VisibilityMode, report, title};
 use crate::protocol::{CommandError, RealTime, StoredModelError, StreamedTarget};
 use crate::stage::{Aborted, Cancel};
+#[cfg(feature = "early-ink")]
+use crate::storage::PAGE_BYTES;
 
 /// The result of working on a drawing in parts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -30,13 +30,15 @@ pub(in crate::plotter) enum PartsProgress {
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Begins to draw the model in flash.
+    /// Begins to draw the model in flash, or the drawing of it that was `kept`, whose options are in
+    /// force: all of it, or what is not drawn of it.
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. Nothing moves then.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(in crate::plotter) fn plot_stored<B: Board>(
         &mut self,
+        kept: Option<KeptParts>,
         listener: &mut Listener<'_, B>,
     ) -> Result<(), CommandError> {
         if self.options.see != VisibilityMode::Faces {
@@ -56,9 +58,12 @@ impl<I: Index> Inner<'_, I> {
         self.job = Job::default();
         self.cursor = Cursor::default();
         self.parts.end();
-        let order = self.order_of_parts(&self.options);
+        let time_model = self.machine.settings().time_model(self.units_per_second());
+        let time_model = kept.map_or(time_model, |kept| kept.time_model);
         let search = &mut self.parts.search;
-        let [least, greatest] = prepare(model, &self.options, steps, self.words, search, listener)?;
+        let scales = (steps, time_model);
+        let [least, greatest] =
+            prepare(model, &self.options, scales, self.words, search, listener)?;
         let bounds = beyond([least, greatest], self.machine.stroke_ends(), steps);
         for point in bounds {
             self.machine.check_travel(0, point)?;
@@ -72,32 +77,49 @@ impl<I: Index> Inner<'_, I> {
             return Ok(());
         }
         let at = self.machine.end();
-        let part = next_part(model, search, steps, order, self.words, None, listener)?;
-        let part = part.ok_or(CommandError::NothingToPlot)?;
+        let mut drawn = kept.and_then(|kept| kept.drawn).unwrap_or(0);
+        if drawn > 0 {
+            Reply(listener.board).line(format_args!(
+                "[MSG:what is drawn is computed again, which may take minutes]"
+            ));
+        }
+        let ends = self.machine.stroke_ends();
+        let mut part = next_part(model, search, steps, self.words, None, listener)?;
+        // The parts that are drawn are left out.
+        while let Some((job, begin)) = &part {
+            let words = self.words.get_mut(*begin..).unwrap_or(&mut []);
+            let (strokes, at) = job.strokes(words, &mut Cursor::default(), ends).count_strokes();
+            if drawn < strokes {
+                break;
+            }
+            drawn -= strokes;
+            part = next_part(model, search, steps, self.words, at, listener)?;
+        }
+        let Some(part) = part else {
+            return self.nothing_left(kept, listener.board);
+        };
+        #[cfg(feature = "early-ink")]
+        if kept.is_none_or(|kept| kept.drawn.is_none()) {
+            Self::make_room(listener, 2 * PAGE_BYTES as u32)?;
+        }
         self.machine.start_streamed(JobSize::default(), bounds)?;
+        self.keep_parts(model.checksum(), time_model, kept, listener.board);
         self.parts.is_active = true;
         self.parts.last.target.point = at;
         self.streamed = Streamed::open_ended();
-        self.take_part(Some(part));
+        self.take_part(Some(part), drawn);
         self.feed_part();
-        Reply(listener.board).line(format_args!(
-            "[MSG:computed and drawn part by part: $again and $resume do not draw this]"
-        ));
+        Reply(listener.board).line(format_args!("[MSG:computed and drawn part by part]"));
         Ok(())
     }
 
-    /// The options of the order of each part.
-    fn order_of_parts(&self, options: &PlotOptions) -> order::Options {
-        let settings = self.machine.settings();
-        options.order(settings.page_steps(), settings.time_model(self.units_per_second()))
-    }
-
-    /// Notes what has been computed.
+    /// Notes what has been computed. So many strokes of it are `drawn` already.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn take_part(&mut self, part: Option<Computed<I>>) {
+    fn take_part(&mut self, part: Option<Computed<I>>, drawn: u32) {
         if part.is_none() {
             self.parts.search = None;
             self.streamed.end_here();
+            self.resumption.end_parts(self.machine.status().job.strokes);
         }
         if let Some((job, _)) = &part {
             self.job.add_report(job.report());
@@ -107,8 +129,12 @@ impl<I: Index> Inner<'_, I> {
             let words = self.words.get_mut(begin..).unwrap_or(&mut []);
             let mut cursor = Cursor::default();
             let mut strokes = job.strokes(words, &mut cursor, ends);
+            if drawn > 0 {
+                strokes.begin_at(drawn);
+            }
+            let from = *strokes.cursor;
             let left = core::iter::from_fn(|| strokes.next_target()).count();
-            ComputedPart { job, cursor: Cursor::default(), left, begin }
+            ComputedPart { job, cursor: from, left, begin }
         });
     }
 
@@ -150,12 +176,11 @@ impl<I: Index> Inner<'_, I> {
             return PartsProgress::Busy;
         };
         let steps = self.machine.settings().page_steps();
-        let order = self.order_of_parts(&search.options);
         let at = Some(self.parts.last.target.point);
         // The machine goes on meanwhile, and does not use this memory.
         let words = core::mem::take(&mut self.words);
         let mut server = PartCancel { inner: self, board, ends: None };
-        let part = next_part(model, search, steps, order, words, at, &mut server);
+        let part = next_part(model, search, steps, words, at, &mut server);
         let ends = server.ends;
         self.words = words;
         match (ends, part) {
@@ -164,7 +189,7 @@ impl<I: Index> Inner<'_, I> {
             (Some(EarlyEnd::ByMachine), _) => self.end_parts(),
             (None, Ok(part)) => {
                 self.parts.search = Some(*search);
-                self.take_part(part);
+                self.take_part(part, 0);
                 self.feed_part();
             }
             (None, Err(error)) => self.give_up(error, board),
@@ -240,6 +265,7 @@ impl<I: Index, B: Board> Cancel for PartCancel<'_, '_, I, B> {
         }
         inner.act(requests);
         inner.watch(*board);
+        inner.note_progress(*board);
         inner.plan(BegunJob::default(), *board);
         board.start_steps();
         if inner.takes_status(requests, *board) {
