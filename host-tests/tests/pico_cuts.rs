@@ -2,6 +2,7 @@
 //! returns garbage once. `cargo xtask power-soak` does it for as long as one wishes.
 #![cfg(feature = "emulator")]
 
+use penup::board_table::PICO;
 use penup_host_tests::pico_cuts::{CutPico, Job};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::job_lines;
@@ -22,6 +23,27 @@ fn small() -> Job {
 
 fn job(scene: &str, options: &[&str]) -> Job {
     Job::new(job_lines(scene, &[&QUICK_PEN[..], options].concat()))
+}
+
+/// A job of a solid that lies in flash and is drawn part by part: vertices without faces fill the
+/// memory.
+fn in_parts() -> Job {
+    let options = ["$page=45x45", "$margin=3", "$hidden=erased"];
+    let mut lines = job_lines("lattice3.obj", &[&QUICK_PEN[..], &options].concat());
+    let plot = lines.pop();
+    lines.extend(vec!["v 1 1 1".to_owned(); PICO.memory.vertices]);
+    lines.extend(plot);
+    Job::new(lines)
+}
+
+#[test]
+fn a_drawing_in_parts_is_whole_after_cuts() -> TestResult {
+    let job = in_parts();
+    let mut board = CutPico::start()?;
+    board.draw(&job, 3, &mut Random::new(5))?;
+    eprintln!("{} strokes, {:?}: {:?}", job.whole.len(), job.time, board.counts());
+    assert!(board.counts().cuts() >= 2, "{:?}", board.counts());
+    Ok(())
 }
 
 #[test]
@@ -49,6 +71,7 @@ fn soak() -> TestResult {
         ("dotted", job("lattice2.obj", &["$page=45x45", "$margin=3", "$hidden=dotted"]), 8),
         ("early ink", job("lattice4.obj", &["$page=40x40", "$margin=3"]), 10),
         ("one stroke with rests", Job::new(one_stroke()), 8),
+        ("in parts", in_parts(), 6),
     ];
     let mut random = Random::new(seed);
     let begun = Instant::now();
