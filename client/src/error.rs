@@ -9,7 +9,7 @@ use crate::interrupt::EXIT_CODE;
 use crate::machine_settings::NoSuchMachine;
 use crate::operate::SettingsFileError;
 use penup::protocol::{CommandError, alarm_entries};
-use penup_job::protocol::RECEIVE_WINDOW;
+use penup_job::protocol::{RECEIVE_WINDOW, strokes_drawn};
 use penup_readers::ReadError;
 use penup_readers::lines::{JobLine, Origin};
 use penup_readers::words::{as_option, explained, for_client};
@@ -280,13 +280,14 @@ pub enum Error {
     Restarted,
     /// A job that was followed has stopped before its end.
     #[error(
-        "the job has stopped after {done} of {all} strokes: it was given up, or the plotter was \
-         reset or lost its power\n`penup resume` goes on with it"
+        "the job has stopped after {}: it was given up, or the plotter was reset or lost its \
+         power\n`penup resume` goes on with it",
+        strokes_drawn(*done, *all)
     )]
     JobStopped {
         /// The number of strokes that are drawn.
         done: u64,
-        /// The number of all strokes.
+        /// The number of all strokes; 0 if it is not known.
         all: u64,
     },
     /// The serial line corrupts so many bytes that a line of the job never arrives intact.

@@ -118,6 +118,11 @@ pub enum Reply {
     Other(String),
 }
 
+/// How many strokes of all are drawn, in words; `all` is 0 if that is not known.
+pub fn strokes_drawn(done: u64, all: u64) -> String {
+    if all == 0 { format!("{done} strokes") } else { format!("{done} of {all} strokes") }
+}
+
 /// A status report, `<State|Key:value|...>`.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Status {
@@ -127,7 +132,8 @@ pub struct Status {
     pub is_standing: bool,
     /// The numbers of `Strokes:done/all`, which is reported during a drawing.
     pub strokes: Option<(u64, u64)>,
-    /// The numbers of `Stopped:done/all`, if a job has stopped that can go on.
+    /// The numbers of `Stopped:done/all`, if a job has stopped that can go on. The second is 0 as
+    /// long as nobody knows it.
     pub stopped: Option<(u64, u64)>,
     /// The lengths of `Ink:done/all`, drawn and to draw, in whole mm.
     pub ink: Option<(u64, u64)>,
@@ -357,6 +363,7 @@ mod tests {
         );
         let stopped = status("<Idle|MPos:0,0,0|Stopped:4/9|Strokes:0/0>");
         assert_eq!((stopped.stopped, run.stopped), (Some((4, 9)), None));
+        assert_eq!([strokes_drawn(4, 9), strokes_drawn(4, 0)], ["4 of 9 strokes", "4 strokes"]);
         let computing = status("<Run|MPos:0,0,0|Stage:order>");
         assert_eq!(
             (computing.stage.as_deref(), computing.ink, computing.percent),

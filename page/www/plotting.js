@@ -348,9 +348,12 @@ export class Plotting {
     if ($("stopped").hidden === !stopped) return;
     $("stopped").hidden = !stopped;
     if (!stopped) return;
+    const [done, all] = stopped;
+    // How many there are is not known of a drawing that is computed part by part.
+    const strokes = all === 0 ? `${done} strokes` : `${done} of ${all} strokes`;
     $("stopped").querySelector("p").textContent =
-      `A job has stopped after ${stopped[0]} of ${stopped[1]} strokes. It can go on once the ` +
-      "machine is homed (By hand: Home), or the pen was put at the origin by hand.";
+      `A job has stopped after ${strokes}. It can go on once the machine is ` +
+      "homed (By hand: Home), or the pen was put at the origin by hand.";
   }
 
   /** More of the path that the pins of the emulated plotter have made. */

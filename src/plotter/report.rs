@@ -259,7 +259,7 @@ impl<I: Index> Inner<'_, I> {
         match stopped {
             // The number of strokes of a drawing in parts is not known before its end.
             #[cfg(feature = "tiles")]
-            Some([done, u32::MAX]) => reply.part(format_args!("|Stopped:{done}/?")),
+            Some([done, u32::MAX]) => reply.part(format_args!("|Stopped:{done}/0")),
             Some([done, all]) => reply.part(format_args!("|Stopped:{done}/{all}")),
             None => {}
         }

@@ -7,7 +7,7 @@ use crate::outcome::Outcome;
 use crate::ports as serial_ports;
 use crate::progress::duration;
 use crate::sender::{Sender, Timeouts};
-use penup_job::protocol::Status;
+use penup_job::protocol::{Status, strokes_drawn};
 use serde_json::{Value, json};
 use std::sync::atomic::AtomicBool;
 
@@ -67,7 +67,8 @@ pub(super) fn described(status: &Status) -> String {
     }
     if let Some((done, all)) = status.stopped {
         lines.push(format!(
-            "a job has stopped after {done} of {all} strokes: `penup resume` goes on with it"
+            "a job has stopped after {}: `penup resume` goes on with it",
+            strokes_drawn(done, all)
         ));
     }
     if let Some((done, all)) = status.strokes.filter(|(_, all)| *all > 0) {

@@ -194,6 +194,7 @@ impl KeptOptions {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::string::ToString as _;
 
     /// Options of which each differs from its default, with numbers that have many digits.
     fn changed() -> PlotOptions {

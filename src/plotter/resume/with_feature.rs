@@ -6,6 +6,8 @@ use crate::index::Index;
 use crate::machine::{Path, Setting, Settings, State, Value};
 #[cfg(feature = "tiles")]
 use crate::order::TimeModel;
+#[cfg(feature = "tiles")]
+use crate::plotter::Layout;
 #[cfg(feature = "early-ink")]
 use crate::plotter::NotStored;
 use crate::plotter::listener::MeasuredStrokes;
@@ -49,6 +51,13 @@ const ONE_BY_ONE: u32 = 1 << 14;
 /// So many of the others are noted at once.
 #[cfg(feature = "tiles")]
 const LATER_AT_ONCE: u32 = 32;
+/// The most bits of the log by which strokes of a drawing in parts are noted. One more says that the
+/// drawing is complete.
+#[cfg(feature = "tiles")]
+const MOST_NOTED: u32 = {
+    let [log, _] = Layout::from(0, 0).logs;
+    log.limit() - 1
+};
 /// The most strokes that are noted at once.
 #[cfg(feature = "stream")]
 const MOST_AT_ONCE: u32 = 1 << 12;
@@ -559,7 +568,8 @@ fn is_in_parts(notes: &Notes) -> bool {
 /// The number of bits of the log that say that so many strokes of a drawing in parts are drawn.
 #[cfg(feature = "tiles")]
 fn noted_in_parts(strokes: u32) -> u32 {
-    strokes.min(ONE_BY_ONE) + strokes.saturating_sub(ONE_BY_ONE) / LATER_AT_ONCE
+    let noted = strokes.min(ONE_BY_ONE) + strokes.saturating_sub(ONE_BY_ONE) / LATER_AT_ONCE;
+    noted.min(MOST_NOTED)
 }
 
 /// The number of strokes of a drawing in parts of which so many bits of the log say that they are
@@ -614,4 +624,28 @@ fn refuse<B: Board>(board: &mut B) {
     Reply(board).line(format_args!(
         "[MSG:$resume will not go on with this: the flash does not take how far it comes]"
     ));
+}
+
+#[cfg(all(test, feature = "tiles"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_strokes_of_a_drawing_in_parts_are_noted_than_are_drawn() {
+        for (drawn, noted) in [
+            (0, 0),
+            (1, 1),
+            (16_384, 16_384),
+            (16_415, 16_384),
+            (16_416, 16_416),
+            (16_500, 16_480),
+            (229_343, 229_312),
+            (229_344, 229_344),
+            (u32::MAX - 1, 229_344),
+        ] {
+            assert_eq!(drawn_in_parts(noted_in_parts(drawn)), noted, "{drawn}");
+            // The whole room of the log says that the drawing is complete.
+            assert!(noted_in_parts(drawn) < 23_040, "{drawn}");
+        }
+    }
 }

@@ -440,7 +440,7 @@ impl CommandError {
                 ),
                 format_args!(
                     "another model came since the job began: $clear, then $resume, or begin anew \
-                     by $plot"
+                     by $plot; a drawing in parts needs its own model in flash"
                 ),
             ),
             #[cfg(not(feature = "resume"))]
