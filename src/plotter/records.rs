@@ -234,8 +234,8 @@ pub(super) fn save_parts<B: Board>(
 }
 
 /// Loads what the drawing in parts that was kept last is computed from: sets the options, and
-/// returns by what its order is chosen. `None` if the last job is another one; the options then stay
-/// as they are.
+/// returns by what its order is chosen. `None` if the last job is another one; the options then
+/// stay as they are.
 #[cfg(feature = "tiles")]
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn load_parts<B: Board>(options: &mut PlotOptions, board: &mut B) -> Option<TimeModel> {

@@ -160,9 +160,9 @@ impl<I: Index> Inner<'_, I> {
         Reply(board).line(format_args!("[MEM:{} bytes to work in]", size_of_val(self.words)));
     }
 
-    /// Whether a status report is to be written now: one was asked for, by `requests` or before, and
-    /// the output has room for it. The request is done with then; otherwise it waits, also where
-    /// what is computed ends meanwhile.
+    /// Whether a status report is to be written now: one was asked for, by `requests` or before,
+    /// and the output has room for it. The request is done with then; otherwise it waits, also
+    /// where what is computed ends meanwhile.
     pub fn takes_status<B: Board>(&mut self, requests: RealTime, board: &mut B) -> bool {
         self.status_due |= requests.has(RealTime::STATUS);
         self.status_due && board.has_room(REPLY_BYTES) && core::mem::take(&mut self.status_due)

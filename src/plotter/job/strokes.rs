@@ -229,8 +229,8 @@ impl<I: Index> Path for Strokes<'_, I> {
 
 #[cfg(feature = "resume")]
 impl<I: Index> Strokes<'_, I> {
-    /// Reads the path to its end. Returns the number of its strokes, as the machine counts them, and
-    /// where it ends.
+    /// Reads the path to its end. Returns the number of its strokes, as the machine counts them,
+    /// and where it ends.
     #[cfg(feature = "tiles")]
     pub fn count_strokes(&mut self) -> (u32, Option<PagePoint>) {
         let (mut inked, mut pen, mut strokes, mut end) = (false, 0, 0u32, None);

@@ -214,7 +214,7 @@ mod tests {
             ("pens", "one"),
             ("page", "123.456x78.9"),
             ("margin", "3.21"),
-            ("title", "Größe \u{2300} 3"),
+            ("title", "Größe 3"),
             ("title-size", "7.7"),
             ("fit", "on"),
             ("order", "exact"),

@@ -41,8 +41,8 @@ const PLACING: [Setting; 16] = [
 const LAYOUT: u32 = u32::from_le_bytes(*b"run2");
 /// The mark of the notes of a job that is sent while it is drawn.
 const STREAMED: u32 = u32::from_le_bytes(*b"str1");
-/// The mark of the notes of a drawing that is computed and drawn part by part. Its number of strokes
-/// is not known when it begins.
+/// The mark of the notes of a drawing that is computed and drawn part by part. Its number of
+/// strokes is not known when it begins.
 #[cfg(feature = "tiles")]
 const PARTS: u32 = u32::from_le_bytes(*b"prt1");
 /// So many first strokes of a drawing in parts are noted one by one.
@@ -51,8 +51,8 @@ const ONE_BY_ONE: u32 = 1 << 14;
 /// So many of the others are noted at once.
 #[cfg(feature = "tiles")]
 const LATER_AT_ONCE: u32 = 32;
-/// The most bits of the log by which strokes of a drawing in parts are noted. One more says that the
-/// drawing is complete.
+/// The most bits of the log by which strokes of a drawing in parts are noted. One more says that
+/// the drawing is complete.
 #[cfg(feature = "tiles")]
 const MOST_NOTED: u32 = {
     let [log, _] = Layout::from(0, 0).logs;
@@ -63,8 +63,8 @@ const MOST_NOTED: u32 = {
 const MOST_AT_ONCE: u32 = 1 << 12;
 /// Number of words before the settings: layout, version, strokes, whether the model is known,
 /// and the checksums of model and options. For a job that is sent the last three are how many
-/// strokes are noted at once, the number by which its sender knows it, and 0. For a drawing in parts
-/// they are 0, the checksum of the model, and 0.
+/// strokes are noted at once, the number by which its sender knows it, and 0. For a drawing in
+/// parts they are 0, the checksum of the model, and 0.
 const HEAD: usize = 6;
 /// Size of the notes in words: each setting takes two.
 const WORDS: usize = HEAD + 2 * PLACING.len();

@@ -30,8 +30,8 @@ pub(in crate::plotter) enum PartsProgress {
 }
 
 impl<I: Index> Inner<'_, I> {
-    /// Begins to draw the model in flash, or the drawing of it that was `kept`, whose options are in
-    /// force: all of it, or what is not drawn of it.
+    /// Begins to draw the model in flash, or the drawing of it that was `kept`, whose options are
+    /// in force: all of it, or what is not drawn of it.
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. Nothing moves then.
