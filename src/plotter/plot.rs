@@ -74,17 +74,7 @@ impl<I: Index> Inner<'_, I> {
                 self.keep_begun(listener.board);
                 Ok(())
             }),
-            #[cfg(feature = "tiles")]
-            Drawing::LastJob if let Some(parts) = self.parts_again(listener.board) => {
-                self.plot_stored(Some(parts), &mut listener)
-            }
-            Drawing::LastJob => self.load(listener.board).and_then(|()| {
-                #[cfg(feature = "early-ink")]
-                self.complete_order(&mut listener)?;
-                self.begin(&mut listener)?;
-                self.keep_progress(None, listener.board);
-                Ok(())
-            }),
+            Drawing::LastJob => self.plot_again(&mut listener),
             #[cfg(feature = "resume")]
             Drawing::Stopped { at_origin } => {
                 self.load_stopped(at_origin, listener.board).and_then(|stopped| match stopped {
@@ -107,6 +97,24 @@ impl<I: Index> Inner<'_, I> {
         begun?;
         self.report_degenerate(board);
         self.act(requests);
+        Ok(())
+    }
+
+    /// Begins to draw the job that was kept last once more.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with.
+    #[inline(always)] // Adds no frame to the stack.
+    fn plot_again<B: Board>(&mut self, listener: &mut Listener<'_, B>) -> Result<(), CommandError> {
+        #[cfg(feature = "tiles")]
+        if let Some(parts) = self.parts_again(listener.board) {
+            return self.plot_stored(Some(parts), listener);
+        }
+        self.load(listener.board)?;
+        #[cfg(feature = "early-ink")]
+        self.complete_order(listener)?;
+        self.begin(listener)?;
+        self.keep_progress(None, listener.board);
         Ok(())
     }
 
