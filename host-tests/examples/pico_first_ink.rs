@@ -34,6 +34,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
+/// The number of steps of the jog: a tenth of a millimetre. What moves behind it is the job.
+const JOG_STEPS: u32 = 8;
+
 /// The time for which the drawing is watched.
 const WATCHED: Duration = Duration::from_secs(30);
 
@@ -59,7 +62,7 @@ fn measure(scene: &str, eye: &str) -> Result<[Duration; 2], Box<dyn Error>> {
     let (mut machine, mut begun, mut first_ink) =
         (Machine::default(), None::<Duration>, None::<Duration>);
     let (mut last, mut longest_rest) = (None::<Duration>, Duration::ZERO);
-    let mut told = false;
+    let (mut told, mut steps) = (false, 0);
     while first_ink.zip(last).is_none_or(|(ink, last)| last < ink + WATCHED) {
         line.status()?;
         if let Some((ink, begun)) = first_ink.zip(begun).filter(|_| !told) {
@@ -67,7 +70,6 @@ fn measure(scene: &str, eye: &str) -> Result<[Duration; 2], Box<dyn Error>> {
             let took = ink.saturating_sub(begun);
             eprintln!("{scene}: first ink after {took:.1?}; watching it for 30 s (some minutes)");
         }
-        let mut is_jog = true;
         for change in line.emulator.pin_changes()? {
             let at = change.at;
             if first_ink.is_some() {
@@ -76,14 +78,10 @@ fn measure(scene: &str, eye: &str) -> Result<[Duration; 2], Box<dyn Error>> {
                 last = Some(at);
             }
             match machine.change(change).map(|event| event.kind) {
-                // The jog takes a tenth of a second at most.
-                Some(MachineEventKind::Step { .. })
-                    if is_jog
-                        && begun.is_none_or(|begun| at < begun + Duration::from_millis(300)) =>
-                {
+                Some(MachineEventKind::Step { .. }) if steps < JOG_STEPS => {
+                    steps += 1;
                     begun = Some(at);
                 }
-                Some(MachineEventKind::Step { .. }) => is_jog = false,
                 Some(MachineEventKind::Pen { down: true }) => first_ink = first_ink.or(Some(at)),
                 _ => {}
             }
