@@ -35,14 +35,14 @@ pub(in crate::plotter) struct KeptOptions {
     codes: [u8; 6],
     /// What is on or off: clipping, seams, merged blocks, one pen, and fit.
     switches: [u8; 5],
-    /// The title, in as many lines as a derived layout can have.
-    title: [[u8; TITLE_LINE]; TitleText::LIMIT / TITLE_LINE],
+    /// The title, in pieces of a length of which `bytemuck` knows the layout.
+    title: [[u8; TITLE_PIECE]; TitleText::LIMIT / TITLE_PIECE],
     /// Fills the last word.
     rest: [u8; 5],
 }
 
-/// The length of a line of [`KeptOptions::title`] in bytes.
-const TITLE_LINE: usize = 16;
+/// The length of a piece of [`KeptOptions::title`] in bytes.
+const TITLE_PIECE: usize = 16;
 /// The number of bits of [`KeptOptions::set`] before those of the precision and the effort.
 const DIRECTIONS: usize = 4;
 /// The greatest number that a user can set, in absolute value.
@@ -101,7 +101,7 @@ impl From<&PlotOptions> for KeptOptions {
             set: set.enumerate().map(|(bit, is_set)| u32::from(is_set) << bit).sum(),
             codes: [projection_code, hidden_code, hidden, method as u8, shape as u8, 0],
             switches: [clip_behind, seams, merged_blocks, one_pen, fit].map(u8::from),
-            title: [[0; TITLE_LINE]; TitleText::LIMIT / TITLE_LINE],
+            title: [[0; TITLE_PIECE]; TitleText::LIMIT / TITLE_PIECE],
             rest: [0; 5],
         };
         let text = title.as_str().as_bytes();
@@ -263,7 +263,7 @@ mod tests {
             |kept| kept.lengths[0] = 0,
             |kept| kept.lengths[4] = -1,
             |kept| kept.codes = [4; 6],
-            |kept| kept.title[0] = [0xFF; TITLE_LINE],
+            |kept| kept.title[0] = [0xFF; TITLE_PIECE],
         ];
         for (number, change) in changes.into_iter().enumerate() {
             let mut kept = kept;

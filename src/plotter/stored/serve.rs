@@ -98,8 +98,9 @@ impl<I: Index> Inner<'_, I> {
         let Some(part) = part else {
             return self.nothing_left(kept, listener.board);
         };
+        // What is kept already takes no new room.
         #[cfg(feature = "early-ink")]
-        if kept.is_none_or(|kept| kept.drawn.is_none()) {
+        if kept.is_none() {
             Self::make_room(listener, 2 * PAGE_BYTES as u32)?;
         }
         self.machine.start_streamed(JobSize::default(), bounds)?;
