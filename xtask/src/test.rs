@@ -1,14 +1,15 @@
 //! Runs all checks, those first that fail fastest.
 
 use std::process::Command;
+use std::thread;
 
-use anyhow::Result;
+use anyhow::{Result, anyhow};
 
 use crate::command::{cargo, describe, run};
 use crate::firmware;
 use crate::page;
 use crate::set_up::{self, Toolchain};
-use crate::side_by_side;
+use crate::side_by_side::{self, Programs};
 use crate::table::{BOARDS, BoardRow, LM3S6965, PICO};
 
 /// Installs what is missing, then runs all checks. It stops at the first failure.
@@ -20,11 +21,35 @@ pub fn everything() -> Result<()> {
     set_up::browser()?;
 
     step(workspace("fmt").args(["--all", "--check"]))?;
+    // The last pass of a compiler over an image or over the page keeps one core busy.
+    let (built, tests) = thread::scope(|scope| {
+        let built = scope.spawn(build_images_and_page);
+        let tests = lint_and_build_tests();
+        (built.join().unwrap_or_else(|_| Err(anyhow!("a panic"))), tests)
+    });
+    built?;
+    let mut tests = tests?;
+    let mut doctests = workspace("test");
+    doctests.args(["--workspace", "--doc"]).args(EMULATOR);
+    tests.computing.push(doctests);
+    tests.computing.insert(0, page::tests()?);
+    side_by_side::run(tests)
+}
+
+/// Lints, builds and checks the firmware of each board, then builds the page.
+fn build_images_and_page() -> Result<()> {
     for board in BOARDS {
         lint_firmware(board)?;
         let image = firmware::build(board)?;
         say!("{}", firmware::check(board, &image)?)?;
     }
+    say!("penup: building the page, which takes a minute or more the first time")?;
+    page::build()
+}
+
+/// Lints all that runs on a computer, builds the documentation, then the client and the tests.
+/// Returns a command for each test program, those in the emulators too, but not for the doctests.
+fn lint_and_build_tests() -> Result<Programs> {
     step(
         workspace("clippy")
             .args(["--workspace", "--all-targets"])
@@ -32,26 +57,16 @@ pub fn everything() -> Result<()> {
             .args(["--", "-Dwarnings"]),
     )?;
     step(
-        workspace("check")
+        workspace("clippy")
             .args(["--package", "penup", "--lib", "--no-default-features"])
-            .args(["--target-dir", "target/without-convex"])
-            .env("RUSTFLAGS", "-Dwarnings"),
+            .args(["--", "-Dwarnings"]),
     )?;
     step(
         workspace("doc")
             .args(["--workspace", "--no-deps", "--document-private-items"])
             .env("RUSTDOCFLAGS", "-Dwarnings"),
     )?;
-    // The tests include those in the emulators, and all doctests.
-    let mut tests = side_by_side::built_by(workspace("test").arg("--workspace").args(EMULATOR))?;
-    let mut doctests = workspace("test");
-    doctests.args(["--workspace", "--doc"]).args(EMULATOR);
-    tests.push(doctests);
-    // The tests above have built the client and the images.
-    say!("penup: building the page, which takes a minute or more the first time")?;
-    page::build()?;
-    tests.insert(0, page::tests()?);
-    side_by_side::run(tests)
+    side_by_side::built_by(workspace("test").arg("--workspace").args(EMULATOR))
 }
 
 /// The options that enable the tests that need the emulators and the firmware.
