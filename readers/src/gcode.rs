@@ -72,6 +72,11 @@ struct Interpreter {
     changes: Changes,
     /// For x and y, the line of the `G53` or `G28` after which the position is not known.
     unplaced: [Option<u32>; 2],
+    /// For x and y, whether the pen is at the home of the machine (`G28`).
+    is_at_home: [bool; 2],
+    /// For x and y, where home lies in the drawing, in mm. It is known if the program has set its
+    /// coordinates there before the first move.
+    home: [Option<f64>; 2],
     /// The number of moves along x or y by `G53`, and the line of the first.
     machine_moves: (usize, usize),
     /// The words that were not obeyed, with their count and the first line.
@@ -107,6 +112,8 @@ impl Interpreter {
             extruder: Extruder::default(),
             changes: Changes::default(),
             unplaced: [None; 2],
+            is_at_home: [false; 2],
+            home: [None; 2],
             machine_moves: (0, 0),
             unknown: BTreeMap::new(),
         }
@@ -155,7 +162,7 @@ impl Interpreter {
         };
         let value = |letter| words.iter().find(|(own, _)| *own == letter).map(|(_, value)| *value);
         let (mut moves, mut sets_position, mut goes_on) = (true, false, true);
-        let (mut sets_system, mut goes_home, mut changes_tool) = (false, false, false);
+        let (mut sets_system, mut goes_home, mut changes_tool) = (false, None, false);
         let (mut servo, mut of_machine) = (false, false);
         let (mut is_move, mut is_setting, mut has_place) = (false, false, false);
         for &(letter, value) in &words {
@@ -217,7 +224,7 @@ impl Interpreter {
                     self.systems.choose(chosen(code), self.moves.len() == 0, &by);
                 }
                 ('G', 100) => (moves, sets_system) = (false, true),
-                ('G', 280 | 300) => (moves, goes_home) = (false, true),
+                ('G', 280 | 300) => (moves, goes_home) = (false, Some(code == 280)),
                 // A dwell, a retraction, and the places of the machine.
                 ('G', 40 | 110 | 281 | 301) => moves = false,
                 ('G', 170 | 400 | 430 | 490 | 610 | 640 | 940) => {}
@@ -254,8 +261,8 @@ impl Interpreter {
         if changes_tool {
             self.changes.put_in(&mut self.signals.choice, number);
         }
-        if goes_home {
-            self.go_home(&value, number);
+        if let Some(is_home) = goes_home {
+            self.go_home(is_home, &value, number);
         }
         if sets_system {
             self.set_system(&value, number)?;
@@ -278,20 +285,21 @@ impl Interpreter {
         Ok(goes_on)
     }
 
-    /// Moves to the home of the machine along the axes that a line names, or all. Before the first
-    /// move, that is where the drawing begins.
-    fn go_home(&mut self, value: &impl Fn(char) -> Option<f64>, number: usize) {
-        if self.moves.len() == 0 {
-            return;
-        }
+    /// Moves to the home of the machine (`is_home`) or to its other place (`G30`) along the axes
+    /// that a line names, or all. Before the first move, that is where the drawing begins.
+    fn go_home(&mut self, is_home: bool, value: &impl Fn(char) -> Option<f64>, number: usize) {
         let all = ['X', 'Y', 'Z'].into_iter().all(|letter| value(letter).is_none());
-        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
+        let is_first = self.moves.len() == 0;
+        for (axis, letter) in ['X', 'Y'].into_iter().enumerate() {
             if all || value(letter).is_some() {
-                *unplaced = Some(u32::try_from(number).unwrap_or(u32::MAX));
+                self.is_at_home[axis] = is_home;
+                let line = u32::try_from(number).unwrap_or(u32::MAX);
+                self.unplaced[axis] = (!is_first).then_some(line).or(self.unplaced[axis]);
             }
         }
         // In a program without heights, no other one would follow.
-        self.signals.is_parked |= value('Z').is_some() && self.signals.height.is_some();
+        let has_height = !is_first && self.signals.height.is_some();
+        self.signals.is_parked |= value('Z').is_some() && has_height;
     }
 
     /// Moves to coordinates of the machine, which are no place of the drawing.
@@ -305,9 +313,10 @@ impl Interpreter {
         }
         self.signals.is_parked |= value('Z').is_some();
         let mut moves = false;
-        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
+        for (axis, letter) in ['X', 'Y'].into_iter().enumerate() {
             if value(letter).is_some() {
-                *unplaced = Some(u32::try_from(number).unwrap_or(u32::MAX));
+                self.unplaced[axis] = Some(u32::try_from(number).unwrap_or(u32::MAX));
+                self.is_at_home[axis] = false;
                 moves = true;
             }
         }
@@ -358,9 +367,12 @@ impl Interpreter {
             return Ok(());
         }
         self.signals.unplaced = self.unplaced[0].or(self.unplaced[1]);
-        for (unplaced, letter) in self.unplaced.iter_mut().zip(['X', 'Y']) {
-            if value(letter).is_some() && !is_relative {
-                *unplaced = None;
+        for (axis, letter) in ['X', 'Y'].into_iter().enumerate() {
+            if value(letter).is_some() {
+                self.is_at_home[axis] = false;
+                if !is_relative {
+                    self.unplaced[axis] = None;
+                }
             }
         }
         let mut points = Vec::new();

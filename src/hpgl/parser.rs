@@ -47,7 +47,8 @@ impl<B: PolygonBuffer> Interpreter<B> {
             Mode::Skipped | Mode::Comment => {}
             Mode::Terminator => {
                 self.text.terminator = dialect::terminator(byte);
-                self.mode = Mode::Code;
+                // A number may follow.
+                (self.mode, self.name) = (Mode::Code, *b"DT");
             }
             Mode::Symbol => {
                 self.text.symbol = if matches!(byte, b'!'..=b':' | b'<'..=b'~') { byte } else { 0 };
@@ -385,6 +386,12 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 }
             }
             b"SA" | b"SS" => at_most(0)?,
+            // The terminator is not drawn, which is what the mode 1 asks for.
+            b"DT" => match *numbers {
+                [] | [UNIT] => {}
+                [_] => return Err(bad),
+                _ => return Err(ErrorNumber::WrongCount),
+            },
             [b'O', letter] => {
                 at_most(0)?;
                 if !self.query(*letter) {

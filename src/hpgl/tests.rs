@@ -140,6 +140,9 @@ fn answers() {
         ("OI;", "'7475A'"),
         ("OS;OS;", "'24' '16'"),
         ("XX;OS;OE;OS;", "'56' '1' '16'"),
+        // Whether the terminator is drawn, which it is not, is a number after it.
+        ("DT#,1;LB#DT\x03;OE;", "'0'"),
+        ("DT#,0;OE;DT#,1,1;OE;", "'3' '2'"),
         ("OP;", "'603,521,10603,7721'"),
         ("IP1,2,3,4;OS;OP;OS;", "'26' '1,2,3,4' '16'"),
         ("OH;", "'0,0,16000,12000'"),

@@ -226,14 +226,23 @@ impl Interpreter {
         // Before the first move, this is where the drawing begins.
         let is_known = |axis: usize| self.unplaced[axis].is_none() || self.moves.len() == 0;
         let at = self.moves.at();
-        [given, [0, 1].map(|axis| is_known(axis).then_some(at[axis]))]
+        let place = |axis: usize| match is_known(axis) {
+            true => Some(at[axis]),
+            false => self.home[axis].filter(|_| self.is_at_home[axis]),
+        };
+        [given, [0, 1].map(place)]
     }
 
     /// Begins the drawing here along the axes of which a coordinate is given.
     fn place_begin(&mut self, given: [Option<f64>; 2]) {
-        for (unplaced, given) in self.unplaced.iter_mut().zip(given) {
-            if given.is_some() && self.moves.len() == 0 {
-                *unplaced = None;
+        if self.moves.len() != 0 {
+            return;
+        }
+        let at = self.moves.at();
+        for axis in 0..given.len() {
+            if given[axis].is_some() {
+                self.unplaced[axis] = None;
+                self.home[axis] = self.is_at_home[axis].then_some(at[axis]);
             }
         }
     }

@@ -443,6 +443,37 @@ fn home_is_a_place_of_the_machine_after_the_first_move() {
     assert_eq!(strokes(lifted), [first, vec![[30.0, 10.0], [40.0, 10.0]]]);
 }
 
+/// Two drawings that were joined, each of which begins at home.
+#[test]
+fn home_is_known_again_where_coordinates_were_set_there() {
+    let drawing = [[10.0, 10.0], [20.0, 10.0]];
+    let part = "G28\nG92 X0 Y0\nG0 X10 Y10\nG1 X20\n";
+    let shifted = "G28\nG92 X-30 Y5\nG0 X-20 Y15\nG1 X-10\n";
+    let along_x = "G28 X\nG92 X0\nG0 X10\nG1 X20\n";
+    let by_g10 = "G28\nG10 L20 P0 X0 Y0\nG0 X10 Y10\nG1 X20\n";
+    for again in [part, shifted, along_x, by_g10] {
+        assert_eq!(strokes(&format!("{part}{again}")), [drawing, drawing], "{again}");
+        assert_eq!(strokes(&format!("{by_g10}{again}")), [drawing, drawing], "{again}");
+    }
+    // The pen draws from nowhere but a place that a move has reached.
+    let error = sent("a.nc", format!("{part}G28\nG92 X0 Y0\nG1 X5\n").as_bytes());
+    let error = error.expect_err("refused").to_string();
+    assert!(error.contains("would draw from a place of the machine"), "{error}");
+    // It is not known where coordinates were set elsewhere, or the second time.
+    for (begin, again) in [
+        ("G28\nG0 X10 Y10\nG1 X20\n", part),
+        ("G92 X0 Y0\nG0 X10 Y10\nG1 X20\n", part),
+        ("G30\nG92 X0 Y0\nG0 X10 Y10\nG1 X20\n", part),
+        ("G28\nG53 G0 X5 Y5\nG92 X0 Y0\nG0 X10 Y10\nG1 X20\n", part),
+        (part, "G30\nG92 X0 Y0\nG0 X10 Y10\nG1 X20\n"),
+        (part, "G28\nG53 G0 X5 Y5\nG92 X0 Y0\nG0 X10 Y10\nG1 X20\n"),
+        (part, "G28\nG91\nG0 X5 Y5\nG90\nG92 X0 Y0\nG0 X10 Y10\nG1 X20\n"),
+    ] {
+        let error = sent("a.nc", format!("{begin}{again}").as_bytes()).expect_err("refused");
+        assert!(error.to_string().contains("G92 in line "), "{begin}{again}{error}");
+    }
+}
+
 #[test]
 fn a_distance_from_a_height_of_the_machine_is_no_height() {
     let begin = "G0 Z5\nG0 X10 Y10\nG1 Z-1\nG1 X20\n";
