@@ -120,7 +120,11 @@ pub enum Reply {
 
 /// How many strokes of all are drawn, in words; `all` is 0 if that is not known.
 pub fn strokes_drawn(done: u64, all: u64) -> String {
-    if all == 0 { format!("{done} strokes") } else { format!("{done} of {all} strokes") }
+    let noun = |count: u64| if count == 1 { "stroke" } else { "strokes" };
+    match all {
+        0 => format!("{done} {}", noun(done)),
+        _ => format!("{done} of {all} {}", noun(all)),
+    }
 }
 
 /// A status report, `<State|Key:value|...>`.
@@ -364,6 +368,7 @@ mod tests {
         let stopped = status("<Idle|MPos:0,0,0|Stopped:4/9|Strokes:0/0>");
         assert_eq!((stopped.stopped, run.stopped), (Some((4, 9)), None));
         assert_eq!([strokes_drawn(4, 9), strokes_drawn(4, 0)], ["4 of 9 strokes", "4 strokes"]);
+        assert_eq!([strokes_drawn(0, 1), strokes_drawn(1, 0)], ["0 of 1 stroke", "1 stroke"]);
         let computing = status("<Run|MPos:0,0,0|Stage:order>");
         assert_eq!(
             (computing.stage.as_deref(), computing.ink, computing.percent),

@@ -839,10 +839,17 @@ test("speeds, heights and a square by hand, and a job that has stopped", async (
   // The next status of the emulated one takes its place, so what is shown is read at once.
   const said = await page.evaluate(() => {
     const { plotting } = window.penup;
-    plotting.follow({ state: "Idle", position: [], percent: 100, stopped: [4, 9] });
-    return document.querySelector("#stopped p").textContent;
+    const status = { state: "Idle", position: [], percent: 100 };
+    return [[4, 9], [119, 0], [1, 0]].map((stopped) => {
+      plotting.follow({ ...status, stopped: null });
+      plotting.follow({ ...status, stopped });
+      return document.querySelector("#stopped p").textContent;
+    });
   });
-  assert.match(said, /4 of 9 strokes/);
+  assert.match(said[0], /after 4 of 9 strokes\./);
+  // It is not known how many strokes a drawing has that is computed part by part.
+  assert.match(said[1], /after 119 strokes\./);
+  assert.match(said[2], /after 1 stroke\./);
   assert.deepEqual(problems, []);
 });
 

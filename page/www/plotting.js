@@ -350,7 +350,8 @@ export class Plotting {
     if (!stopped) return;
     const [done, all] = stopped;
     // How many there are is not known of a drawing that is computed part by part.
-    const strokes = all === 0 ? `${done} strokes` : `${done} of ${all} strokes`;
+    const count = all === 0 ? `${done}` : `${done} of ${all}`;
+    const strokes = `${count} ${(all || done) === 1 ? "stroke" : "strokes"}`;
     $("stopped").querySelector("p").textContent =
       `A job has stopped after ${strokes}. It can go on once the machine is ` +
       "homed (By hand: Home), or the pen was put at the origin by hand.";
