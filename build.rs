@@ -3,7 +3,8 @@
 //! The arguments stand here and not in `.cargo/config.toml`, where a `RUSTFLAGS` in the environment
 //! would replace them and the image would link empty.
 
-use std::path::PathBuf;
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
+use std::path::{Path, PathBuf};
 use std::{env, fs, io};
 
 #[path = "src/board_table.rs"]
@@ -21,6 +22,8 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=memory.x");
     println!("cargo::rerun-if-changed=boards");
     println!("cargo::rerun-if-changed=src/board_table.rs");
+    println!("cargo::rerun-if-changed=src");
+    println!("cargo::rustc-env=PENUP_SOURCES={:08x}", sources(Path::new("src"))?);
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return Ok(());
     }
@@ -51,4 +54,22 @@ fn main() -> io::Result<()> {
         }
     }
     Ok(())
+}
+
+/// Returns a number that differs between sources, of which this folder is the root: a firmware that
+/// computes a drawing again asks whether it computes the same strokes.
+fn sources(folder: &Path) -> io::Result<u32> {
+    let mut digest = DefaultHasher::new();
+    let entries: io::Result<Vec<_>> = fs::read_dir(folder)?.collect();
+    let mut paths: Vec<PathBuf> = entries?.into_iter().map(|entry| entry.path()).collect();
+    paths.sort();
+    for path in paths {
+        path.hash(&mut digest);
+        if path.is_dir() {
+            sources(&path)?.hash(&mut digest);
+        } else {
+            fs::read(&path)?.hash(&mut digest);
+        }
+    }
+    Ok(digest.finish() as u32)
 }

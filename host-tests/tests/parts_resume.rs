@@ -292,18 +292,83 @@ fn what_has_changed_is_refused_and_the_drawing_stays_kept() {
     assert_one_drawing(&whole, &[begun, rest]);
 
     let mut board = Off::new();
-    board.on(|plotter| {
+    let begun = board.on(|plotter| {
         plotter.order(&lines);
         plotter.run(milliseconds / 2);
     });
     let nothing = board.on(|plotter| {
         assert!(plotter.say("$clear").ends_with("ok\n"));
         assert!(plotter.say("$resume=origin").ends_with("error:167\n"));
-        assert!(plotter.say("$again").ends_with("error:161\n"));
+        assert!(plotter.say("$again").ends_with("error:167\n"));
         let other = job_lines("notched.obj", &[]);
         plotter.order(&other[..other.len() - 1]);
         assert!(plotter.say("$resume=origin").ends_with("error:167\n"));
         assert!(plotter.status().contains("|Stopped:"), "{}", plotter.status());
+        assert!(plotter.say("$clear").ends_with("ok\n"));
     });
     assert_eq!(nothing, Run::new());
+    // The same model, sent again, is that of the drawing.
+    let rest = board.on(|plotter| {
+        plotter.order(&lines[..lines.len() - 1]);
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.ends_with("ok\n"), "{answer}");
+        finish(plotter);
+    });
+    assert_one_drawing(&whole, &[begun, rest]);
+}
+
+#[test]
+fn a_refusal_leaves_the_options_as_they_are() {
+    let lines = lattice(&[]);
+    let (_, milliseconds) = undisturbed(&lines);
+    let mut board = Off::new();
+    board.on(|plotter| {
+        plotter.order(&lines);
+        plotter.run(milliseconds / 2);
+    });
+    board.on(|plotter| {
+        assert!(plotter.heard().contains("stopped"));
+        let mut refuses = |refused: &str, because: &str| {
+            let before = plotter.say("$options");
+            let answer = plotter.say(refused);
+            assert!(answer.contains(because), "{refused}: {answer}");
+            assert_eq!(plotter.say("$options"), before, "{refused}");
+        };
+        // The machine is too small for the drawing.
+        refuses("$130=30", "ok\n");
+        refuses("$resume=origin", "error:");
+        refuses("$again", "error:");
+        refuses("$130=420", "ok\n");
+        // It only checks, so that the pen is nowhere.
+        refuses("$C", "ok\n");
+        refuses("$resume=origin", "error:");
+        refuses("$again", "ok\n");
+    });
+}
+
+/// The power goes while a drawing in parts begins to be drawn once more: what it is computed from
+/// stays kept.
+#[test]
+fn a_drawing_is_drawn_again_wherever_its_beginning_was_cut() {
+    let lines = lattice(&[]);
+    let mut board = Off::new();
+    let whole = board.on(|plotter| {
+        plotter.order(&lines);
+        finish(plotter);
+    });
+    for budget in [0, 1, 100, 300, 1000, 3000, 4095, 4096, 4097, 4200, 4351, 4352, 4353, 4400] {
+        let begun = board.on(|plotter| {
+            plotter.board.flash().expect("flash").budget = budget;
+            plotter.send("$again\n");
+            finish(plotter);
+            assert!(plotter.is_cut(), "{budget}");
+        });
+        assert!(begun.len() < whole.len(), "{budget}");
+    }
+    let again = board.on(|plotter| {
+        let answer = plotter.say("$again");
+        assert!(answer.ends_with("ok\n"), "{answer}");
+        finish(plotter);
+    });
+    assert_eq!(ink(&again), ink(&whole));
 }

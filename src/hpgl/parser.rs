@@ -31,8 +31,8 @@ pub(super) enum Mode {
 const WITHOUT_EFFECT: &[[u8; 2]] = &[
     *b"AC", *b"AD", *b"AF", *b"AH", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CT", *b"CV", *b"DC",
     *b"DP", *b"EC", *b"FI", *b"FN", *b"FR", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY",
-    *b"LA", *b"LO", *b"MC", *b"NP", *b"NR", *b"PB", *b"PC", *b"PG", *b"PS", *b"PW", *b"QL",
-    *b"RF", *b"RP", *b"SB", *b"SD", *b"SG", *b"SV", *b"TD", *b"TR", *b"UL", *b"WU",
+    *b"LA", *b"MC", *b"NP", *b"NR", *b"PB", *b"PC", *b"PG", *b"PS", *b"PW", *b"QL", *b"RF", *b"RP",
+    *b"SB", *b"SG", *b"SV", *b"TD", *b"TR", *b"UL", *b"WU",
 ];
 
 impl<B: PolygonBuffer> Interpreter<B> {
@@ -386,6 +386,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 }
             }
             b"SA" | b"SS" => at_most(0)?,
+            // Labels begin where the pen is. Others would have to be known whole before they begin.
+            b"LO" => match *numbers {
+                [] | [UNIT] => {}
+                _ => return Err(ErrorNumber::Unknown),
+            },
             // The terminator is not drawn, which is what the mode 1 asks for.
             b"DT" => match *numbers {
                 [] | [UNIT] => {}

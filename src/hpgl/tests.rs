@@ -140,6 +140,8 @@ fn answers() {
         ("OI;", "'7475A'"),
         ("OS;OS;", "'24' '16'"),
         ("XX;OS;OE;OS;", "'56' '1' '16'"),
+        // Labels that do not begin at the pen, and the size of letters in HP-GL/2.
+        ("LO;LO1;OE;LO5;OE;SD1,21,4,5;OE;", "'0' '1' '1'"),
         // Whether the terminator is drawn, which it is not, is a number after it.
         ("DT#,1;LB#DT\x03;OE;", "'0'"),
         ("DT#,0;OE;DT#,1,1;OE;", "'3' '2'"),

@@ -86,8 +86,7 @@ impl Machine<'_> {
         // The motion planner does not count strokes that are shorter than a motor step, so the end
         // of the path counts.
         let is_end = open.is_whole && self.is_stopped();
-        let strokes =
-            if is_end { self.progress.size().strokes } else { over.wrapping_sub(open.begin) };
+        let strokes = if is_end { self.progress.size().strokes } else { drawn(over, open.begin) };
         (is_end || (is_raised && over != open.noted)).then_some(strokes)
     }
 
@@ -180,5 +179,28 @@ impl Machine<'_> {
     /// Whether targets may be read: always.
     pub(super) const fn reads_on(&self) -> bool {
         true
+    }
+}
+
+/// Returns how many strokes of the job are drawn if the motion planner has counted `over` strokes,
+/// and `begin` before the job. Of a stroke that has been interrupted, the planner may not have
+/// counted the piece before that, because it is shorter than a motor step; then `over` is less.
+#[cfg(feature = "resume")]
+const fn drawn(over: u32, begin: u32) -> u32 {
+    let strokes = over.wrapping_sub(begin);
+    if strokes > i32::MAX.cast_unsigned() { 0 } else { strokes }
+}
+
+#[cfg(all(test, feature = "resume"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_more_strokes_are_noted_than_are_drawn() {
+        for (over, begin, strokes) in
+            [(5, 5, 0), (7, 5, 2), (5, 6, 0), (2, u32::MAX, 3), (u32::MAX, 0, 0), (0, 3, 0)]
+        {
+            assert_eq!(drawn(over, begin), strokes, "{over} after {begin}");
+        }
     }
 }

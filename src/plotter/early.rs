@@ -16,7 +16,7 @@
 
 use super::job::{Begun, OrderStep, Pipeline, Unordered};
 use super::listener::{Listener, MeasuredStrokes};
-use super::{Board, Cursor, Inner, Job, Observer, Reply, Unobserved, records, report};
+use super::{Board, Cursor, Inner, Job, Observer, Unobserved, records, report};
 use crate::drawing::PagePoint;
 use crate::index::Index;
 use crate::machine::{JobSize, Machine, Measured, State, TargetList};
@@ -446,8 +446,7 @@ impl<I: Index> Inner<'_, I> {
         self.cursor = Cursor::default();
         let kept = records::add_order(&self.job, strokes, self.words, listener.board);
         if kept.is_err() {
-            Reply(listener.board)
-                .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
+            records::say_not_kept(listener.board);
         }
         Ok(())
     }

@@ -5,7 +5,6 @@
 use super::Unobserved;
 use super::job::Pipeline;
 use super::listener::{Listener, MeasuredStrokes};
-use super::reply::Reply;
 #[cfg(feature = "resume")]
 use super::resume::StoppedJob;
 use super::{Board, Cursor, Inner, Job, Observer, records};
@@ -85,7 +84,7 @@ impl<I: Index> Inner<'_, I> {
                     }
                     StoppedJob::Sent => Ok(()),
                     #[cfg(feature = "tiles")]
-                    StoppedJob::InParts(parts) => self.plot_stored(Some(parts), &mut listener),
+                    StoppedJob::InParts(parts) => self.plot_kept(parts, &mut listener),
                 })
             }
         };
@@ -107,8 +106,8 @@ impl<I: Index> Inner<'_, I> {
     #[inline(always)] // Adds no frame to the stack.
     fn plot_again<B: Board>(&mut self, listener: &mut Listener<'_, B>) -> Result<(), CommandError> {
         #[cfg(feature = "tiles")]
-        if let Some(parts) = self.parts_again(listener.board) {
-            return self.plot_stored(Some(parts), listener);
+        if let Some(parts) = self.kept_parts(listener.board)? {
+            return self.plot_kept(parts, listener);
         }
         self.load(listener.board)?;
         #[cfg(feature = "early-ink")]
@@ -214,8 +213,7 @@ impl<I: Index> Inner<'_, I> {
     pub(super) fn save<B: Board>(&self, board: &mut B) -> bool {
         let saved = records::save_job(&self.job, self.machine.settings(), self.words, board);
         if saved.is_err() {
-            Reply(board)
-                .line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
+            records::say_not_kept(board);
         }
         saved.is_ok()
     }

@@ -7,6 +7,8 @@ use super::job::{UNORDERED_WORDS, Unordered};
 #[cfg(feature = "tiles")]
 use super::options::{KeptOptions, PlotOptions};
 use super::program::{Parameters, SYSTEMS, TEXT_LIMIT, Text};
+#[cfg(feature = "tiles")]
+use super::resume::KeptParts;
 use super::{Board, Job, NotStored, Record, Reply, Stored};
 use crate::array::MapEach;
 use crate::fixed::Length;
@@ -212,50 +214,73 @@ pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotS
 
 /// A mark in place of [`JOB_LAYOUT`] for a drawing that is computed and drawn part by part. What it
 /// is computed from is kept besides the model: the speed, the acceleration and the work of a second
-/// by which the order is chosen, and the options.
+/// by which the order is chosen, the checksums of the model and of the firmware's sources, and the
+/// options.
 #[cfg(feature = "tiles")]
-const PARTS_LAYOUT: u32 = u32::from_le_bytes(*b"jobp");
+const PARTS_LAYOUT: u32 = u32::from_le_bytes(*b"jobq");
+/// A number that differs between builds from other sources, which may compute other strokes.
+#[cfg(feature = "tiles")]
+pub(super) const SOURCES: u32 = match u32::from_str_radix(env!("PENUP_SOURCES"), 16) {
+    Ok(sources) => sources,
+    Err(_) => 0,
+};
 
-/// Keeps, in place of the last job, what a drawing in parts is computed from.
-///
-/// # Errors
-/// [`NotStored`]: the previous job is still kept.
+/// Tells the user that the job that begins is not kept.
+#[inline(never)] // It is called in several places.
+pub(super) fn say_not_kept<B: Board>(board: &mut B) {
+    Reply(board).line(format_args!("[MSG:$again will not draw this: the flash is worn out]"));
+}
+
+/// Keeps what a drawing in parts of the model with this checksum is computed from, as the last job.
+/// Returns whether it is kept. If it is not, `$again` does not draw it, which is said.
 #[cfg(feature = "tiles")]
 #[inline(never)] // Keeps its frame off the stack while the stages run.
 pub(super) fn save_parts<B: Board>(
     options: &PlotOptions,
     time_model: TimeModel,
+    model: u32,
     board: &mut B,
-) -> Result<(), NotStored> {
+) -> bool {
     let TimeModel { speed, acceleration, units_per_second } = time_model;
-    let head = [PARTS_LAYOUT, speed, acceleration, units_per_second].map(u32::to_le_bytes);
+    let head = [PARTS_LAYOUT, speed, acceleration, units_per_second, model, SOURCES];
+    let head = head.map(u32::to_le_bytes);
     let options = KeptOptions::from(options);
-    board.save(Record::Job, &[head.as_flattened(), bytemuck::bytes_of(&options)])
+    let kept = board.save(Record::Job, &[head.as_flattened(), bytemuck::bytes_of(&options)]);
+    if kept.is_err() {
+        say_not_kept(board);
+    }
+    kept.is_ok()
 }
 
-/// Loads what the drawing in parts that was kept last is computed from: sets the options, and
-/// returns by what its order is chosen. `None` if the last job is another one; the options then
-/// stay as they are.
+/// Returns what the last job is computed from, if it is a drawing in parts; `None` if it is
+/// another one. Sets the `options`, if they are given, to its own.
 #[cfg(feature = "tiles")]
 #[inline(never)] // Keeps its frame off the stack while the stages run.
-pub(super) fn load_parts<B: Board>(options: &mut PlotOptions, board: &mut B) -> Option<TimeModel> {
+pub(super) fn load_parts<B: Board>(
+    mut options: Option<&mut PlotOptions>,
+    board: &mut B,
+) -> Option<KeptParts> {
     let mut found = None;
     board.load(Record::Job, &mut |record| {
-        let (mut head, mut kept) = ([[0; 4]; 4], KeptOptions::zeroed());
+        let (mut head, mut kept) = ([[0; 4]; 6], KeptOptions::zeroed());
         if record.read(head.as_flattened_mut()) != size_of_val(&head)
             || record.read(bytemuck::bytes_of_mut(&mut kept)) != size_of_val(&kept)
         {
             return;
         }
-        let [layout, speed, acceleration, units_per_second] = head.map(u32::from_le_bytes);
+        let [layout, speed, acceleration, units_per_second, model, sources] =
+            head.map(u32::from_le_bytes);
         // No machine is faster, and no board counts more work as a second.
         let is_known = layout == PARTS_LAYOUT
             && speed < 1 << 22
             && acceleration < 1 << 27
             && units_per_second <= TimeModel::BOARD;
         if let Some(kept) = kept.options().filter(|_| is_known) {
-            *options = kept;
-            found = Some(TimeModel { speed, acceleration, units_per_second });
+            if let Some(options) = options.as_deref_mut() {
+                *options = kept;
+            }
+            let time_model = TimeModel { speed, acceleration, units_per_second };
+            found = Some(KeptParts { time_model, model, sources, drawn: None });
         }
     });
     found

@@ -113,7 +113,8 @@ impl Sender<'_> {
         self.deliver(&lines, &mut Quiet)?;
         let base = self.done - 1;
         self.follow_drawing(Some(&lines), progress)?;
-        self.confirm(&lines, base)
+        self.confirm(&lines, base)?;
+        self.fail_if_stopped().map(drop)
     }
 
     /// Follows the job that the plotter draws until the machine is idle, whoever has sent it.
@@ -124,10 +125,24 @@ impl Sender<'_> {
     /// silent.
     pub fn watch(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
         let status = self.follow_drawing(None, progress)?;
-        let is_done = status.strokes.is_some_and(|(done, all)| done == all && all > 0);
+        if status.stopped.is_some() {
+            return self.fail_if_stopped();
+        }
+        Ok(status)
+    }
+
+    /// Returns the status, in which no job has stopped that could go on. The plotter notes the last
+    /// stroke a moment after the machine is at rest, so it is asked again.
+    fn fail_if_stopped(&mut self) -> Result<Status, Error> {
+        let mut status = self.status()?;
+        for _ in 0..2 {
+            if status.stopped.is_some() {
+                status = self.status()?;
+            }
+        }
         match status.stopped {
-            Some((done, all)) if !is_done => Err(Error::JobStopped { done, all }),
-            _ => Ok(status),
+            Some((done, all)) => Err(Error::JobStopped { done, all }),
+            None => Ok(status),
         }
     }
 

@@ -3,9 +3,10 @@
 //! In this order: the angle of a servo (`M280`, `M300`, `M340`); the height Z; the power S, where
 //! the spindle is on from the first move that draws to the last; the spindle or laser (`M3`, `M4`,
 //! `M5`), which with the power 0 does not draw, nor before the first power if the program says one;
-//! or, if none of these changes between moves, G1 to G3 draw and G0 does not. A laser that stays on
-//! over G0 does not burn there. But if any move extrudes, as on a 3D printer, those that do draw,
-//! and no others.
+//! or, if none of these changes between moves, G1 to G3 draw and G0 does not. A height that only
+//! sets the focus of a laser is down during G0 with the laser off: then the laser must be on, too,
+//! for a move to draw. A laser that stays on over G0 does not burn there. But if any move extrudes,
+//! as on a 3D printer, those that do draw, and no others.
 //!
 //! A signal has levels at which the pen is up and others at which it is down. They are divided
 //! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may
@@ -37,7 +38,7 @@ pub(super) fn inked(moves: &Moves, has_absolute_heights: bool) -> Vec<bool> {
         return moves.iter().map(|it| it.signals.extrudes).collect();
     }
     let draws = servo()
-        .or_else(|| if drifts { growth() } else { height() })
+        .or_else(|| if drifts { growth() } else { height() }.map(|draws| while_on(moves, draws)))
         .or_else(|| by_power(moves))
         .or_else(|| by_spindle(moves))
         .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect());
@@ -67,6 +68,23 @@ fn is_on(it: &Move) -> bool {
     it.signals.spindle == Some(true) && it.signals.power != Some(0.0)
 }
 
+/// Of moves that `draws` says to draw, those with the spindle on, if it is off during some of those
+/// by G0 and on during some by G1 to G3. Otherwise all of them.
+fn while_on(moves: &Moves, mut draws: Vec<bool>) -> Vec<bool> {
+    let has = |is_rapid: bool, on: bool| {
+        let mut drawn = moves.iter().zip(&draws).filter(|(it, draws)| {
+            **draws && it.is_rapid == is_rapid && it.signals.spindle.is_some()
+        });
+        drawn.any(|(it, _)| is_on(&it) == on && it.length() > SAME)
+    };
+    if has(true, false) && has(false, true) {
+        for (draws, it) in draws.iter_mut().zip(moves.iter()) {
+            *draws &= is_on(&it);
+        }
+    }
+    draws
+}
+
 /// Of a program with G1 to G3 while the spindle is on, G0 does not draw: it is a laser, or a pen
 /// that is up then anyway.
 fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
@@ -83,15 +101,18 @@ fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
 fn by_power(moves: &Moves) -> Option<Vec<bool>> {
     let first = moves.iter().position(|it| is_on(&it))?;
     let last = moves.iter().rposition(|it| is_on(&it))?;
-    let mut between = moves.iter().take(last + 1).skip(first);
+    let between = moves.iter().take(last + 1).skip(first);
     if !between.clone().all(|it| is_on(&it)) {
         return None;
     }
     let power = |signals: &Signals| signals.power.filter(|_| signals.spindle == Some(true));
     let draws = by_level(moves, power, None)?;
-    // A laser does not burn during G0, whatever its power.
+    // During G0 a laser does not burn, and during G1 to G3 it does, whatever its power. A pen is up
+    // during the one and down during the others, unless it travels by G1 alone.
+    let travels = between.clone().any(|it| it.is_rapid);
+    let mut divided = between.zip(draws.get(first..=last)?);
     let is_laser =
-        between.by_ref().zip(draws.get(first..=last)?).any(|(it, draws)| it.is_rapid && *draws);
+        travels && divided.any(|(it, draws)| it.is_rapid == *draws && it.length() > SAME);
     (!is_laser).then_some(draws)
 }
 

@@ -443,6 +443,35 @@ fn home_is_a_place_of_the_machine_after_the_first_move() {
     assert_eq!(strokes(lifted), [first, vec![[30.0, 10.0], [40.0, 10.0]]]);
 }
 
+/// The lines are engraved with little power, and the outline is cut with more.
+#[test]
+fn a_laser_with_two_powers_draws_with_both() {
+    for on in ["M4", "M3", "M3 S0"] {
+        let program =
+            format!("G21 G90\n{on}\nG0 X10 Y10\nG1 X30 S200 F1000\nG0 X40 Y10\nG1 X60 S500\nM5\n");
+        let [first, second] = [[[10.0, 10.0], [30.0, 10.0]], [[40.0, 10.0], [60.0, 10.0]]];
+        assert_eq!(strokes(&program), [first, second], "{program}");
+    }
+}
+
+/// Z sets the focus of a laser, or a height for the way, and the laser or the servo draws.
+#[test]
+fn a_height_does_not_draw_while_the_laser_is_off() {
+    for (on, off) in [("M3 S500", "M5"), ("M3", "M5"), ("S500", "S0")] {
+        let program = format!(
+            "G21 G90\nM3 {off}\nG0 Z10\nG0 X0 Y0\nG0 Z0\nG0 X10 Y10\n{on}\nG1 X20 F600\n{off}\n\
+             G0 X40\n{on}\nG1 X50\n{off}\nG0 Z10\nG0 X0 Y0\nM30\n"
+        );
+        let program = program.replace("M3 M5", "M5");
+        let [first, second] = [[[10.0, 10.0], [20.0, 10.0]], [[40.0, 10.0], [50.0, 10.0]]];
+        assert_eq!(strokes(&program), [first, second], "{program}");
+    }
+    // A mill whose spindle stands still while the tool is changed, and that travels by G1.
+    let mill = "G0 Z5\nM3 S9000\nG1 X10 Y10\nG1 Z-1\nG1 X20\nG1 Z5\nM5\nM6 T2\nM3\nG1 X40\n\
+                G1 Z-1\nG1 X50\nG0 Z5\nM5\nG0 X0 Y0\n";
+    assert_eq!(strokes(mill).len(), 2);
+}
+
 /// Two drawings that were joined, each of which begins at home.
 #[test]
 fn home_is_known_again_where_coordinates_were_set_there() {

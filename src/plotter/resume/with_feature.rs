@@ -10,6 +10,8 @@ use crate::order::TimeModel;
 use crate::plotter::Layout;
 #[cfg(feature = "early-ink")]
 use crate::plotter::NotStored;
+#[cfg(feature = "tiles")]
+use crate::plotter::listener::Listener;
 use crate::plotter::listener::MeasuredStrokes;
 use crate::plotter::{Board, Inner, Reply, records};
 use crate::protocol::CommandError;
@@ -64,7 +66,7 @@ const MOST_AT_ONCE: u32 = 1 << 12;
 /// Number of words before the settings: layout, version, strokes, whether the model is known,
 /// and the checksums of model and options. For a job that is sent the last three are how many
 /// strokes are noted at once, the number by which its sender knows it, and 0. For a drawing in
-/// parts they are 0, the checksum of the model, and 0.
+/// parts, whose record has all that, they are 0.
 const HEAD: usize = 6;
 /// Size of the notes in words: each setting takes two.
 const WORDS: usize = HEAD + 2 * PLACING.len();
@@ -126,6 +128,10 @@ pub(in crate::plotter) enum StoppedJob {
 pub(in crate::plotter) struct KeptParts {
     /// By what the order of each part is chosen.
     pub time_model: TimeModel,
+    /// The checksum of the model.
+    pub model: u32,
+    /// The checksum of the sources of the firmware that began it.
+    pub sources: u32,
     /// The number of strokes that are drawn; `None` to begin anew.
     pub drawn: Option<u32>,
 }
@@ -315,12 +321,17 @@ impl<I: Index> Inner<'_, I> {
         }
         #[cfg(feature = "tiles")]
         if is_in_parts(&notes) {
-            let parts = self.load_parts(word(&notes, 4), Some(done(&notes, noted)), board)?;
+            let kept = self.kept_parts(board)?.ok_or(CommandError::NoJobKept)?;
+            // Another build may compute other strokes, or divide them otherwise.
+            if kept.sources != records::SOURCES {
+                return Err(CommandError::OtherVersion);
+            }
             if at_origin {
                 self.machine.declare_origin()?;
             }
             self.resumption.is_lost = false;
-            return Ok(StoppedJob::InParts(parts));
+            let drawn = Some(done(&notes, noted));
+            return Ok(StoppedJob::InParts(KeptParts { drawn, ..kept }));
         }
         self.copy_words = 0;
         self.job = Default::default();
@@ -334,34 +345,44 @@ impl<I: Index> Inner<'_, I> {
         Ok(StoppedJob::Loaded(noted))
     }
 
-    /// Loads what a drawing in parts of the model with this checksum is computed from, of which so
-    /// many strokes are drawn. Its options are in force then.
+    /// Returns what the last job is computed from if it is a drawing in parts, to draw it anew;
+    /// otherwise `None`. A model that is still coming is completed.
     ///
     /// # Errors
-    /// [`CommandError::OtherModel`] if the flash holds another model or none, or
-    /// [`CommandError::NoJobKept`].
+    /// [`CommandError::OtherModel`] if the flash holds another model or none, or the reason why
+    /// the model in flash cannot be used.
     #[cfg(feature = "tiles")]
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn load_parts<B: Board>(
+    pub(in crate::plotter) fn kept_parts<B: Board>(
         &mut self,
-        model: u32,
-        drawn: Option<u32>,
         board: &mut B,
-    ) -> Result<KeptParts, CommandError> {
-        if self.stored_checksum(board) != Some(model) {
+    ) -> Result<Option<KeptParts>, CommandError> {
+        let Some(kept) = records::load_parts(None, board) else { return Ok(None) };
+        if !self.is_in_flash() || self.whole_model(board)?.checksum() != kept.model {
             return Err(CommandError::OtherModel);
         }
-        let time_model = records::load_parts(&mut self.options, board);
-        Ok(KeptParts { time_model: time_model.ok_or(CommandError::NoJobKept)?, drawn })
+        Ok(Some(kept))
     }
 
-    /// If the last job is a drawing in parts of the model in flash, what it is computed from, so
-    /// that it is drawn again. Its options are in force then.
+    /// Draws a drawing in parts once more, or its rest, with its own options. They stay in force
+    /// if the machine begins to draw.
+    ///
+    /// # Errors
+    /// The [`CommandError`] to reply with.
     #[cfg(feature = "tiles")]
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(in crate::plotter) fn parts_again<B: Board>(&mut self, board: &mut B) -> Option<KeptParts> {
-        let (notes, _) = read(board).filter(|(notes, _)| is_in_parts(notes))?;
-        self.load_parts(word(&notes, 4), None, board).ok()
+    #[inline(never)] // Keeps its frame off the stack while other jobs are computed.
+    pub(in crate::plotter) fn plot_kept<B: Board>(
+        &mut self,
+        kept: KeptParts,
+        listener: &mut Listener<'_, B>,
+    ) -> Result<(), CommandError> {
+        let before = self.options;
+        let _ = records::load_parts(Some(&mut self.options), listener.board);
+        let begun = self.plot_stored(Some(kept), listener);
+        if begun.is_err() || self.machine.state() == State::Check {
+            self.options = before;
+        }
+        begun
     }
 
     /// Nothing is left to draw of a drawing in parts. If it was `kept`, the power went just behind
@@ -403,10 +424,11 @@ impl<I: Index> Inner<'_, I> {
         }
         let drawn = kept.and_then(|kept| kept.drawn);
         if drawn.is_none() {
-            let notes = begin_notes(self.machine.settings(), PARTS, u32::MAX, [0, model, 0]);
-            let is_kept =
-                kept.is_some() || records::save_parts(&self.options, time_model, board).is_ok();
-            if !is_kept || board.begin_progress(notes.as_flattened(), 0).is_err() {
+            let notes = begin_notes(self.machine.settings(), PARTS, u32::MAX, [0; 3]);
+            if kept.is_none() && !records::save_parts(&self.options, time_model, model, board) {
+                return;
+            }
+            if board.begin_progress(notes.as_flattened(), 0).is_err() {
                 return refuse(board);
             }
         }

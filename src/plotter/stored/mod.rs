@@ -182,7 +182,7 @@ impl<I: Index> Inner<'_, I> {
 
     /// Completes the model that is coming, and returns it.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
-    fn whole_model<B: Board>(
+    pub(super) fn whole_model<B: Board>(
         &mut self,
         board: &mut B,
     ) -> Result<StoredModel<'static>, CommandError> {
@@ -194,14 +194,6 @@ impl<I: Index> Inner<'_, I> {
         let model = StoredModel::new(area).ok_or(StoredModelError::Damaged)?;
         self.large = FlashModel::Whole;
         Ok(model)
-    }
-
-    /// The checksum of the model in flash, if it is complete.
-    #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(super) fn stored_checksum<B: Board>(&self, board: &mut B) -> Option<u32> {
-        let (area, _) = board.model_flash()?;
-        let model = matches!(self.large, FlashModel::Whole).then(|| StoredModel::new(area));
-        Some(model.flatten()?.checksum())
     }
 
     /// Writes the part of the reply to `$model` that tells of a model in flash, or of the room

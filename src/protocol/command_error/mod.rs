@@ -439,8 +439,8 @@ impl CommandError {
                      anew with a model of yours",
                 ),
                 format_args!(
-                    "another model came since the job began: $clear, then $resume, or begin anew \
-                     by $plot; a drawing in parts needs its own model in flash"
+                    "another model came since the job began: $resume after $clear, or begin anew \
+                     by $plot; a drawing of a model in flash needs that model: send it again"
                 ),
             ),
             #[cfg(not(feature = "resume"))]
