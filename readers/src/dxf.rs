@@ -11,9 +11,11 @@
 //! by the same placement on the page and pen.
 
 mod binary;
+mod code_page;
 mod curves;
 mod dashes;
 mod document;
+mod one_byte;
 mod space;
 mod text;
 
@@ -69,6 +71,9 @@ const MODEL: &str = "entities in model space";
 
 /// What is said of the entities on layers of the screen.
 const UNPLOTTED: &str = "entities on layers that are not to be plotted (--layer NAME draws one)";
+
+/// What is said, before its path, of another drawing that is inserted.
+const EXTERNAL: &str = "INSERT of the external drawing";
 
 /// The strokes of a drawing, and what of it is not drawn.
 struct Drawing<'d, 'a> {
@@ -352,6 +357,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
             self.skip("INSERT of an unknown block", entity.line);
             return Ok(());
         };
+        if let Some(path) = self.document.external(entity.text(2).unwrap_or_default()) {
+            let how = "(bind it in the program that wrote the file)";
+            self.skip(&format!("{EXTERNAL} {path} {how}"), entity.line);
+            return Ok(());
+        }
         let [x, y] = entity.point(10)?;
         let scale = [entity.number(41, 1.0)?, entity.number(42, 1.0)?];
         let (sine, cosine) = entity.number(50, 0.0)?.to_radians().sin_cos();
@@ -405,6 +415,15 @@ impl<'d, 'a> Drawing<'d, 'a> {
         }
         let line_type = self.document.line_type(entity, placement.layer, placement.line_type);
         self.all(entities, Placement { line_type, depth: placement.depth + 1, ..placement })
+    }
+}
+
+/// What is said of a single one of the things that are not drawn. The paths of other drawings stay
+/// as they are.
+fn singular(what: &str) -> String {
+    match what.starts_with(EXTERNAL) {
+        true => what.to_owned(),
+        false => what.replacen("entities", "entity", 1),
     }
 }
 
@@ -512,11 +531,7 @@ impl Format for Dxf {
                 None => return refused("this binary DXF is damaged or not whole: save it again"),
             },
         };
-        let text = String::from_utf8(bytes).unwrap_or_else(|error| {
-            // Files from before 2007 use the character set of a country. Only names contain letters
-            // that differ.
-            error.into_bytes().into_iter().map(char::from).collect()
-        });
+        let (text, note_of_letters) = code_page::decoded(bytes);
         let text = text.trim_start_matches('\u{FEFF}');
         let in_line = |(number, reason): LineError| {
             let line = text.lines().nth(number - 1).unwrap_or_default();
@@ -577,10 +592,7 @@ impl Format for Dxf {
             .skipped
             .iter()
             .map(|(what, (count, line))| match count {
-                1 => {
-                    let what = what.replacen("entities", "entity", 1);
-                    format!("1 {what} is not drawn (line {line})")
-                }
+                1 => format!("1 {} is not drawn (line {line})", singular(what)),
                 _ => format!("{count} {what} are not drawn (the first in line {line})"),
             })
             .collect();
@@ -606,6 +618,7 @@ impl Format for Dxf {
                 notes.push(format!("{} {what}", counted(number, nouns)));
             }
         }
+        notes.extend(note_of_letters);
         if drawing.is_of_paper {
             notes.push("paper space is drawn, because there is nothing in model space".to_owned());
         }

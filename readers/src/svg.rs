@@ -23,6 +23,7 @@
 mod areas;
 mod axidraw;
 mod clip;
+mod css;
 mod drawing;
 mod embedded;
 mod encoding;
@@ -30,6 +31,7 @@ mod flatten;
 mod markup;
 mod pens;
 mod runs;
+mod size;
 #[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
 mod text;
 mod unread;

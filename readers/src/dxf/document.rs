@@ -4,6 +4,9 @@ use super::curves::Affine;
 use crate::plan::Point;
 use std::collections::{HashMap, HashSet};
 
+/// The code with which an object begins that is embedded in an entity.
+const EMBEDDED: i32 = 101;
+
 /// A code and its value, and the line of the file in which the value stands. A file may have many
 /// millions of them.
 #[derive(Debug, Clone, Copy)]
@@ -97,6 +100,8 @@ pub(super) struct Document<'a> {
     unplotted: HashSet<String>,
     /// The blocks with their base points.
     blocks: HashMap<String, (Point, Vec<Entity<'a>>)>,
+    /// The paths of the other drawings that blocks stand for.
+    externals: HashMap<String, &'a str>,
     /// The line types that are not continuous: the lengths of dashes, above 0, and gaps, below 0.
     line_types: HashMap<String, Vec<f64>>,
     /// The line types of layers.
@@ -126,6 +131,13 @@ impl<'a> Document<'a> {
     /// The block with this name: its base point and its entities.
     pub(super) fn block(&self, name: &str) -> Option<&(Point, Vec<Entity<'a>>)> {
         self.blocks.get(&name.to_uppercase())
+    }
+
+    /// The path of the other drawing that the block with this name stands for, if nothing of that
+    /// drawing is in this file.
+    pub(super) fn external(&self, name: &str) -> Option<&'a str> {
+        let is_elsewhere = self.block(name).is_some_and(|(_, entities)| entities.is_empty());
+        self.externals.get(&name.to_uppercase()).copied().filter(|_| is_elsewhere)
     }
 
     /// The outline within which an insertion of a block shows it, in the coordinates of the block.
@@ -182,11 +194,13 @@ pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, LineError> {
 }
 
 /// Divides pairs into entities, each of which begins with code 0. What stands before the first is
-/// left out.
+/// left out, and so is an object that is embedded at the end of an entity: its codes have other
+/// meanings.
 pub(super) fn entities<'a>(pairs: &'a [Pair<'a>]) -> impl Iterator<Item = Entity<'a>> {
     let groups = pairs.chunk_by(|_, next| next.code != 0);
     groups.filter_map(|group| match group {
         [begin, pairs @ ..] if begin.code == 0 => {
+            let pairs = pairs.split(|pair| pair.code == EMBEDDED).next().unwrap_or_default();
             Some(Entity { kind: begin.value(), line: begin.line(), pairs })
         }
         _ => None,
@@ -238,6 +252,8 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
                         ("BLOCK", _) => {
                             let name = entity.text(2).unwrap_or_default().to_uppercase();
                             let base = entity.point(10)?;
+                            let path = external(&entity)?.map(|path| (name.clone(), path));
+                            document.externals.extend(path);
                             document.blocks.insert(name.clone(), (base, Vec::new()));
                             block = Some(name);
                         }
@@ -277,6 +293,14 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
     document.clips.retain(|handle, _| handles.contains(handle));
     document.unclipped += clips - document.clips.len();
     Ok(document)
+}
+
+/// The path of the other drawing that a block stands for, or else its name; `None` if it stands for
+/// none.
+fn external<'a>(block: &Entity<'a>) -> Result<Option<&'a str>, LineError> {
+    let is_external = block.flags()? & (4 | 8) != 0;
+    let path = block.text(1).filter(|path| !path.is_empty()).or_else(|| block.text(2));
+    Ok(path.filter(|_| is_external))
 }
 
 /// The handle of the insertion that a filter in space belongs to, and the outline within which the

@@ -60,10 +60,16 @@ fn lines_and_polylines_have_true_size_in_any_unit() {
     );
 }
 
+/// What AutoCAD 2018 writes behind a paragraph.
+const EMBEDDED: &str = "101 Embedded_Object 70 1 10 1.0 20 0.0 30 0.0 11 100 21 100 31 0.0 40 0.0 \
+                        41 7 71 9";
+
 /// Codes of two bytes are those of release 13 on, and of one byte those before.
 #[test]
 fn the_binary_form_is_that_of_the_text() {
-    let text = dxf("4", "", "0 LINE 8 walls 62 3 10 1.5 20 2 11 -3 21 4.25 210 0 230 1");
+    let line = "0 LINE 8 walls 62 3 10 1.5 20 2 11 -3 21 4.25 210 0 230 1";
+    let paragraph = format!("0 MTEXT 10 9 20 9 40 5 71 1 1 HI {EMBEDDED}");
+    let text = dxf("4", "", &format!("{line} {paragraph}"));
     for is_wide in [true, false] {
         let mut binary = b"AutoCAD Binary DXF\r\n\x1A\0".to_vec();
         let lines: Vec<&str> = text.lines().collect();
@@ -80,6 +86,7 @@ fn the_binary_form_is_that_of_the_text() {
             }
         }
         assert_eq!(sent("a.dxf", &binary), sent("a.dxf", text.as_bytes()), "{is_wide}");
+        assert!(sent("a.dxf", &binary).is_ok(), "{is_wide}");
         for end in 0..binary.len() {
             let _ = sent("a.dxf", &binary[..end]);
         }
@@ -467,6 +474,142 @@ fn texts_stand_where_the_file_says() {
             "1 letter is not in the plotter's font: drawn as a box",
         ]
     );
+}
+
+/// The codes of the embedded object are those of the paragraph, with other meanings.
+#[test]
+fn an_embedded_object_does_not_belong_to_its_entity() {
+    let paragraph = "0 MTEXT 8 0 100 AcDbMText 10 100 20 100 40 5 71 1 1 HI";
+    let attribute = "0 ATTRIB 8 0 10 100 20 100 40 5 1 HI 72 1";
+    for entity in [paragraph, attribute] {
+        let whole = format!("{entity} {EMBEDDED} 0 LINE 11 5");
+        let plain = format!("{entity} 0 LINE 11 5");
+        assert_eq!(strokes(&dxf("4", "", &whole)), strokes(&dxf("4", "", &plain)));
+    }
+}
+
+#[test]
+fn drawings_elsewhere_are_told() {
+    let blocks = |flags: &str| {
+        format!(
+            "0 SECTION 2 BLOCKS 0 BLOCK 2 Site 70 {flags} 10 0 20 0 1 ..\\entities.dwg 0 ENDBLK \
+             0 BLOCK 2 bound 70 4 1 b.dwg 0 LINE 11 5 0 ENDBLK 0 BLOCK 2 lost 70 8 1 0 ENDBLK \
+             0 ENDSEC"
+        )
+        .replace("1 0 ENDBLK", "0 ENDBLK")
+    };
+    let said = |flags: &str, entities: &str| {
+        let entities = format!("0 LINE 11 5 {entities}");
+        let said = notes("a.dxf", dxf("4", &blocks(flags), &entities).as_bytes());
+        said.iter().filter_map(|it| it.rsplit_once(" (")).map(|it| it.0.to_owned()).collect()
+    };
+    let told = |what: &str| {
+        let how = "(bind it in the program that wrote the file)";
+        what.replace("DWG", &format!("INSERT of the external drawing ..\\entities.dwg {how}"))
+    };
+    for flags in ["4", "8", "36", "12"] {
+        let one: Vec<String> = said(flags, "0 INSERT 2 SITE");
+        assert_eq!(one, [told("1 DWG is not drawn")], "{flags}");
+    }
+    let two: Vec<String> = said("4", "0 INSERT 2 site 0 INSERT 2 site");
+    assert_eq!(two, [told("2 DWG are not drawn")]);
+    let lost: Vec<String> = said("4", "0 INSERT 2 lost");
+    assert!(lost[0].starts_with("1 INSERT of the external drawing lost (bind"), "{lost:?}");
+    // What is in the file is drawn, and a block of nothing is nothing.
+    for (flags, entities) in [("4", "0 INSERT 2 bound"), ("0", "0 INSERT 2 site")] {
+        let said: Vec<String> = said(flags, entities);
+        assert!(said.is_empty(), "{said:?}");
+    }
+}
+
+/// A file with a text in these bytes, and the header of a version with a code page.
+fn written(version: &str, code_page: &str, text: &[u8]) -> Vec<u8> {
+    let variable = |name: &str, code: u32, value: &str| match value {
+        "" => String::new(),
+        value => format!("9\r\n{name}\r\n  {code}\r\n{value}\r\n"),
+    };
+    let header = variable("$ACADVER", 1, version) + &variable("$DWGCODEPAGE", 3, code_page);
+    let file = dxf("4", "", "0 TEXT 40 21 1 HERE").replacen("9\r\n", &format!("{header}9\r\n"), 1);
+    let (before, after) = file.split_once("HERE").expect("a place for the text");
+    [before.as_bytes(), text, after.as_bytes()].concat()
+}
+
+#[test]
+fn letters_are_those_of_the_code_page() {
+    for (version, code_page, bytes, letters) in [
+        ("AC1015", "ANSI_1250", &b"\xE8\xF8"[..], "čř"),
+        ("AC1015", "ansi_1251", b"\xC0\xC1\xDF", "АБЯ"),
+        ("AC1015", "ANSI_1252", b"\xE9\x80", "é€"),
+        ("AC1009", "ANSI_1253", b"\xC1\xD9", "ΑΩ"),
+        ("AC1009", "ISO8859-9", b"\xFE\xDD", "şİ"),
+        ("AC1009", "dos850", b"\x84\x9B", "äø"),
+        ("AC1009", "dos866", b"\x80\x81", "АБ"),
+        // The second byte of a letter may be that of a backslash.
+        ("AC1015", "ANSI_932", b"\x95\x5C\x8E\xA6", "表示"),
+        ("AC1015", "ANSI_936", b"\xB1\xED", "表"),
+        ("AC1015", "ANSI_949", b"\xB0\xA1", "가"),
+        ("AC1015", "ANSI_950", b"\xAA\xED", "表"),
+        ("", "ANSI_1251", b"\xC0\xC1", "АБ"),
+        // What is UTF-8 stays so, from 2007 on and where the file says nothing else.
+        ("AC1021", "ANSI_1251", "é".as_bytes(), "é"),
+        ("AC1032", "ANSI_1252", "čЯ".as_bytes(), "čЯ"),
+        ("AC1015", "", "é".as_bytes(), "é"),
+        ("", "ANSI_1252", "é".as_bytes(), "é"),
+        ("AC1015", "", b"\xE9", "é"),
+        ("AC1015", "DOS737", "é".as_bytes(), "é"),
+        ("AC1021", "ANSI_1251", b"\xC0\xC1", "АБ"),
+    ] {
+        let own = written(version, code_page, bytes);
+        let (text, note) = super::code_page::decoded(own.clone());
+        assert!(text.contains(&format!("\r\n{letters}\r\n")), "{code_page} {text}");
+        assert_eq!(note, None, "{code_page}");
+        assert_eq!(sent("a.dxf", &own), sent("a.dxf", &written("", "", letters.as_bytes())));
+    }
+}
+
+/// Another table has the same letters.
+#[test]
+fn code_pages_are_those_of_windows() {
+    use encoding_rs as other;
+    for (name, encoding) in [
+        ("ANSI_874", other::WINDOWS_874),
+        ("ANSI_1250", other::WINDOWS_1250),
+        ("ANSI_1251", other::WINDOWS_1251),
+        ("ANSI_1252", other::WINDOWS_1252),
+        ("ANSI_1253", other::WINDOWS_1253),
+        ("ANSI_1254", other::WINDOWS_1254),
+        ("ANSI_1255", other::WINDOWS_1255),
+        ("ANSI_1256", other::WINDOWS_1256),
+        ("ANSI_1257", other::WINDOWS_1257),
+        ("ANSI_1258", other::WINDOWS_1258),
+        ("DOS866", other::IBM866),
+    ] {
+        let upper = super::one_byte::upper(name).expect("a known code page");
+        for (byte, letter) in (0x80_u8..=0xFF).zip(upper.iter().map(|number| u32::from(*number))) {
+            let bytes = [byte];
+            let (theirs, _) = encoding.decode_without_bom_handling(&bytes);
+            let ours = char::from_u32(letter).expect("a letter");
+            assert!(theirs.chars().eq([ours]), "{name} {byte:x} {theirs} {ours}");
+        }
+    }
+}
+
+#[test]
+fn doubtful_letters_are_told() {
+    let unknown = "the code page of the file (DOS737) is not known: its letters are read as \
+                   Latin-1, so some may be wrong";
+    assert!(notes("a.dxf", &written("AC1009", "DOS737", b"\xE9")).contains(&unknown.to_owned()));
+    assert_eq!(notes("a.dxf", &written("AC1009", "DOS737", b"e")).len(), 1);
+    let doubtful = "the letters of the file are read in its code page (ANSI_1252), but may be \
+                    UTF-8: if they are drawn wrongly, save it as a DXF of AutoCAD 2007 or newer";
+    let file = written("AC1015", "ANSI_1252", "é".as_bytes());
+    assert!(notes("a.dxf", &file).contains(&doubtful.to_owned()));
+    let latin = written("AC1015", "", "Ã©".as_bytes());
+    assert_eq!(sent("a.dxf", &file), sent("a.dxf", &latin));
+    // The mark of UTF-8 decides.
+    let marked = [b"\xEF\xBB\xBF", file.as_slice()].concat();
+    assert_eq!(sent("a.dxf", &marked), sent("a.dxf", &written("", "", "é".as_bytes())));
+    assert_eq!(notes("a.dxf", &marked).len(), 1);
 }
 
 #[test]

@@ -62,6 +62,7 @@ impl Embedded {
 
     fn tree(&self, data: &[u8], options: &Options<'_>) -> Option<Tree> {
         let text = encoding::text(data.to_vec()).ok()?;
+        let text = markup::with_ids(&text, &markup::parsed(&text).ok()?);
         let document = markup::parsed(&text).ok()?;
         {
             let mut found = self.found();

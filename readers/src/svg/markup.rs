@@ -6,11 +6,10 @@
 use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
-use super::{runs, unread};
+use super::{css, runs, size, unread};
 use crate::page::Page;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
-use std::ops::Range;
 use usvg::roxmltree::{Document, Error, Node, NodeId, ParsingOptions};
 
 /// The elements that are drawn as paths.
@@ -79,31 +78,25 @@ pub(super) fn is_one_of(node: Node<'_, '_>, names: &[&str]) -> bool {
         && names.contains(&node.tag_name().name())
 }
 
-/// A copy of `text` in which every group, reference, shape and text has an `id`, and transforms in
-/// `style` attributes have the form that they have in SVG. In a `switch` no `foreignObject` is
-/// chosen, and features of SVG that are asked for are there, as in a browser.
+/// A copy of `text` in which every group, reference, shape and text has an `id`, and CSS and the
+/// size of the picture have a form that `usvg` reads. In a `switch` no `foreignObject` is chosen,
+/// and features of SVG that are asked for are there, as in a browser.
 pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let own: HashSet<&str> =
         document.descendants().filter_map(|node| node.attribute("id")).collect();
+    let names_root = css::names_root(document);
     let mut copy = String::with_capacity(text.len() + text.len() / 4);
     let (mut copied, mut number) = (0, 0_u32);
     for node in document.descendants() {
         let is_traced =
             is_one_of(node, &SHAPES) || is_one_of(node, &["g", "a", "use", "svg", "text", "image"]);
-        let is_traced =
-            is_traced && node.attribute("id").is_none() && node.parent_element().is_some();
-        let mut edits: Vec<(Range<usize>, String)> = Vec::new();
-        if let Some(style) = node.attribute_node("style")
-            && let Some(value) = text.get(style.range_value())
-            && value.contains("transform")
-        {
-            edits.extend(with_plain_transform(value).map(|value| (style.range_value(), value)));
-        }
+        let is_root = node == document.root_element();
+        let is_traced = is_traced && node.attribute("id").is_none() && !is_root;
+        let is_named = is_root && names_root && node.attribute(css::ROOT).is_none();
+        let mut edits = edits_of(node, text);
         let is_foreign = is_one_of(node, &["foreignObject"]);
-        let own_condition = node.attribute_node("requiredFeatures").filter(|_| !is_foreign);
-        edits.extend(own_condition.map(|it| (it.range_value(), FEATURE.to_owned())));
         let is_left_out = is_foreign && node.attribute("requiredExtensions").is_none();
-        if !is_traced && !is_left_out && edits.is_empty() {
+        if !is_traced && !is_left_out && !is_named && edits.is_empty() {
             continue;
         }
         // The name of an element ends at a space, a slash or an angle bracket. The contents of an
@@ -117,6 +110,9 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         copied = end;
         if is_left_out {
             copy.push_str(" requiredExtensions=\"penup\"");
+        }
+        if is_named {
+            copy.push_str(&format!(" {}=\"\"", css::ROOT));
         }
         if is_traced {
             let id = loop {
@@ -141,12 +137,16 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     copy
 }
 
-/// The declarations of a `style` attribute with a transform as SVG writes it; `None` if they have
-/// it, or there is no such form.
-fn with_plain_transform(style: &str) -> Option<String> {
-    let (_, css) = unread::declarations(style).find(|(name, _)| *name == "transform")?;
-    let plain = unread::plain_transform(css)?;
-    (plain != css).then(|| style.replace(css, &plain))
+/// The corrections of an element that is not only given an `id`.
+fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<css::Edit> {
+    let mut edits = css::edits_of(node, text);
+    let own_condition = node.attribute_node("requiredFeatures");
+    let own_condition = own_condition.filter(|_| !is_one_of(node, &["foreignObject"]));
+    edits.extend(own_condition.map(|it| (it.range_value(), FEATURE.to_owned())));
+    if node == node.document().root_element() {
+        edits.extend(size::edits_of(node));
+    }
+    edits
 }
 
 /// The elements of an SVG in which every group and shape has an `id`.
@@ -295,9 +295,7 @@ impl<'a, 'input> Markup<'a, 'input> {
 
     /// Says how large a unit is taken to be, if the file does not say the size of its `page`.
     pub(super) fn size_note(&self, page: Page) -> Option<String> {
-        let root = self.document.root_element();
-        let is_said = |name| root.attribute(name).is_some_and(|size| !size.ends_with('%'));
-        if is_said("width") || is_said("height") {
+        if size::is_said(self.document.root_element()) {
             return None;
         }
         let Page { width, height } = page;

@@ -606,5 +606,6 @@ mod clips;
 mod css;
 mod embedded;
 mod masks;
+mod sizes;
 #[cfg(feature = "text")]
 mod texts;

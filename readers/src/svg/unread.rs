@@ -1,9 +1,11 @@
 //! What an SVG asks for by means that are not read: properties and rules of CSS, scripts,
 //! animations, and paints of other programs. All of it is counted, for the user.
 
+use super::css::without_comments;
 use super::markup::{Count, SHAPES, is_one_of};
 use std::collections::BTreeMap;
 use std::str::FromStr as _;
+use svgtypes::FontShorthand;
 use usvg::roxmltree::{Document, Node};
 
 /// The properties of CSS that move or form a shape, and are read as attributes only or not at all.
@@ -72,7 +74,13 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
 /// The properties and values of a list of declarations.
 pub(super) fn declarations(list: &str) -> impl Iterator<Item = (&str, &str)> {
     let pairs = list.split(';').filter_map(|declaration| declaration.split_once(':'));
-    pairs.map(|(name, value)| (name.trim(), value.trim()))
+    pairs.map(|(name, value)| (name.trim(), without_important(value)))
+}
+
+/// A value without the word that it goes before others.
+pub(super) fn without_important(value: &str) -> &str {
+    let word = value.rsplit_once('!').filter(|(_, word)| word.trim() == "important");
+    word.map_or(value, |(value, _)| value).trim()
 }
 
 /// What is not read of a property.
@@ -83,6 +91,7 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
     }
     let is_unread = match name {
         "clip-path" => !value.starts_with("url(") && !value.contains("var("),
+        "font" => is_style && !value.contains("var(") && FontShorthand::from_str(value).is_err(),
         "transform" | "patternTransform" | "gradientTransform" => plain_transform(value).is_none(),
         _ => is_style && (NOT_READ.contains(&name) || is_shape && SIZES.contains(&name)),
     };
@@ -95,14 +104,8 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
 /// What is not read of a style sheet.
 fn of_sheet(sheet: &str) -> Vec<String> {
     let mut unread = Vec::new();
-    let mut rest = sheet;
-    let mut plain = String::new();
-    while let Some((before, after)) = rest.split_once("/*") {
-        plain.push_str(before);
-        rest = after.split_once("*/").map_or("", |(_, after)| after);
-    }
-    plain.push_str(rest);
-    let mut rest = plain.as_str();
+    let plain = without_comments(sheet);
+    let mut rest = plain.as_ref();
     while let Some(end) = rest.find(['{', ';', '}']) {
         let (prelude, body) = (rest[..end].trim(), &rest[end..]);
         if let Some(rule) = prelude.strip_prefix('@') {
@@ -118,14 +121,8 @@ fn of_sheet(sheet: &str) -> Vec<String> {
             rest = &body[1..];
             continue;
         };
-        for class in prelude.split(':').skip(1).filter(|class| !class.is_empty()) {
-            let end = class.find(|it: char| !it.is_alphanumeric() && it != '-');
-            let class = &class[..end.unwrap_or(class.len())];
-            if !CLASSES.contains(&class) && class != "root" {
-                unread.push(format!("a selector :{class} of CSS"));
-            }
-        }
         let list = block.split('}').next().unwrap_or_default();
+        unread.extend(of_selectors(prelude, list));
         // Sizes may be those of the whole picture.
         let properties =
             declarations(list).filter(|(name, _)| !matches!(*name, "width" | "height"));
@@ -135,6 +132,46 @@ fn of_sheet(sheet: &str) -> Vec<String> {
         rest = after_block(body);
     }
     unread
+}
+
+/// What is not read of the selectors of a rule with these declarations.
+fn of_selectors(selectors: &str, list: &str) -> Vec<String> {
+    let mut unread = Vec::new();
+    // Variables are counted where they are used.
+    let has_variables_only = declarations(list).all(|(name, _)| name.starts_with("--"));
+    for class in selectors.split(':').skip(1).filter(|class| !class.is_empty()) {
+        let end = class.find(|it: char| !it.is_alphanumeric() && it != '-');
+        let class = class.get(..end.unwrap_or(class.len())).unwrap_or_default();
+        let is_silent = class == "root" && has_variables_only;
+        if !CLASSES.contains(&class) && !is_silent {
+            unread.push(format!("a selector :{class} of CSS"));
+        }
+    }
+    unread.extend(unread_sign(selectors).map(|sign| format!("a selector with {sign} of CSS")));
+    unread
+}
+
+/// The first sign of selectors at which `usvg` stops reading them.
+fn unread_sign(selectors: &str) -> Option<String> {
+    let mut quote = None;
+    let mut is_in_brackets = false;
+    let mut letters = selectors.chars().peekable();
+    while let Some(letter) = letters.next() {
+        let is_operator = letters.peek() == Some(&'=');
+        match letter {
+            _ if quote.is_some() => quote = quote.filter(|quote| *quote != letter),
+            '"' | '\'' => quote = Some(letter),
+            '[' => is_in_brackets = true,
+            ']' => is_in_brackets = false,
+            '^' | '$' | '*' if is_operator => return Some(format!("{letter}=")),
+            '~' | '|' if is_in_brackets && is_operator => {}
+            ' ' | '\n' | '\t' | '\r' if is_in_brackets => return Some("spaces in [ ]".to_owned()),
+            // Of the letters beyond ASCII these are not taken for letters.
+            '~' | '|' | '\\' | '\u{80}'..='\u{ED}' => return Some(letter.to_string()),
+            _ => {}
+        }
+    }
+    None
 }
 
 /// What follows a block, or a semicolon.
@@ -201,6 +238,16 @@ mod tests {
             ("@media print{.a{d:path('M0 0')} .b{x:1}} .c{r:5px}", "the rule @media of CSS"),
             ("a:not(.b), c{}", "a selector :not of CSS"),
             (".a{stroke:var(--b)} :root{--b:red}", "a variable of CSS"),
+            (":root{--b:red;--c:d}", ""),
+            (":root{--b:red;stroke:red}", "a selector :root of CSS"),
+            (".a, .b ~ .c{}", "a selector with ~ of CSS"),
+            ("#\\31 a{}", "a selector with \\ of CSS"),
+            ("svg|path{}", "a selector with | of CSS"),
+            ("a[b$='c']{}", "a selector with $= of CSS"),
+            ("a[b~='~|'] > *, a[b|=c] + .d-1_é{}", "a selector with é of CSS"),
+            ("a[b~='~|\\^=é'] > *, a[b|=c] + .d-1_ö{}", ""),
+            (".a{font:4px/1.5 Arial} .b{font:inherit} .c{font:bold 4px Arial !important}", ""),
+            (".a{font:caption}", "the property font of CSS"),
             (".a{clip-path:circle(5px)}", "the property clip-path of CSS"),
             (".a{", ""),
             ("@media {", "the rule @media of CSS"),

@@ -91,3 +91,88 @@ fn a_browser_text_in_html_is_replaced_by_what_the_file_has_for_others() {
     let notes = read(&in_mm(alone)).expect("an SVG");
     assert_eq!(notes.notes(), ["1 foreignObject is not drawn: it is not SVG (line 1)"]);
 }
+
+#[test]
+fn a_style_sheet_moves_shapes_as_an_attribute_does() {
+    let sheet = |sheet: &str| {
+        let path = "<path class='a' d='M10 10H20' stroke='red'/>";
+        let svg = in_mm(&format!("<style>{sheet}</style>{path}"));
+        let contents = read(&svg).expect("an SVG");
+        assert!(contents.notes().is_empty(), "{sheet}: {:?}", contents.notes());
+        polylines(&contents).into_iter().map(|(_, points)| points).collect::<Vec<_>>()
+    };
+    for moved in [
+        ".a{transform:translate(10px,5px)}",
+        "<![CDATA[.b{fill:red}\n.a { fill:none; transform : translate( 10px , 5px ) ; }]]>",
+        ".a{transform:translate(10px,/* ; */5px)!important;transform:none}",
+        ".a{--b:c;transform:translate(10px,5px)}",
+        "/* .a{ */.a{transform:translate(10px,5px)",
+        "/*<![CDATA[*/.a{transform:translate(10px,5px)}/*]]>*/.b{--c:d",
+        "<![CDATA[.a{transform:translate(10px,5px)}.b{--c:d]]>",
+    ] {
+        assert_eq!(sheet(moved), [[[20.0, 85.0], [30.0, 85.0]]], "{moved}");
+    }
+    let svg = in_mm("<style>.a{transform:rotate(1turn)}</style><path d='M1 1H9' stroke='red'/>");
+    let notes = read(&svg).expect("an SVG").notes().join("; ");
+    assert!(notes.contains("the property transform of CSS, which is not obeyed"), "{notes}");
+    // The lines of the file keep their numbers.
+    let svg = in_mm(
+        "<style>:root{--a:b\n;}.a{transform:rotate(/*\n*/0deg)}</style>\n\
+         <path d='M1 1H9' stroke='red'/>",
+    );
+    let contents = read(&svg).expect("an SVG");
+    assert!(contents.in_order().filter_map(|line| line.origin).all(|origin| origin.line == 4));
+}
+
+#[test]
+fn selectors_are_obeyed_or_named() {
+    let two = "<path class='a' d='M10 10H20' stroke='red'/><path class='a' d='M10 20H20'/>";
+    let read = |sheet: &str, shapes: &str| {
+        let contents = read(&in_mm(&format!("<style>{sheet}</style>{shapes}"))).expect("an SVG");
+        (polylines(&contents).len(), contents.notes().join("; "))
+    };
+    for (selector, what) in [
+        (".a ~ .a", "with ~"),
+        (".a~.a", "with ~"),
+        ("#\\31 a", "with \\"),
+        ("svg|path", "with |"),
+        ("path, *|a", "with |"),
+        ("[class^=\"a\"]", "with ^="),
+        ("[class = a]", "with spaces in [ ]"),
+        (".é", "with é"),
+        (".b:root &gt; .a", ":root"),
+    ] {
+        let (_, notes) = read(&format!("{selector}{{stroke:red}}"), two);
+        let said = format!("a selector {what} of CSS, which is not obeyed");
+        assert!(notes.contains(&said), "{selector}: {notes}");
+    }
+    for selector in [
+        ".a + .a",
+        "svg&gt;.a",
+        ":root .a",
+        "svg:root > *",
+        "[class~=\"a\"]",
+        "[class|=a]",
+        "[class='a']",
+        "path",
+        ":root",
+        "q,:root",
+    ] {
+        let (lines, notes) = read(&format!("{selector}{{stroke:red;fill:none}}"), two);
+        assert_eq!((lines, notes.as_str()), (2, ""), "{selector}");
+    }
+    // The root is no other element, and a rule for it goes before one for all elements `svg`.
+    let nested = "<svg><path d='M10 20H20'/></svg><path d='M10 10H20' stroke='red'/>";
+    assert_eq!(read(":root{--b:c;stroke:red}svg{stroke:none}", nested).0, 1);
+    assert_eq!(read(":root{--b:c}", nested).0, 1);
+}
+
+#[test]
+fn long_css_takes_no_long_time() {
+    for part in ["--a:b;", "/*", "'", "\"\\", ":root", "a{", "font:1/", "transform:(", "--:(", "}"]
+    {
+        let sheet = part.repeat(300_000);
+        let sheet = format!("<style>{sheet}</style><path d='M1 1H9' stroke='red'/>");
+        assert_eq!(drawn(&in_mm(&sheet)).len(), 1);
+    }
+}

@@ -75,3 +75,14 @@ fn what_an_svg_within_an_svg_does_not_draw_is_named() {
     assert!(notes.iter().any(|note| note.contains("1 script is not run")), "{notes:?}");
     assert!(notes.iter().any(|note| note.contains("image") && note.contains("not drawn")));
 }
+
+#[test]
+fn the_css_of_an_svg_within_an_svg_is_corrected_as_well() {
+    let inner = INNER.replace(
+        "<path",
+        "<style>:root{--a:b;fill:none}.a{transform:translate(0px,-5px)}</style><path class='a'",
+    );
+    let contents = read(&image(&as_data(&inner), "width='40' height='20'")).expect("an SVG");
+    assert!(contents.notes().is_empty(), "{:?}", contents.notes());
+    assert_eq!(polylines(&contents)[1].1, [[10.0, 75.0], [50.0, 75.0]]);
+}

@@ -170,3 +170,35 @@ fn layers_and_colours_choose_the_pens_of_texts() {
     let pens: Vec<String> = polylines(&contents).into_iter().map(|(pen, _)| pen).collect();
     assert_eq!(pens, ["pen2", "pen1"]);
 }
+
+#[test]
+fn the_size_of_letters_is_read_beside_the_height_of_lines() {
+    let size = |svg: &str| {
+        let contents = read_in(squares, &in_mm(svg)).expect("an SVG");
+        assert!(contents.notes().is_empty(), "{svg}: {:?}", contents.notes());
+        let (_, points) = polylines(&contents).remove(0);
+        let right = points.iter().map(|point| point[0]).fold(0.0, f64::max);
+        // The letter is half as wide as it is large.
+        2.0 * (right - 20.0)
+    };
+    let text = |font: &str| {
+        [
+            format!("<text x='20' y='30' style=\"fill:red;{font};stroke:none\">a</text>"),
+            format!("<style>text{{{font};fill:red}}</style><text x='20' y='30'>a</text>"),
+        ]
+    };
+    for font in [
+        "font:4px/1.5 Squares",
+        "font: italic bold 4px / normal Squares, sans-serif",
+        "font:4px/calc(1px + 2px)&quot;Squares&quot;",
+        "font:4px/120% 'Squares' !important",
+        "--a:b/c;font:4px Squares",
+    ] {
+        for svg in text(font) {
+            assert_eq!(size(&svg), 4.0, "{svg}");
+        }
+    }
+    let svg = in_mm("<text x='20' y='30' style='font:caption'>a</text>");
+    let notes = read_in(squares, &svg).expect("an SVG").notes().join("; ");
+    assert!(notes.contains("the property font of CSS, which is not obeyed"), "{notes}");
+}

@@ -1,0 +1,268 @@
+//! Corrects CSS in the text of an SVG, so that `usvg` obeys more of it: in style sheets and in
+//! `style` attributes alike.
+//!
+//! Transforms get the form that they have in SVG. The line height in `font` is left out, and so are
+//! custom properties, because `usvg` reads nothing that follows them. The pseudo-class `:root`
+//! becomes an attribute selector, which counts as much, for an attribute that the root is given.
+
+use super::unread;
+use std::borrow::Cow;
+use std::ops::Range;
+use usvg::roxmltree::{Document, Node};
+
+/// A range of a text, and what stands there instead.
+pub(super) type Edit = (Range<usize>, String);
+
+/// The attribute that the root of an SVG has for style sheets that name it.
+pub(super) const ROOT: &str = "data-penup-root";
+
+const ROOT_CLASS: &str = ":root";
+
+/// Whether a style sheet of the file may have a selector for the root.
+pub(super) fn names_root(document: &Document<'_>) -> bool {
+    let sheets = document.descendants().filter(|node| is_sheet(*node));
+    let mut texts = sheets.flat_map(|sheet| sheet.children()).filter_map(|child| child.text());
+    texts.any(|text| text.contains(ROOT_CLASS))
+}
+
+/// The corrections of the CSS that an element has, in the text of the document.
+pub(super) fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<Edit> {
+    let mut ranges: Vec<_> =
+        node.attribute_node("style").map(|style| style.range_value()).into_iter().collect();
+    if is_sheet(node) {
+        ranges.extend(contents(node, text));
+    }
+    let found = ranges.into_iter().flat_map(|range| {
+        let start = range.start;
+        let found = edits(text.get(range).unwrap_or_default()).into_iter();
+        found.map(move |(it, instead)| (start + it.start..start + it.end, instead))
+    });
+    found.collect()
+}
+
+/// Where the contents of a style sheet lie in the text.
+fn contents(sheet: Node<'_, '_>, text: &str) -> Vec<Range<usize>> {
+    let own = sheet.range();
+    let texts = sheet.children().filter(Node::is_text).map(|text| text.range());
+    // The contents of an entity lie elsewhere.
+    let mut ranges: Vec<_> =
+        texts.filter(|it| own.start <= it.start && it.end <= own.end).collect();
+    let mut children = sheet.children();
+    if let [only] = ranges.as_mut_slice()
+        && children.nth(1).is_none()
+        && let Some(length) = text.get(only.start..own.end).and_then(|rest| rest.rfind("</"))
+    {
+        // Of text that is partly in CDATA this is the first piece.
+        only.end = only.start + length;
+    }
+    ranges
+}
+
+fn is_sheet(node: Node<'_, '_>) -> bool {
+    node.is_element() && node.tag_name().name() == "style"
+}
+
+/// The corrections of a style sheet, or of a list of declarations.
+fn edits(css: &str) -> Vec<Edit> {
+    let mut edits = Vec::new();
+    for part in parts(css) {
+        match part.end {
+            Some(b'{') => edits.extend(edits_of_selectors(&part)),
+            _ => edits.extend(edit_of_declaration(&part)),
+        }
+    }
+    for (range, instead) in &mut edits {
+        // The lines of the text keep their numbers.
+        let lines = |text: &str| text.matches('\n').count();
+        let before = lines(css.get(range.clone()).unwrap_or_default());
+        instead.push_str(&"\n".repeat(before.saturating_sub(lines(instead))));
+    }
+    edits
+}
+
+/// The text up to a brace or a semicolon.
+struct Part<'a> {
+    text: &'a str,
+    /// Where it begins.
+    start: usize,
+    /// The letter at which it ends; `None` at the end of the text.
+    end: Option<u8>,
+}
+
+/// The parts of a text. Braces and semicolons in comments and in strings end none.
+fn parts(css: &str) -> Vec<Part<'_>> {
+    let mut parts = Vec::new();
+    let bytes = css.as_bytes();
+    let (mut start, mut at) = (0, 0);
+    while let Some(letter) = bytes.get(at).copied() {
+        let next = match letter {
+            b'/' if bytes.get(at + 1) == Some(&b'*') => comment_end(css, at),
+            b'"' | b'\'' => string_end(bytes, at, letter),
+            _ => at + 1,
+        };
+        if matches!(letter, b'{' | b'}' | b';') {
+            let text = css.get(start..at).unwrap_or_default();
+            parts.push(Part { text, start, end: Some(letter) });
+            start = next;
+        }
+        at = next;
+    }
+    parts.push(Part { text: css.get(start..).unwrap_or_default(), start, end: None });
+    parts
+}
+
+/// The end of the comment that begins at `at`.
+fn comment_end(css: &str, at: usize) -> usize {
+    let contents = at + "/*".len();
+    let length = css.get(contents..).and_then(|rest| rest.find("*/"));
+    length.map_or(css.len(), |length| contents + length + "*/".len())
+}
+
+/// The end of the string that begins with `quote` at `at`.
+fn string_end(bytes: &[u8], at: usize, quote: u8) -> usize {
+    let mut is_escaped = false;
+    let is_end = |letter: &u8| {
+        let ends = *letter == quote && !is_escaped;
+        is_escaped = *letter == b'\\' && !is_escaped;
+        ends
+    };
+    let contents = at + 1;
+    let length = bytes.get(contents..).and_then(|rest| rest.iter().position(is_end));
+    length.map_or(bytes.len(), |length| contents + length + 1)
+}
+
+/// A copy of a text without its comments.
+pub(super) fn without_comments(css: &str) -> Cow<'_, str> {
+    if !css.contains("/*") {
+        return Cow::Borrowed(css);
+    }
+    let mut plain = String::with_capacity(css.len());
+    let mut rest = css;
+    while let Some((before, after)) = rest.split_once("/*") {
+        plain.push_str(before);
+        rest = after.split_once("*/").map_or("", |(_, after)| after);
+    }
+    plain.push_str(rest);
+    Cow::Owned(plain)
+}
+
+/// The corrections of the selectors of a rule.
+fn edits_of_selectors(part: &Part<'_>) -> Vec<Edit> {
+    if part.text.contains(['"', '\'']) {
+        return Vec::new();
+    }
+    let classes = part.text.match_indices(ROOT_CLASS).filter(|(at, class)| {
+        let before = part.text.get(..*at).unwrap_or_default();
+        let behind = part.text.get(at + class.len()..).unwrap_or_default();
+        let is_more = |it: char| it.is_alphanumeric() || matches!(it, '-' | '_' | '\\' | '(');
+        !before.ends_with([':', '\\']) && !behind.starts_with(is_more)
+    });
+    let ranges = classes.map(|(at, class)| part.start + at..part.start + at + class.len());
+    ranges.map(|range| (range, format!("[{ROOT}]"))).collect()
+}
+
+/// The correction of a declaration.
+fn edit_of_declaration(part: &Part<'_>) -> Option<Edit> {
+    let own = without_leading_comments(part.text);
+    let end = part.start + part.text.len();
+    // The marks of CDATA stay.
+    if own.contains('<') || own.contains("]]>") {
+        return None;
+    }
+    let (name, value) = own.split_once(':')?;
+    if name.starts_with("--") {
+        // A semicolon alone is an error to `usvg`.
+        let end = end + usize::from(part.end == Some(b';'));
+        return is_whole(own)
+            .then(|| (part.start + part.text.len() - own.len()..end, String::new()));
+    }
+    let start = end - value.trim_start().len();
+    let value = unread::without_important(value);
+    let plain = without_comments(value);
+    let instead = match name.trim_end() {
+        "transform" => unread::plain_transform(&plain)?,
+        "font" => without_line_height(&plain)?,
+        _ => return None,
+    };
+    (instead != value).then(|| (start..start + value.len(), instead))
+}
+
+fn without_leading_comments(text: &str) -> &str {
+    let mut rest = text.trim_start();
+    while rest.starts_with("/*") {
+        rest = rest.get(comment_end(rest, 0)..).unwrap_or_default().trim_start();
+    }
+    rest
+}
+
+/// Whether the semicolon after a text ends a declaration, rather than lying in brackets or in the
+/// name of a letter.
+fn is_whole(declaration: &str) -> bool {
+    let number = |letter| declaration.matches(letter).count();
+    !declaration.contains('&') && number('(') == number(')')
+}
+
+/// The value of `font` without the height of lines, which stands behind the size of the letters
+/// and before the font; `None` if there is none.
+fn without_line_height(font: &str) -> Option<String> {
+    let slash = font.find(['/', '"', '\'']).filter(|at| font.as_bytes().get(*at) == Some(&b'/'))?;
+    let (size, rest) = font.split_at(slash);
+    let rest = rest.trim_start_matches('/').trim_start();
+    let mut depth = 0_u32;
+    let is_end = |letter: char| {
+        match letter {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        depth == 0 && (letter.is_whitespace() || matches!(letter, '"' | '\'' | '&'))
+    };
+    let family = rest.find(is_end).and_then(|end| rest.get(end..)).unwrap_or_default();
+    Some(format!("{} {}", size.trim_end(), family.trim_start()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn edited(css: &str) -> String {
+        let mut edited = css.to_owned();
+        for (range, instead) in edits(css).into_iter().rev() {
+            edited.replace_range(range, &instead);
+        }
+        edited
+    }
+
+    #[test]
+    fn css_is_corrected_and_keeps_its_lines() {
+        for (css, corrected) in [
+            (".a{transform:translate(10px,5px)}", ".a{transform:translate(10,5)}"),
+            (
+                "/*{*/ /* ; */ transform /* */: none;transform: /* a\n */rotate(9deg) !important",
+                "/*{*/ /* ; */ transform /* */: none;transform: rotate(9)\n !important",
+            ),
+            (
+                "a:hover{fill:red;transform:rotate(1turn)}",
+                "a:hover{fill:red;transform:rotate(1turn)}",
+            ),
+            ("font:italic 4px / 1.5 &quot;A&quot;;x:y", "font:italic 4px &quot;A&quot;;x:y"),
+            (".a{font:4px/calc(1 + 2)'a/b'}", ".a{font:4px 'a/b'}"),
+            ("font:4px 'a/b'", "font:4px 'a/b'"),
+            ("font:4px/1.5", "font:4px "),
+            (
+                "svg:root, :root>a, :rooted, b::root{--x:'}';\n--y:\n(a);fill:red;--z:b}",
+                "svg[data-penup-root], [data-penup-root]>a, :rooted, b::root{\n\nfill:red;}",
+            ),
+            ("--x:&quot;a;fill:red&quot;", "--x:&quot;a;fill:red&quot;"),
+            ("a[b=':root']{}", "a[b=':root']{}"),
+            ("transform:rotate(1deg", "transform:rotate(1deg"),
+            ("/* transform:rotate(1deg)", "/* transform:rotate(1deg)"),
+            (".a{--b:c]]>", ".a{--b:c]]>"),
+            ("--b:<![CDATA[;]]>c", "--b:<![CDATA[;]]>c"),
+            ("'\\';transform:rotate(1deg)", "'\\';transform:rotate(1deg)"),
+            ("ä:{;}:;--:;é'", "ä:{;}:;é'"),
+        ] {
+            assert_eq!(edited(css), corrected, "{css}");
+        }
+    }
+}

@@ -1,0 +1,51 @@
+//! Tests of the size that an SVG says it has.
+
+use super::*;
+
+/// The page of an SVG of 100 x 50 units, its first vertex, and whether its size is not said.
+fn sized(size: &str) -> ([f64; 2], [f64; 2], bool) {
+    let svg = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' {size} viewBox='0 0 100 50'>\
+         <path d='M10 25H90' stroke='red'/></svg>"
+    );
+    let contents = read(&svg).expect("an SVG");
+    let Page { width, height } = contents.page().expect("a page");
+    let is_told = contents.notes().iter().any(|it| it.contains("does not say its size"));
+    ([width, height], polylines(&contents)[0].1[0], is_told)
+}
+
+#[test]
+fn each_unit_of_css_gives_true_size_and_a_percentage_follows_from_the_view_box() {
+    for size in [
+        "width='100mm' height='50mm'",
+        "width='100MM' height='50MM'",
+        "width='400Q' height='200q'",
+        "width=' 10Cm ' height='50mm\n'",
+        "width='1E2mm' height='50mm'",
+        "width='100%' height='50mm'",
+        "width='100mm' height='100%'",
+        "width='50%' height='5CM'",
+        "width='100mm' height='50vh'",
+        "width='100 mm' height='50mm'",
+        "width='auto' height='200Q'",
+        "height='50MM'",
+    ] {
+        assert_eq!(sized(size), ([100.0, 50.0], [10.0, 25.0], false), "{size}");
+    }
+}
+
+#[test]
+fn a_size_that_depends_on_the_window_or_is_no_length_is_not_said() {
+    for size in [
+        "",
+        "width='100%' height='100%'",
+        "width='50vw' height='25vw'",
+        "width='100 mm' height='50 mm'",
+        "width='100%' height='50vh'",
+        "width='calc(1mm)' height=''",
+        "width='1e400mm' height='-'",
+        "width='infmm' height='é'",
+    ] {
+        assert_eq!(sized(size), ([26.458, 13.229], [2.646, 6.614], true), "{size}");
+    }
+}
