@@ -425,7 +425,9 @@ impl<I: Index> Inner<'_, I> {
         let drawn = kept.and_then(|kept| kept.drawn);
         if drawn.is_none() {
             let notes = begin_notes(self.machine.settings(), PARTS, u32::MAX, [0; 3]);
-            if kept.is_none() && !records::save_parts(&self.options, time_model, model, board) {
+            // The rest of what another build has kept would be refused.
+            let is_saved = kept.is_some_and(|kept| kept.sources == records::SOURCES);
+            if !is_saved && !records::save_parts(&self.options, time_model, model, board) {
                 return;
             }
             if board.begin_progress(notes.as_flattened(), 0).is_err() {
