@@ -172,8 +172,7 @@ fn a_computer_comes_near_to_lkh() {
              {milliseconds} ms",
             100.0 * (length / best - 1.0)
         );
-        let tolerance = if name.contains("random") { 0.015 } else { 0.01 };
-        assert!(length <= (1.0 + tolerance) * best, "{name}");
+        assert!(length <= 1.01 * best, "{name}");
     }
 }
 
@@ -183,13 +182,10 @@ const BY_LKH: [f64; 10] =
 
 #[test]
 fn a_computer_is_within_a_hundredth_of_what_lkh_found() {
-    let mut sums = [0.0; 2];
     for (seed, best) in (1..).zip(BY_LKH) {
         let (length, units) = by_a_computer(&random(1000, seed));
-        assert!(length <= 1.015 * best, "seed {seed}: {length:.1} mm, by LKH {best:.1} mm");
+        assert!(length <= 1.01 * best, "seed {seed}: {length:.1} mm, by LKH {best:.1} mm");
         // More would take longer than a tenth of a second.
-        assert!(units <= 10_000_000, "seed {seed}: {units} units");
-        sums = [sums[0] + length, sums[1] + best];
+        assert!(units <= 12_500_000, "seed {seed}: {units} units");
     }
-    assert!(sums[0] <= 1.01 * sums[1], "in all {:.1} mm, by LKH {:.1} mm", sums[0], sums[1]);
 }

@@ -56,7 +56,7 @@ const WINDOW_UNITS_PER_MOVE: u64 = 800;
 const FIRST_TOUR_PART: u64 = 256;
 
 /// With [`Effort::Auto`], annealing has this many units of work for each move.
-const ANNEALING_UNITS_PER_MOVE: u64 = 7000;
+const ANNEALING_UNITS_PER_MOVE: u64 = 10_000;
 /// The part of its length by which annealing makes a tour shorter at least, as measured: it pays if
 /// that saves more time than the work takes.
 const ANNEALING_PART: u64 = 32;
