@@ -215,6 +215,11 @@ fn spawn(command: &mut Command) -> io::Result<(Child, ChildStdout, ChildStderr)>
     }
 }
 
+/// The pause before more of the trace is read. QEMU writes each line by itself, and would wake the
+/// thread that reads at every line, which would cost several times as much as all else that QEMU
+/// does. Its pipe holds the lines of several milliseconds.
+const TRACE_PAUSE: Duration = Duration::from_micros(250);
+
 /// Reads the trace until QEMU ends.
 fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
     let mut lines = BufReader::with_capacity(1 << 16, stderr);
@@ -234,9 +239,10 @@ fn read_trace(stderr: ChildStderr, shared: &Shared<State>) {
         // them at every line would cost more than reading it.
         if count == 0 || !lines.buffer().contains(&b'\n') {
             shared.notify();
-        }
-        if count == 0 {
-            return;
+            if count == 0 {
+                return;
+            }
+            thread::sleep(TRACE_PAUSE);
         }
     }
 }
