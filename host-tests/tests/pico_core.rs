@@ -60,6 +60,8 @@ for (let count = 0; count < Number(cases); count++) {
     isCall ? 0xd000 | random(0x1000) | (random(2) << 13) : random(0x10000)];
   const registers = Array.from({ length: 13 }, number);
   const flags = Array.from({ length: 4 }, () => random(2) === 1);
+  // No result is negative and zero.
+  if (flags[0]) flags[1] = false;
   for (const { chip, core, xip } of [quick, slow]) {
     op.forEach((half, index) => {
       const at = pc - (inFlash ? FLASH : RAM) + 2 * index;
