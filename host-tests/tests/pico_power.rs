@@ -138,9 +138,9 @@ fn changed(line: &str, travel: u32) -> String {
     }
 }
 
-/// The number of power cuts: `PENUP_CUTS`, or else 200.
+/// The number of power cuts: `PENUP_CUTS`, or else 100.
 fn cut_count() -> u64 {
-    wish("PENUP_CUTS", 200)
+    wish("PENUP_CUTS", 100)
 }
 
 #[test]

@@ -66,7 +66,8 @@ fn lint_and_build_tests() -> Result<Programs> {
             .args(["--workspace", "--no-deps", "--document-private-items"])
             .env("RUSTDOCFLAGS", "-Dwarnings"),
     )?;
-    side_by_side::built_by(workspace("test").arg("--workspace").args(EMULATOR))
+    // The examples have been compiled for the lints, and contain no tests.
+    side_by_side::built_by(workspace("test").args(["--workspace", "--tests"]).args(EMULATOR))
 }
 
 /// The options that enable the tests that need the emulators and the firmware.
