@@ -56,6 +56,8 @@ struct Reader {
     /// The pen and the points in mm of each stroke, and the byte of the file where it begins.
     strokes: Vec<(u32, usize, Vec<[f64; 2]>)>,
     points: usize,
+    /// The number of sheets of paper so far. Only the first is drawn.
+    sheets: usize,
     /// The instructions that were not obeyed, with their count.
     unknown: BTreeMap<String, usize>,
     /// The byte where the label begins that the file does not end.
@@ -74,6 +76,7 @@ impl Reader {
             begin: 0,
             strokes: Vec::new(),
             points: 0,
+            sheets: 1,
             unknown: BTreeMap::new(),
             endless: None,
         }
@@ -108,6 +111,7 @@ impl Reader {
                     self.end_stroke();
                     self.interpreter.initialize(self.at, LIMITS);
                 }
+                Action::Line([_, at]) | Action::Dot(at) if self.sheets > 1 => self.at = at,
                 Action::Line([from, to]) => {
                     self.begin_at(from, begin);
                     self.stroke.push(to);
@@ -122,6 +126,10 @@ impl Reader {
                     self.end_stroke();
                     // Pen 0 puts the pen away, and the interpreter draws nothing then.
                     self.pen = if pen > 0 { pen.into() } else { self.pen };
+                }
+                Action::Sheet => {
+                    self.end_stroke();
+                    self.sheets += 1;
                 }
                 // Nobody has asked.
                 Action::Answer(_) | Action::Nothing => continue,
@@ -276,6 +284,13 @@ impl Format for HpGl {
                 1 => format!("1 instruction {name} is not obeyed"),
                 count => format!("{count} instructions {name} are not obeyed"),
             });
+        }
+        if reader.sheets > 1 {
+            notes.push(format!(
+                "the file fills {} sheets of paper (PG), and only the first one is drawn: make a \
+                 file of each",
+                reader.sheets
+            ));
         }
         if let Some(begin) = reader.endless {
             notes.push(format!(

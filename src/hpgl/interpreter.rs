@@ -35,6 +35,8 @@ pub enum Action {
     Go(Point),
     /// The pen with this number is needed, from 1; 0 puts the pen away.
     Pen(u8),
+    /// The next sheet of paper is needed for what follows.
+    Sheet,
     /// An answer is sent.
     Answer(Answer),
 }
@@ -148,6 +150,13 @@ pub struct Interpreter<B = [Vertex; VERTICES]> {
     index: u32,
     /// The line that is being drawn in dashes.
     stroke: Option<Stroke>,
+
+    /// Whether something has been drawn on the sheet.
+    has_ink: bool,
+    /// Whether the sheet is complete, so that what is drawn next needs another one.
+    is_sheet_over: bool,
+    /// What is to be drawn first on the next sheet; otherwise [`Action::Nothing`].
+    first_of_sheet: Action,
 }
 
 impl Interpreter {
@@ -190,6 +199,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
             steps: Deque::new(),
             index: 0,
             stroke: None,
+            has_ink: false,
+            is_sheet_over: false,
+            first_of_sheet: Action::Nothing,
         }
     }
 
@@ -221,17 +233,25 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.forget_instruction();
         self.letter = 0;
         self.clear_steps();
+        (self.has_ink, self.is_sheet_over) = (false, false);
     }
 
     /// Forgets what is left to do for the last byte.
     pub fn clear_steps(&mut self) {
         self.steps.clear();
         (self.index, self.stroke) = (0, None);
+        self.first_of_sheet = Action::Nothing;
+    }
+
+    /// Notes that the sheet is complete. Another one is needed before anything else is drawn, but
+    /// not if nothing has been drawn on this one.
+    pub(super) fn end_sheet(&mut self) {
+        self.is_sheet_over |= core::mem::take(&mut self.has_ink);
     }
 
     /// Whether nothing is left to do for the bytes so far, and no instruction is incomplete.
     pub fn is_idle(&self) -> bool {
-        self.steps.is_empty() && self.stroke.is_none()
+        self.steps.is_empty() && self.stroke.is_none() && self.first_of_sheet == Action::Nothing
     }
 
     /// The speed that `VS` has chosen for lines, in cm/s, in units of 2^-16; `None` if it has not.
@@ -309,6 +329,23 @@ impl<B: PolygonBuffer> Interpreter<B> {
     /// Returns the next action that results from the bytes so far. Take all actions before the next
     /// byte comes.
     pub fn next_action(&mut self) -> Option<Action> {
+        let first = core::mem::replace(&mut self.first_of_sheet, Action::Nothing);
+        if first != Action::Nothing {
+            return Some(first);
+        }
+        let action = self.next_of_steps()?;
+        if matches!(action, Action::Line(_) | Action::Dot(_)) {
+            self.has_ink = true;
+            if core::mem::take(&mut self.is_sheet_over) {
+                self.first_of_sheet = action;
+                return Some(Action::Sheet);
+            }
+        }
+        Some(action)
+    }
+
+    /// Returns the next action of the steps that are left.
+    fn next_of_steps(&mut self) -> Option<Action> {
         loop {
             if let Some(action) = self.continue_stroke() {
                 return Some(action);

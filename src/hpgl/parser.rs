@@ -29,10 +29,10 @@ pub(super) enum Mode {
 /// Instructions that have no effect on what is drawn, or that penup carries out in its own way.
 #[rustfmt::skip]
 const WITHOUT_EFFECT: &[[u8; 2]] = &[
-    *b"AC", *b"AD", *b"AF", *b"AH", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CT", *b"CV", *b"DC",
-    *b"DP", *b"EC", *b"FI", *b"FN", *b"FR", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY",
-    *b"LA", *b"MC", *b"NP", *b"NR", *b"PB", *b"PC", *b"PG", *b"PS", *b"PW", *b"QL", *b"RF", *b"RP",
-    *b"SB", *b"SG", *b"SV", *b"TD", *b"TR", *b"UL", *b"WU",
+    *b"AC", *b"AD", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CT", *b"CV", *b"DC", *b"DP", *b"EC",
+    *b"FI", *b"FN", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY", *b"LA", *b"MC", *b"NP", *b"NR",
+    *b"PB", *b"PC", *b"PS", *b"PW", *b"QL", *b"RF", *b"RP", *b"SB", *b"SG", *b"SV", *b"TD", *b"TR",
+    *b"UL", *b"WU",
 ];
 
 impl<B: PolygonBuffer> Interpreter<B> {
@@ -403,6 +403,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
                     return Err(ErrorNumber::Unknown);
                 }
             }
+            b"AF" | b"AH" | b"FR" | b"PG" => self.end_sheet(),
             name if WITHOUT_EFFECT.contains(name) => {}
             _ => return Err(ErrorNumber::Unknown),
         }

@@ -29,6 +29,7 @@ fn shown(action: &Action) -> String {
         Action::Dot(at) => format!("dot {}", units(*at)),
         Action::Go(to) => format!("go {}", units(*to)),
         Action::Pen(pen) => format!("pen {pen}"),
+        Action::Sheet => String::from("sheet"),
         Action::Answer(answer) => format!("'{answer}'"),
     }
 }
@@ -477,4 +478,21 @@ fn the_sender_is_stopped_and_goes_on() {
     }
     assert_eq!(line.send(b"\x05"), "");
     assert!(line.work(1000).ends_with("|\x06"));
+}
+
+#[test]
+fn a_sheet_that_is_drawn_on_is_followed_by_another_one() {
+    assert_eq!(
+        actions(b"PG;PD40,0;PU;PG;AF;PA0,80;PD40,80,0,0;PG;"),
+        "0,0>40,0 go 0,80 sheet 0,80>40,80 40,80>0,0"
+    );
+    // It may begin with `IN`, and with a dot.
+    assert_eq!(actions(b"PD40,0;FR;IN;PU;PD;"), "0,0>40,0 init sheet dot 40,0");
+    let mut session = interpreter();
+    let mut shown_of = |bytes: &[u8]| {
+        actions_of(&mut session, bytes).iter().map(shown).collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(shown_of(b"PD40,0;PG;"), "0,0>40,0");
+    session.abandon();
+    assert_eq!(actions_of(&mut session, b"PD0,0;").len(), 1, "what has been given up is over");
 }

@@ -12,6 +12,7 @@ use crate::hpgl::{Action, Dialect, Point, Rectangle, Session, Token, UNITS_PER_M
 use crate::index::Index;
 use crate::machine::{Machine, MachineError, Setting, State, Target, Value};
 use crate::protocol::Label;
+use core::fmt;
 
 /// HP-GL at the serial ports of a plotter.
 #[derive(Debug)]
@@ -178,6 +179,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 Outcome::Done
             }
             Action::Pen(number) => self.change_pen(number, board),
+            Action::Sheet => self.change_sheet(board),
             Action::Line(_) | Action::Dot(_) | Action::Go(_) => self.draw_action(action),
         };
         match outcome {
@@ -236,29 +238,55 @@ impl<'m, I: Index> Plotter<'m, I> {
 
     /// Waits for the pen with this number, from 1, unless it is in the holder. Pen 0 needs nothing.
     fn change_pen<B: Board>(&mut self, number: u8, board: &mut B) -> Outcome {
-        let machine = &mut self.inner.machine;
+        let machine = &self.inner.machine;
         let Some(pen) = number.checked_sub(1) else { return Outcome::Done };
+        let is_there = pen == machine.pen() || self.inner.options.one_pen;
+        if !self.hpgl.has_asked && (is_there || self.is_out_of_work()) {
+            return Outcome::Done;
+        }
+        let outcome = self.ask(format_args!("[MSG:put in pen {number}, then send ~]"), board);
+        match outcome {
+            Outcome::More => self.inner.hpgl_pen = Some(pen),
+            Outcome::Done => {
+                self.inner.hpgl_pen = None;
+                if !matches!(self.inner.machine.state(), State::Alarm(_) | State::Sleep) {
+                    self.inner.machine.set_pen(pen);
+                }
+            }
+            Outcome::Waits | Outcome::Refused => {}
+        }
+        outcome
+    }
+
+    /// Waits for the next sheet of paper.
+    fn change_sheet<B: Board>(&mut self, board: &mut B) -> Outcome {
+        if !self.hpgl.has_asked && self.is_out_of_work() {
+            return Outcome::Done;
+        }
+        self.ask(format_args!("[MSG:put in the next sheet, then send ~]"), board)
+    }
+
+    /// Whether the machine does not draw.
+    fn is_out_of_work(&self) -> bool {
+        matches!(self.inner.machine.state(), State::Alarm(_) | State::Sleep | State::Check)
+    }
+
+    /// Lets the machine stand at the end of all moves until `~`, and says why. Done once it goes
+    /// on.
+    fn ask<B: Board>(&mut self, message: fmt::Arguments<'_>, board: &mut B) -> Outcome {
+        let machine = &mut self.inner.machine;
         if self.hpgl.has_asked {
             if let State::Hold { .. } = machine.state() {
                 return Outcome::Waits;
             }
             self.hpgl.has_asked = false;
-            self.inner.hpgl_pen = None;
-            if !matches!(machine.state(), State::Alarm(_) | State::Sleep) {
-                machine.set_pen(pen);
-            }
-            return Outcome::Done;
-        }
-        let is_locked = matches!(machine.state(), State::Alarm(_) | State::Sleep | State::Check);
-        if pen == machine.pen() || self.inner.options.one_pen || is_locked {
             return Outcome::Done;
         }
         if machine.state() != State::Idle || !machine.is_stopped() || machine.pause().is_err() {
             return Outcome::Waits;
         }
         self.hpgl.has_asked = true;
-        self.inner.hpgl_pen = Some(pen);
-        Reply(board).line(format_args!("[MSG:put in pen {number}, then send ~]"));
+        Reply(board).line(message);
         Outcome::More
     }
 }

@@ -141,6 +141,30 @@ fn nothing_is_answered_that_hp_gl_does_not_ask_for() {
 }
 
 #[test]
+fn the_machine_stands_until_the_next_sheet_is_there() {
+    let mut bench = Bench::small();
+    bench.board.receive(b"IN;PG;PD100,0;PU;PG;PU0,100;");
+    bench.work(3000);
+    assert!(bench.say("?").starts_with("<Idle|"), "nothing is to be drawn on the next sheet");
+    bench.board.receive(b"PD100,100;PD100,200;PU;PG;");
+    bench.work(3000);
+    let status = bench.say("?");
+    assert!(status.starts_with("<Hold:0|") && !status.contains("|Pen:"), "{status}");
+    assert!(inked(&bench).iter().all(|[_, y]| *y == 0.0), "nothing is drawn on the first sheet");
+    bench.board.receive(b"~");
+    bench.work(3000);
+    assert!(bench.say("?").starts_with("<Idle|"));
+    for point in [[0.0, 200.0], [200.0, 200.0], [200.0, 400.0]] {
+        assert!(inked(&bench).contains(&point), "{point:?}");
+    }
+    // The sheet is asked for at the other port.
+    let mut bench = Bench::small();
+    bench.board.receive_by(1, b"$I\n");
+    let heard = draw(&mut bench, b"IN;PD100,0;PG;PD100,100;");
+    assert!(heard.contains("[MSG:put in the next sheet, then send ~]"), "{heard}");
+}
+
+#[test]
 fn pens_are_asked_for_when_they_differ_and_status_tells_which() {
     let mut bench = Bench::small();
     bench.board.receive(b"IN;SP1;PD100,0;SP1;PD200,0;SP3;PD300,0;");

@@ -118,6 +118,17 @@ fn a_label_without_an_end_is_told() {
 }
 
 #[test]
+fn of_several_sheets_the_first_is_drawn_and_the_others_are_told() {
+    let first = "IN;PG;PD40,0;PU;";
+    let rest = "PG;IN;PU0,40;PD40,40;PU;PG;PU0,80;PD;PG;";
+    assert_eq!(lines(&[first, rest].concat()), lines(first));
+    let told = "the file fills 3 sheets of paper (PG), and only the first one is drawn: make a \
+                file of each";
+    assert_eq!(notes("a.plt", [first, rest].concat().as_bytes()), [told]);
+    assert!(notes("a.plt", [first, "PG;"].concat().as_bytes()).is_empty());
+}
+
+#[test]
 fn what_is_not_drawn_is_counted_or_refused() {
     assert_eq!(
         notes("a.plt", b"IN;PD40,0;UC1,2;BLx\x03UC;FT9;"),
