@@ -352,7 +352,8 @@ export function quickCore(chip, xip, callCycles) {
             const low = countBits(op & 0xff);
             const bytes = 4 * (low + ((op >>> 8) & 1));
             let address = (r[13] - bytes) >>> 0;
-            if (bytes === 0 || !canStore(address, 4) || !canStore(address + bytes - 4, 4)) break run;
+            if (bytes === 0 || !canStore(address, 4)) break run;
+            if (!canStore(address + bytes - 4, 4)) break run;
             r[13] = address;
             let at = (address - RAM) >>> 2;
             for (let i = 0; i < 8; i++) if (op & (1 << i)) ram32[at++] = r[i];
