@@ -24,6 +24,8 @@ pub struct Session {
     interpreter: Interpreter,
     /// The action that is being carried out.
     action: Action,
+    /// Whether the user has been asked for the pen or the sheet that it needs.
+    has_asked: bool,
     /// Whether bytes were lost since the last call of [`Session::take_loss`].
     has_lost: bool,
 }
@@ -38,6 +40,7 @@ impl Session {
             handshake: Handshake::new(),
             interpreter: Interpreter::new(),
             action: Action::Nothing,
+            has_asked: false,
             has_lost: false,
         }
     }
@@ -65,7 +68,17 @@ impl Session {
     pub fn forget(&mut self) {
         (self.first, self.count) = (0, 0);
         self.interpreter.abandon();
-        self.action = Action::Nothing;
+        (self.action, self.has_asked) = (Action::Nothing, false);
+    }
+
+    /// Whether the user has been asked for the pen or the sheet that the action needs.
+    pub fn has_asked(&self) -> bool {
+        self.has_asked
+    }
+
+    /// Notes that the user has been asked for it.
+    pub fn note_asked(&mut self) {
+        self.has_asked = true;
     }
 
     /// How many more bytes can be received.
@@ -146,7 +159,7 @@ impl Session {
 
     /// Ends the action.
     pub fn end_action(&mut self) {
-        self.action = Action::Nothing;
+        (self.action, self.has_asked) = (Action::Nothing, false);
     }
 
     /// Ends the action without carrying it out, because the machine is locked.

@@ -22,8 +22,6 @@ pub(super) struct HpGl<'m> {
     /// The port whose HP-GL is carried out.
     port: Option<usize>,
     session: &'m mut Session,
-    /// Whether the user has been asked for the pen that the current action needs.
-    has_asked: bool,
     /// Whether something was to be drawn while the machine was locked. Nothing is drawn then until
     /// the next `IN`.
     was_locked: bool,
@@ -45,7 +43,7 @@ impl<'m> HpGl<'m> {
     /// Without HP-GL, in the memory of `session`.
     pub(super) fn new(session: &'m mut Session) -> Self {
         let dialects = [Dialect::new(); PORT_LIMIT];
-        Self { dialects, port: None, session, has_asked: false, was_locked: false }
+        Self { dialects, port: None, session, was_locked: false }
     }
 
     /// The port at which HP-GL is in force or still carried out.
@@ -101,7 +99,7 @@ impl<'m, I: Index> Plotter<'m, I> {
                 let (at, limits) = frame(&self.inner.machine);
                 self.hpgl.session.begin(beginning, byte, at, limits);
                 self.hpgl.port = Some(port);
-                (self.hpgl.has_asked, self.hpgl.was_locked) = (false, false);
+                self.hpgl.was_locked = false;
                 self.inner.hpgl_pen = None;
                 self.mute(board);
             }
@@ -166,6 +164,10 @@ impl<'m, I: Index> Plotter<'m, I> {
     /// Carries out the next action. Returns whether there was anything to do.
     fn carry_out_action<B: Board>(&mut self, board: &mut B) -> bool {
         let action = self.hpgl.session.action().clone();
+        if !self.hpgl.session.has_asked() {
+            // The sender may have taken the request for a pen back.
+            self.inner.hpgl_pen = None;
+        }
         let outcome = match action {
             Action::Nothing => return !self.hpgl.session.is_idle(),
             Action::Answer(answer) => {
@@ -241,7 +243,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         let machine = &self.inner.machine;
         let Some(pen) = number.checked_sub(1) else { return Outcome::Done };
         let is_there = pen == machine.pen() || self.inner.options.one_pen;
-        if !self.hpgl.has_asked && (is_there || self.is_out_of_work()) {
+        if !self.hpgl.session.has_asked() && (is_there || self.draws_nothing()) {
             return Outcome::Done;
         }
         let outcome = self.ask(format_args!("[MSG:put in pen {number}, then send ~]"), board);
@@ -260,14 +262,14 @@ impl<'m, I: Index> Plotter<'m, I> {
 
     /// Waits for the next sheet of paper.
     fn change_sheet<B: Board>(&mut self, board: &mut B) -> Outcome {
-        if !self.hpgl.has_asked && self.is_out_of_work() {
+        if !self.hpgl.session.has_asked() && self.draws_nothing() {
             return Outcome::Done;
         }
         self.ask(format_args!("[MSG:put in the next sheet, then send ~]"), board)
     }
 
-    /// Whether the machine does not draw.
-    fn is_out_of_work(&self) -> bool {
+    /// Whether the machine draws nothing in its present state, so that it needs no pen and no sheet.
+    fn draws_nothing(&self) -> bool {
         matches!(self.inner.machine.state(), State::Alarm(_) | State::Sleep | State::Check)
     }
 
@@ -275,17 +277,16 @@ impl<'m, I: Index> Plotter<'m, I> {
     /// on.
     fn ask<B: Board>(&mut self, message: fmt::Arguments<'_>, board: &mut B) -> Outcome {
         let machine = &mut self.inner.machine;
-        if self.hpgl.has_asked {
-            if let State::Hold { .. } = machine.state() {
-                return Outcome::Waits;
-            }
-            self.hpgl.has_asked = false;
-            return Outcome::Done;
+        if self.hpgl.session.has_asked() {
+            return match machine.state() {
+                State::Hold { .. } => Outcome::Waits,
+                _ => Outcome::Done,
+            };
         }
         if machine.state() != State::Idle || !machine.is_stopped() || machine.pause().is_err() {
             return Outcome::Waits;
         }
-        self.hpgl.has_asked = true;
+        self.hpgl.session.note_asked();
         Reply(board).line(message);
         Outcome::More
     }

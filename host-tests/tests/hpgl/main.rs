@@ -165,6 +165,29 @@ fn the_machine_stands_until_the_next_sheet_is_there() {
 }
 
 #[test]
+fn what_the_sender_takes_back_has_not_been_asked_for() {
+    for (first, next) in [("SP3;", "SP2;PD300,0;"), ("SP3;", "SP1;PD100,0;PU;PG;PD300,0;")] {
+        let mut bench = Bench::small();
+        bench.board.receive(format!("IN;SP1;PD50,0;PU;{first}PD200,0;").as_bytes());
+        bench.work(3000);
+        assert!(bench.say("?").contains("|Pen:3|"));
+        // `ESC.K` forgets the change of pens and the line behind it.
+        bench.board.receive(b"\x1B.K");
+        bench.work(3000);
+        assert!(!bench.say("?").contains("|Pen:"));
+        bench.board.receive(b"~");
+        bench.work(3000);
+        assert!(bench.say("?").starts_with("<Idle|"));
+        bench.board.receive(next.as_bytes());
+        bench.work(3000);
+        let status = bench.say("?");
+        assert!(status.starts_with("<Hold:0|"), "{next} {status}");
+        let ink = inked(&bench);
+        assert!(ink.iter().all(|[x, _]| *x <= 200.0), "{next} {ink:?}");
+    }
+}
+
+#[test]
 fn pens_are_asked_for_when_they_differ_and_status_tells_which() {
     let mut bench = Bench::small();
     bench.board.receive(b"IN;SP1;PD100,0;SP1;PD200,0;SP3;PD300,0;");
