@@ -226,6 +226,26 @@ fn sift_down(heap: &mut dyn Heap, count: usize, mut parent: usize) {
     }
 }
 
+/// Cancels what other threads compute when a flag is set.
+#[cfg(feature = "threads")]
+pub(crate) struct CancelFlag<'f>(&'f core::sync::atomic::AtomicBool);
+
+#[cfg(feature = "threads")]
+impl<'f> CancelFlag<'f> {
+    /// Cancels when `is_cancelled` becomes true.
+    pub(crate) fn new(is_cancelled: &'f core::sync::atomic::AtomicBool) -> Self {
+        Self(is_cancelled)
+    }
+}
+
+#[cfg(feature = "threads")]
+impl Cancel for CancelFlag<'_> {
+    fn check(&mut self) -> Result<(), Aborted> {
+        let is_cancelled = self.0.load(core::sync::atomic::Ordering::Relaxed);
+        if is_cancelled { Err(Aborted) } else { Ok(()) }
+    }
+}
+
 /// The error that the user has cancelled the job while it was being computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]

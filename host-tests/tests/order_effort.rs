@@ -185,7 +185,7 @@ fn a_computer_is_within_a_hundredth_of_what_lkh_found() {
     for (seed, best) in (1..).zip(BY_LKH) {
         let (length, units) = by_a_computer(&random(1000, seed));
         assert!(length <= 1.01 * best, "seed {seed}: {length:.1} mm, by LKH {best:.1} mm");
-        // More would take longer than a tenth of a second.
+        // More would take two cores longer than a tenth of a second.
         assert!(units <= 12_500_000, "seed {seed}: {units} units");
     }
 }

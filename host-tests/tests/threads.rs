@@ -1,13 +1,17 @@
-//! Hidden lines on all cores are those of one core, stretch by stretch.
+//! Hidden lines on all cores are those of one core, stretch by stretch, and so is the order.
 
+use penup::drawing::{Drawing, Segment};
 use penup::geometry::Projection;
+use penup::index::Index;
 use penup::model::Elements;
+use penup::order::{self, Effort, FirstStrokes, Leg, OrderError, Shape, TimeModel};
 use penup::stage::{Aborted, Cancel, NeverCancel, Scratch};
 use penup::visibility::threads::{self, find_stretches_in_parts};
 use penup::visibility::{
     Crease, Options, Report, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError,
     find_stretches, scratch_bytes,
 };
+use penup_host_tests::order_drawings::{KINDS, Strokes, random};
 use penup_host_tests::random_scenes::random_scene;
 use penup_host_tests::scene_files::{Model, Stretches, View};
 use proptest::prelude::*;
@@ -135,4 +139,98 @@ fn what_is_refused_on_one_core_is_refused_on_all() {
     let found = search(&scene, Options::default(), part, (&mut NeverCancel, &mut Room(0)));
     assert!(matches!(known, Err(VisibilityError::UnknownVertex(_))));
     assert_eq!(known, found);
+}
+
+/// The options with which a computer orders for a plotter.
+fn by_a_computer(shape: Shape) -> order::Options {
+    let time_model = TimeModel { units_per_second: TimeModel::COMPUTER, ..TimeModel::default() };
+    let effort = Effort::Auto(time_model);
+    order::Options { effort, shape, lift_cost: 2 * 80 * 256, ..order::Options::default() }
+}
+
+/// Orders the strokes behind the first `drawn`, with numbers of this width. Returns the segments
+/// and directions of the tour.
+fn order_with<I: Index>(
+    strokes: &Strokes,
+    drawn: usize,
+    options: order::Options,
+    cancel: &mut dyn Cancel,
+) -> Result<(Vec<(usize, bool)>, order::Report), OrderError> {
+    let number = |number: u32| I::new(number as usize);
+    let segment =
+        |segment: &Segment<u32>| Segment::new(number(segment.from()), number(segment.to()));
+    let segments: Vec<Segment<I>> = strokes.segments.iter().map(segment).collect();
+    let drawing = Drawing { points: &strokes.points, segments: &segments };
+    let mut memory = vec![0; 64 * segments.len() + 8192];
+    let mut tour = vec![Leg::new(I::ZERO, false); segments.len()];
+    let scratch = Scratch::new(&mut memory);
+    let report = if drawn == 0 {
+        order::order(drawing, options, scratch, cancel, &mut tour)?
+    } else {
+        let first = FirstStrokes { segments: drawn, ..FirstStrokes::default() };
+        order::first_legs(&mut tour[..drawn]);
+        let (drawn, rest) = tour.split_at_mut(drawn);
+        order::order_rest(drawing, first, drawn, options, scratch, cancel, rest)?
+    };
+    Ok((tour.iter().map(|leg| (leg.segment(), leg.reversed())).collect(), report))
+}
+
+#[test]
+fn the_order_depends_neither_on_the_cores_nor_on_the_width_of_its_numbers() {
+    let pools = [1, 2, 5].map(|threads| {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("some threads")
+    });
+    for ((name, make), seed) in KINDS.into_iter().zip(1..) {
+        for (shape, drawn) in [(Shape::OpenPath, 0), (Shape::ClosedCycle, 0), (Shape::OpenPath, 20)]
+        {
+            let strokes = &make(900, seed);
+            let options = by_a_computer(shape);
+            let order = || order_with::<u32>(strokes, drawn, options, &mut NeverCancel);
+            let expected = order().expect("an order");
+            for pool in &pools {
+                assert!(pool.install(order).expect("an order") == expected, "{name} {shape:?}");
+            }
+            let narrow = order_with::<u16>(strokes, drawn, options, &mut NeverCancel);
+            assert!(narrow.expect("an order") == expected, "{name} {shape:?}, numbers of 16 bits");
+            let mut segments: Vec<_> = expected.0.iter().map(|&(segment, _)| segment).collect();
+            segments.sort_unstable();
+            assert!(segments.into_iter().eq(0..strokes.segments.len()), "{name} {shape:?}");
+        }
+    }
+}
+
+#[test]
+fn all_cores_find_what_one_core_finds_and_a_board_does_not() {
+    for (count, drawn) in [(800, 0), (1300, 0), (3300, 0), (900, 10)] {
+        for shape in [Shape::OpenPath, Shape::ClosedCycle] {
+            let strokes = &random(count, count);
+            let options = by_a_computer(shape);
+            let pen_up = |options| {
+                let order = order_with::<u32>(strokes, drawn, options, &mut NeverCancel);
+                order.expect("an order").1.pen_up
+            };
+            let with = |effort| pen_up(order::Options { effort, ..options });
+            let [all_cores, board] = [options.effort, Effort::default()].map(with);
+            // One core has the same units for each move, all at once.
+            let one_core = with(Effort::Units(10_000));
+            let table = format!("{count} {shape:?}: {all_cores}, {board}, {one_core}");
+            println!("{table}");
+            assert!(all_cores < board / 100 * 99, "{table}");
+            assert!(all_cores < one_core / 100 * 101, "{table}");
+        }
+    }
+}
+
+#[test]
+fn an_order_on_all_cores_can_be_cancelled() {
+    let strokes = &random(900, 1);
+    let options = by_a_computer(Shape::OpenPath);
+    let mut all = CancelAfter(usize::MAX);
+    order_with::<u32>(strokes, 0, options, &mut all).expect("an order");
+    let asked = usize::MAX - all.0;
+    for part in 0..16 {
+        let mut cancel = CancelAfter(asked * part / 16);
+        let order = order_with::<u32>(strokes, 0, options, &mut cancel);
+        assert_eq!(order.err(), Some(OrderError::Aborted), "after {part} of 16 parts");
+    }
 }

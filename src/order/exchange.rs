@@ -176,6 +176,12 @@ impl<'s, 'a, I: Index> Exchanges<'s, 'a, I> {
         })
     }
 
+    /// Takes all stations out of the queue.
+    #[cfg(feature = "threads")]
+    pub fn rest(&mut self) {
+        while self.waiting.next().is_some() {}
+    }
+
     /// Returns the scratch memory needed for this many stations, chains, and legs including the
     /// gap, in bytes. The cache of distances takes whatever else there is.
     pub const fn bytes(stations: usize, chains: usize, legs: usize) -> usize {

@@ -21,16 +21,19 @@
 //! hundreds of them are needed to see a rate. A further first tour is made only if it takes so
 //! little work that it may pay, too.
 
+#[cfg(feature = "threads")]
+mod stretches;
+
 use super::euler::Unused;
 use super::exchange::Exchanges;
-use super::kicks::Kicks;
+use super::kicks::{KickPlan, Kicks, Window, shorten};
 use super::metric::{length, root};
 use super::neighbours::Neighbours;
 use super::network::Network;
-use super::orient::orient;
 use super::patch_cycles::patch_cycles;
 use super::work_budget::WorkBudget;
 use super::{Effort, Leg, OrderError, TimeModel, even_part, mark_parts, reverse};
+use crate::array::MapEach;
 use crate::drawing::PagePoint;
 use crate::index::Index;
 use crate::stage::Scratch;
@@ -41,8 +44,6 @@ const NEIGHBOURS: [usize; 2] = [8, 4];
 const KICK_REACH: u32 = 6;
 /// The search ends after this many kicks (random changes) in vain for each move of the tour.
 const PATIENCE: u32 = 50;
-/// The directions of the strokes are improved after each this many kicks.
-const KICKS_BETWEEN_TURNS: u32 = 64;
 /// The part of a fixed budget that may be spent on each of the three first tours. What is left is
 /// spent on the best of them.
 const FIRST_TOUR_SHARE: u64 = 12;
@@ -62,6 +63,9 @@ const ANNEALING_UNITS_PER_MOVE: u64 = 10_000;
 const ANNEALING_PART: u64 = 32;
 /// The moves that a kick changes while it anneals are at most this many moves apart.
 const ANNEALING_REACH: u32 = 20;
+/// By how many of 256 parts of a mean move a kick may make a tour longer, at the beginning and at
+/// the end of annealing.
+const WHOLE_HEAT: [u64; 2] = [256, 0];
 
 /// A tour to be improved, and the limits for it.
 pub(super) struct Tour<'t, I> {
@@ -101,6 +105,7 @@ pub(super) fn improve<'t, I: Index>(
     };
     let Best { neighbours, moves, .. } = best;
     let cycle = scratch.take(best.route.len() + usize::from(open))?;
+    let annealing = u64::from(moves) * ANNEALING_UNITS_PER_MOVE;
     let first = match effort {
         Effort::Auto(time_model) => Until::Exchanged(time_model),
         Effort::Units(units) => {
@@ -109,7 +114,8 @@ pub(super) fn improve<'t, I: Index>(
     };
     best.restore(cycle);
     let mut pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
-    if pays {
+    let all_cores = best.anneals_on_all_cores(effort, annealing);
+    if pays && all_cores.is_none() {
         patch_cycles(network, neighbours, mate, scratch.reborrow(), work_budget)?;
         best.follow(mate, start, None, cycle, scratch.reborrow(), work_budget)?;
         pays = best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
@@ -131,18 +137,25 @@ pub(super) fn improve<'t, I: Index>(
                 shortest = (length, Some(corner));
             }
         }
-        best.follow(mate, None, shortest.1, cycle, scratch.reborrow(), work_budget)?;
-        best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
+        // Annealing leaves nothing of what makes a further first tour a little better.
+        if all_cores.is_none() || shortest.0 < best.cost / 32 * 41 {
+            best.follow(mate, None, shortest.1, cycle, scratch.reborrow(), work_budget)?;
+            best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
+        }
     }
-    let annealing = u64::from(moves) * ANNEALING_UNITS_PER_MOVE;
+    #[cfg(feature = "threads")]
+    if let Some(time_model) = all_cores {
+        (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
+        return best.anneal_on_all_cores(cycle, time_model, scratch, work_budget);
+    }
     let last = match effort {
         Effort::Auto(time_model) if best.pays(annealing, ANNEALING_PART, time_model, best.cost) => {
-            Until::Annealed(annealing)
+            Until::Annealed { units: annealing, heat: WHOLE_HEAT }
         }
         Effort::Auto(time_model) => Until::Unpaid(time_model),
         Effort::Units(units) => {
             let budget = u64::from(moves) * u64::from(units);
-            Until::Annealed(budget.saturating_sub(best.spent))
+            Until::Annealed { units: budget.saturating_sub(best.spent), heat: WHOLE_HEAT }
         }
     };
     // Lifts get their cost only now: with a cost from the start, the exchanges that shorten the
@@ -177,7 +190,8 @@ pub(super) fn improve_further<'r, I: Index>(
         let lift = u64::from(lift_cost) + 1;
         best.cost = first_move.into_iter().chain(moves).map(|length| length + lift).sum();
         best.restore(cycle);
-        best.work_on(cycle, Until::Annealed(units), scratch, work_budget)?;
+        let until = Until::Annealed { units, heat: WHOLE_HEAT };
+        best.work_on(cycle, until, scratch, work_budget)?;
     }
     Ok(())
 }
@@ -190,8 +204,14 @@ enum Until {
     Spent(u64),
     /// When exchanges alone find nothing better any more. No kick is made.
     Exchanged(TimeModel),
-    /// When this many units of work are spent. A kick may make the tour longer, by less and less.
-    Annealed(u64),
+    /// When this many units of work are spent. A kick may make the tour longer, by less and less:
+    /// at first and at last by so many of 256 parts of a mean move.
+    Annealed {
+        /// The units of work.
+        units: u64,
+        /// By how many parts of a mean move at first, and at last.
+        heat: [u64; 2],
+    },
     /// When the kicks save less time than they take.
     Unpaid(TimeModel),
 }
@@ -200,7 +220,10 @@ impl Until {
     /// Returns the units of work that may be spent.
     fn budget(self) -> u64 {
         // Work without a limit ends by itself long before this number of units.
-        if let Self::Spent(units) | Self::Annealed(units) = self { units } else { u64::MAX >> 1 }
+        match self {
+            Self::Spent(units) | Self::Annealed { units, .. } => units,
+            Self::Exchanged(_) | Self::Unpaid(_) => u64::MAX >> 1,
+        }
     }
 }
 
@@ -334,49 +357,46 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
         work_budget.grant(until.budget());
         shorten(&mut tour, choices, work_budget)?;
         let mut pays = true;
-        let (mut window, mut hottest, mut reach) = (None, 0, KICK_REACH);
-        let spent = until.budget() - work_budget.left();
+        let mut plan = KickPlan {
+            heat: [0; 2],
+            reach: KICK_REACH,
+            patience: PATIENCE.saturating_mul(self.moves),
+            window: None,
+        };
+        let budget = until.budget();
+        let spent = budget - work_budget.left();
         match until {
             Until::Spent(_) => work_budget.grant(0),
             Until::Exchanged(time_model) => {
                 pays = self.pays(spent, FIRST_TOUR_PART, time_model, tour.cost());
                 work_budget.grant(0);
             }
-            Until::Annealed(_) => {
-                (hottest, reach) = (self.mean_move(tour.cost()), ANNEALING_REACH);
+            Until::Annealed { heat, .. } => {
+                let mean = self.mean_move(tour.cost());
+                plan.heat = heat.map_each(|part| mean * part);
+                plan.reach = ANNEALING_REACH;
             }
-            Until::Unpaid(time_model) => window = Some(self.window(time_model, tour.cost())),
+            Until::Unpaid(time_model) => plan.window = Some(self.window(time_model, tour.cost())),
         }
         self.spent += spent;
-        let patience = PATIENCE.saturating_mul(self.moves);
-        let kicks = &mut self.kicks;
-        let mut in_vain = 0;
-        let mut window_gain = 0;
-        let mut window_begin = work_budget.left();
-        for count in 1.. {
-            if in_vain >= patience || work_budget.is_over() {
-                break;
-            }
-            // Of 256 parts of the budget; the mean length of a move is below 2^31.
-            let parts_left = work_budget.left() / (until.budget() / 256 + 1);
-            let heat = ((hottest * parts_left) >> 8) as u32;
-            let mut gain = kicks.kick(&mut tour, reach, heat, work_budget)?;
-            if count % KICKS_BETWEEN_TURNS == 0 {
-                gain += shorten(&mut tour, choices, work_budget)?;
-            }
-            in_vain = if gain > 0 { 0 } else { in_vain + 1 };
-            window_gain += gain;
-            if let Some(Window { units, least_gain }) = window
-                && window_begin - work_budget.left() >= units
-            {
-                if window_gain < least_gain {
-                    break;
-                }
-                (window_gain, window_begin) = (0, work_budget.left());
-            }
-        }
+        self.kicks.improve(&mut tour, plan, budget, choices, work_budget)?;
         self.keep(&tour);
         Ok(pays)
+    }
+
+    /// Returns the time model if the tour is to be annealed on all cores, which takes so many units
+    /// of work.
+    #[inline(always)] // On a board it is never so.
+    fn anneals_on_all_cores(&self, effort: Effort, annealing: u64) -> Option<TimeModel> {
+        #[cfg(feature = "threads")]
+        if let Effort::Auto(time_model) = effort
+            && time_model.units_per_second >= TimeModel::COMPUTER
+            && self.has_stretches()
+            && self.pays(annealing, ANNEALING_PART, time_model, self.cost)
+        {
+            return Some(time_model);
+        }
+        None
     }
 
     /// Whether so many units of work save more time than they take, if they make a tour that costs
@@ -432,32 +452,6 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
             reverse(self.route);
         }
     }
-}
-
-/// A stretch of work at whose end it is decided whether kicks still pay.
-struct Window {
-    /// The units of work in it.
-    units: u64,
-    /// The least gain with which the work goes on, in 1/256 steps.
-    least_gain: i64,
-}
-
-/// Exchanges moves and reverses strokes until neither makes the tour shorter. Returns by how much
-/// it became shorter.
-fn shorten<I: Index>(
-    tour: &mut Exchanges<'_, '_, I>,
-    choices: &mut [u8],
-    work_budget: &mut WorkBudget<'_>,
-) -> Result<i64, OrderError> {
-    let mut gain = tour.exchange_all(true, work_budget)?;
-    while !work_budget.is_over() {
-        let more = orient(tour, choices, work_budget)?;
-        if more == 0 {
-            break;
-        }
-        gain += more + tour.exchange_all(true, work_budget)?;
-    }
-    Ok(gain)
 }
 
 /// Returns the most scratch memory that is in use at any time, in bytes.

@@ -14,7 +14,8 @@
 //! 4. `improve` shortens the tour of several parts: `patch_cycles` changes pen-up moves so that
 //!    they join the parts, `exchange` exchanges moves while that helps (`search` finds the
 //!    exchanges), `orient` chooses the direction of each stroke, and `kicks` changes the tour at
-//!    random where nothing else helps any more.
+//!    random where nothing else helps any more. On a computer, all cores may share the last of
+//!    these (`improve::stretches`).
 //!
 //! Where the pen begins while this is done, `first` chooses the strokes that it draws meanwhile.
 //!
@@ -156,7 +157,9 @@ impl TimeModel {
     /// (`cargo xtask bench --board pico`), does this many at 125 MHz.
     pub const BOARD: u32 = 250_000;
     /// The units that count as one second where a computer computes for a plotter. They are more
-    /// than it does in that time, because the plotter draws meanwhile.
+    /// than it does in that time, because the plotter draws meanwhile. With this many or more, and
+    /// with the feature `threads`, all cores of the computer share the work on a long tour. The
+    /// tour does not depend on their number.
     pub const COMPUTER: u32 = 30_000_000;
 }
 

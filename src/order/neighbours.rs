@@ -94,6 +94,29 @@ impl<'a, I: Index> Neighbours<'a, I> {
         Ok(Self { lists, per_station })
     }
 
+    /// Writes to `lists` what the lists of these stations hold of each other. `number` has for each
+    /// station its number in the result, or [`Index::NONE`].
+    #[cfg(feature = "threads")]
+    pub fn part<'p>(
+        &self,
+        stations: &[I],
+        number: &[I],
+        lists: &'p mut std::vec::Vec<I>,
+    ) -> Neighbours<'p, I> {
+        let entries = Self::entries(self.per_station);
+        for (count, &station) in (1..).zip(stations) {
+            for Candidate { station, length } in self.of(station) {
+                let number = number[station.get()];
+                if number != I::NONE {
+                    lists.push(number);
+                    lists.extend(I::HAS_ROOM.then(|| I::new(length as usize)));
+                }
+            }
+            lists.resize(count * entries, I::NONE);
+        }
+        Neighbours { lists, per_station: self.per_station }
+    }
+
     /// Returns the number of entries of the list of each station.
     const fn entries(per_station: usize) -> usize {
         if I::HAS_ROOM { 2 * per_station } else { per_station }

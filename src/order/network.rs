@@ -143,6 +143,22 @@ impl<'a, I: Index> Network<'a, I> {
         Ok(Self { points: drawing.points, segments: drawing.segments, at, ends, outer, anchor })
     }
 
+    /// Returns a part of this network, whose stations lie at the points `at` and whose chains join
+    /// the stations `ends`. The anchor stays. It cannot be [expanded](Self::expand).
+    #[cfg(feature = "threads")]
+    pub fn part<'p>(&self, at: &'p [I], ends: &'p [[I; 2]]) -> Network<'p, I>
+    where
+        'a: 'p,
+    {
+        Network { at, ends, outer: &[], ..*self }
+    }
+
+    /// Returns the number of the point at which a station lies.
+    #[cfg(feature = "threads")]
+    pub fn point(&self, station: I) -> I {
+        self.at[station.get()]
+    }
+
     /// Returns the number of stations, the points where the pen may stop or turn.
     pub fn stations(&self) -> I {
         I::new(self.at.len())

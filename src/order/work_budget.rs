@@ -36,6 +36,15 @@ impl<'a> WorkBudget<'a> {
         if self.done >= Self::UNITS { self.check() } else { Ok(()) }
     }
 
+    /// Counts any number of units of work that other threads have done.
+    #[cfg(feature = "threads")]
+    pub fn work_long(&mut self, units: u64) -> Result<(), Aborted> {
+        for _ in 0..units / u64::from(Self::UNITS) {
+            self.answer()?;
+        }
+        Ok(())
+    }
+
     /// Takes the units done from the budget, and calls [`Cancel::check`].
     #[cold]
     #[inline(never)] // Inlined, it would make every search 5 % slower.

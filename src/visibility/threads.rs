@@ -15,7 +15,7 @@ use super::search::{Marks, StretchFinder};
 use super::yield_counter::YieldCounter;
 use super::{Cores, Options, Report, Scene, Stretch, StretchSink, VisibilityError, index};
 use crate::index::Index;
-use crate::stage::{Aborted, Cancel, Scratch, SinkFull};
+use crate::stage::{Cancel, CancelFlag, Scratch, SinkFull};
 use core::ops::Range;
 use core::sync::atomic::{AtomicBool, Ordering};
 use core::time::Duration;
@@ -131,7 +131,7 @@ fn search<I: Index>(
     let marks = Marks::new(faces, 0, &mut Scratch::new(&mut memory))?;
     let mut finder = StretchFinder::new(around, grid, marks, options, super::Owner::default());
     let mut found = Collected(Vec::new());
-    let mut stopping = Stopping(stop);
+    let mut stopping = CancelFlag::new(stop);
     let yield_counter = &mut YieldCounter::new(&mut stopping);
     match part {
         SearchPart::Edges(corners) => finder.follow_edges(corners, yield_counter, &mut found)?,
@@ -176,14 +176,5 @@ impl<I> StretchSink<I> for Collected<I> {
     fn stretch(&mut self, stretch: Stretch<I>) -> Result<(), SinkFull> {
         self.0.push(stretch);
         Ok(())
-    }
-}
-
-/// Cancels a part when the whole search has ended.
-struct Stopping<'s>(&'s AtomicBool);
-
-impl Cancel for Stopping<'_> {
-    fn check(&mut self) -> Result<(), Aborted> {
-        if self.0.load(Ordering::Relaxed) { Err(Aborted) } else { Ok(()) }
     }
 }
