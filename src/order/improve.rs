@@ -63,6 +63,12 @@ const ANNEALING_UNITS_PER_MOVE: u64 = 10_000;
 const ANNEALING_PART: u64 = 32;
 /// The moves that a kick changes while it anneals are at most this many moves apart.
 const ANNEALING_REACH: u32 = 20;
+/// All cores of a computer anneal a tour that has at least this many moves.
+const LEAST_SHARED_MOVES: u32 = 800;
+/// Before all cores anneal, the tour from a corner is worked on only if it is shorter than so many
+/// of 256 parts of the tour that was worked on before. Tours of hatching are, and they become
+/// better; those of random strokes are not.
+const CORNER_TOUR_PARTS: u64 = 328;
 /// By how many of 256 parts of a mean move a kick may make a tour longer, at the beginning and at
 /// the end of annealing.
 const WHOLE_HEAT: [u64; 2] = [256, 0];
@@ -138,7 +144,7 @@ pub(super) fn improve<'t, I: Index>(
             }
         }
         // Annealing leaves nothing of what makes a further first tour a little better.
-        if all_cores.is_none() || shortest.0 < best.cost / 32 * 41 {
+        if all_cores.is_none() || shortest.0 < best.cost / 256 * CORNER_TOUR_PARTS {
             best.follow(mate, None, shortest.1, cycle, scratch.reborrow(), work_budget)?;
             best.work_on(cycle, first, scratch.reborrow(), work_budget)?;
         }
@@ -384,19 +390,21 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
         Ok(pays)
     }
 
-    /// Returns the time model if the tour is to be annealed on all cores, which takes so many units
-    /// of work.
+    /// Returns the time model if the tour is to be annealed on all cores, where annealing takes so
+    /// many units of work.
     #[inline(always)] // On a board it is never so.
     fn anneals_on_all_cores(&self, effort: Effort, annealing: u64) -> Option<TimeModel> {
-        #[cfg(feature = "threads")]
-        if let Effort::Auto(time_model) = effort
-            && time_model.units_per_second >= TimeModel::COMPUTER
-            && self.has_stretches()
-            && self.pays(annealing, ANNEALING_PART, time_model, self.cost)
-        {
-            return Some(time_model);
+        match effort {
+            Effort::Auto(time_model)
+                if cfg!(feature = "threads")
+                    && time_model.units_per_second >= TimeModel::COMPUTER
+                    && self.moves >= LEAST_SHARED_MOVES
+                    && self.pays(annealing, ANNEALING_PART, time_model, self.cost) =>
+            {
+                Some(time_model)
+            }
+            _ => None,
         }
-        None
     }
 
     /// Whether so many units of work save more time than they take, if they make a tour that costs

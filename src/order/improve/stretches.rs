@@ -11,7 +11,9 @@
 //! After Karp, "Probabilistic analysis of partitioning algorithms for the traveling-salesman
 //! problem in the plane" (1977), and the tour segments of Helsgaun's LKH.
 
-use super::{ANNEALING_REACH, Best, NEIGHBOURS, Until, WHOLE_HEAT, scratch_bytes};
+use super::{
+    ANNEALING_REACH, Best, LEAST_SHARED_MOVES, NEIGHBOURS, Until, WHOLE_HEAT, scratch_bytes,
+};
 use crate::index::Index;
 use crate::order::exchange::Exchanges;
 use crate::order::kicks::{KickPlan, Kicks};
@@ -34,8 +36,6 @@ const WHOLE_UNITS: u64 = 3500;
 const STRETCH_UNITS: u64 = 5500;
 /// How often the tour is cut into stretches anew.
 const ROUNDS: u64 = 8;
-/// A stretch has at least this many moves.
-const LEAST_MOVES: u32 = 400;
 /// The most stretches. More would keep no more cores busy.
 const MOST_STRETCHES: usize = 32;
 /// The bytes of a stretch's table of distances.
@@ -43,10 +43,11 @@ const TABLE_BYTES: usize = 1 << 15;
 /// How long the calling thread waits for a stretch before it asks whether the user has cancelled.
 const TIMEOUT: Duration = Duration::from_millis(20);
 
-/// Returns into how many stretches a tour with this many moves is cut; `None` if it is too short.
-fn stretches(moves: u32) -> Option<usize> {
-    let stretches = 1 << (moves / LEAST_MOVES).checked_ilog2()?;
-    (stretches > 1).then_some(stretches.min(MOST_STRETCHES))
+/// Returns into how many stretches a tour with this many moves is cut: two for the shortest, and a
+/// power of two for all, so that the cores are equally busy.
+fn stretches(moves: u32) -> usize {
+    let parts = (moves / (LEAST_SHARED_MOVES / 2)).max(2);
+    (1 << parts.ilog2()).min(MOST_STRETCHES)
 }
 
 /// What the stretches of a tour have in common.
@@ -66,11 +67,6 @@ struct Whole<'w, I> {
 }
 
 impl<I: Index> Best<'_, '_, I> {
-    /// Whether [`Self::anneal_on_all_cores`] is made for a tour with so many moves.
-    pub(super) fn has_stretches(&self) -> bool {
-        stretches(self.moves).is_some()
-    }
-
     /// Shortens the shortest tour found so far by annealing.
     pub(super) fn anneal_on_all_cores(
         &mut self,
@@ -102,7 +98,7 @@ impl<I: Index> Best<'_, '_, I> {
                 heat: [heat_at(round), heat_at(round + 1)],
                 units_per_leg: (stretch_units << 8) / (ROUNDS * cycle.len() as u64).max(1),
             };
-            let stretches = stretches(self.moves).unwrap_or(1);
+            let stretches = stretches(self.moves);
             // The cuts lie in the middle of the former stretches, or a quarter before or behind it.
             let quarters = [2, 1, 2, 3][round as usize % 4];
             cycle.rotate_left(quarters * cycle.len() / (4 * stretches));
