@@ -62,6 +62,8 @@ pub struct Session {
     strokes: u64,
     /// How often the plotter was asked again for what did not arrive whole.
     questions: u32,
+    /// How many reports in succession say that the machine rests and that a job has stopped.
+    stops: u32,
     /// Whether the plotter computes or finds its switches, as its last status says.
     reads_no_lines: bool,
     /// Equal reports of a machine that waits, one after the other.
@@ -101,6 +103,7 @@ impl Session {
             report: None,
             strokes: 0,
             questions: 0,
+            stops: 0,
             reads_no_lines: false,
             holds: (None, String::new(), 0),
             is_given_up: false,

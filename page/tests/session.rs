@@ -117,6 +117,32 @@ fn hold_resume_and_give_up() {
     pipe.until("drawn");
 }
 
+/// A line on which the first `reports` of a plotter at rest, once it draws, say that a job has
+/// stopped.
+fn stopped(count: &mut u64, to_plotter: bool, bytes: Vec<u8>, reports: u64) -> Vec<u8> {
+    let text = String::from_utf8_lossy(&bytes);
+    if to_plotter || !text.contains("<Idle|") {
+        *count += u64::from(*count == 0 && text.contains("<Run|"));
+        return bytes;
+    }
+    if *count == 0 || *count > reports {
+        return bytes;
+    }
+    *count += 1;
+    text.replace("<Idle|", "<Idle|Stopped:2/9|").into_bytes()
+}
+
+#[test]
+fn a_drawing_that_has_stopped_before_its_end_is_not_called_drawn() {
+    let mut pipe = Pipe::new(|count, to_plotter, bytes| stopped(count, to_plotter, bytes, 1000));
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
+    let failed = pipe.until("failed");
+    assert!(failed["text"].as_str().is_some_and(|it| it.contains("before its end")), "{failed}");
+    assert!(pipe.events.iter().all(|event| event["kind"] != "drawn"), "{:?}", pipe.events);
+    // The plotter may note the last stroke a moment after it is at rest.
+    drawn(|count, to_plotter, bytes| stopped(count, to_plotter, bytes, 2));
+}
+
 #[test]
 fn what_is_refused_says_what_to_do() {
     let mut pipe = Pipe::new(clean);

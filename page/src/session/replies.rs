@@ -13,6 +13,8 @@ use std::rc::Rc;
 
 /// The most times that the checksums and the report are asked for again.
 const MOST_QUESTIONS: u32 = 10;
+/// The least number of reports in succession by which a job has stopped before its end.
+const LEAST_STOPS: u32 = 5;
 
 impl Session {
     pub(super) fn take(&mut self, reply: &Reply, raw: &str) {
@@ -150,6 +152,20 @@ impl Session {
         self.enter(Phase::Finding);
     }
 
+    /// Tells that the job has ended before its last stroke. The plotter notes that stroke a moment
+    /// after the machine is at rest, so several reports must say so.
+    fn has_stopped(&mut self) {
+        if self.stops < LEAST_STOPS {
+            return;
+        }
+        self.fail(
+            "The drawing has stopped before its end: it was given up at another port, or the \
+             plotter was reset or lost its power."
+                .to_owned(),
+        );
+        self.enter(Phase::Ready);
+    }
+
     fn alarmed(&mut self, number: u16) {
         let text = alarm(number, &self.messages);
         self.fail(text);
@@ -181,6 +197,8 @@ impl Session {
         if status.state == "Alarm" && self.phase != Phase::Alarm {
             return self.alarmed(status.alarm.unwrap_or(0));
         }
+        let is_stopped = status.is_idle() && status.stopped.is_some();
+        self.stops = if is_stopped { self.stops + 1 } else { 0 };
         match self.phase {
             Phase::Finding if status.is_idle() => {
                 // An abort loses nothing now, and clears what an earlier sender left half sent.
@@ -193,6 +211,7 @@ impl Session {
                 self.enter(Phase::Greeting);
             }
             Phase::Alarm if status.state != "Alarm" => self.enter(Phase::Finding),
+            Phase::Drawing if is_stopped => self.has_stopped(),
             Phase::Drawing if status.is_idle() => {
                 (self.report, self.questions) = (None, 0);
                 self.deliver(Rc::new(vec![JobLine::command(MODEL)]));
