@@ -1,5 +1,5 @@
-"""Tries what vpype writes with each profile of vpype-gcode, sent to an emulated board as senders for
-Grbl do."""
+"""Tries what vpype writes with each profile of vpype-gcode, sent to an emulated board as senders
+for Grbl do."""
 
 import importlib.metadata
 import os
@@ -81,8 +81,8 @@ wait_for(lambda: port.readline().startswith(b"Grbl"), 20)
 
 
 def answer():
-    """The next answer to a line. Other lines may come before it: the greeting behind `$RST=$` begins
-    with an empty one."""
+    """The next answer to a line. Other lines may come before it: the greeting behind `$RST=$`
+    begins with an empty one."""
     while True:
         received = port.readline()
         text = received.decode().strip()
@@ -99,8 +99,8 @@ def send(line):
 
 
 def stream(lines):
-    """Sends lines as senders for Grbl do, as many before the answers as its buffer holds, and yields
-    each line with its answer."""
+    """Sends lines as senders for Grbl do, as many before the answers as its buffer holds, and
+    yields each line with its answer."""
     waiting = []
     for line in lines:
         while waiting and sum(map(len, waiting)) + len(waiting) + len(line) >= BUFFER:

@@ -13,7 +13,7 @@ use penup::protocol::{ErrorEntry, alarm_entries, error_entries, error_samples};
 use penup_client::cli::Cli;
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::ops::Range;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 
 /// A table of a document: its heading, and its rows as lists of cells in plain text.
@@ -158,6 +158,42 @@ fn every_row_of_every_document_has_as_many_cells_as_its_heading() {
             }
         }
     }
+}
+
+/// The files below `folder` that are source, but for what is built or installed.
+fn sources_below(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).expect("a folder of source") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+        if path.is_dir() {
+            if !["target", "node_modules", ".git", "corpus", "artifacts"].contains(&name) {
+                sources_below(&path, found);
+            }
+        } else if ["rs", "mjs", "js", "toml", "css", "html", "py", "sh", "x"]
+            .iter()
+            .any(|end| path.extension().is_some_and(|extension| extension == *end))
+        {
+            found.push(path);
+        }
+    }
+}
+
+/// `cargo fmt` breaks no comment and no string.
+#[test]
+fn no_line_of_the_source_has_more_than_100_columns() {
+    let mut sources = Vec::new();
+    sources_below(&root(), &mut sources);
+    assert!(sources.len() > 300, "{} files", sources.len());
+    let mut long = String::new();
+    for source in sources {
+        let text = std::fs::read_to_string(&source).expect("a source in UTF-8");
+        for (number, line) in (1..).zip(text.lines()) {
+            if line.chars().count() > 100 {
+                long += &format!("{}:{number}\n", source.display());
+            }
+        }
+    }
+    assert!(long.is_empty(), "more than 100 columns:\n{long}");
 }
 
 #[test]

@@ -410,7 +410,9 @@ test("penup page draws the texts of an SVG in the fonts of the computer", async 
   const own = await program(svg);
   try {
     await fresh(own.hash, { address: own.folder });
-    await page.waitForFunction(() => /^letter/.test(document.getElementById("file-name").textContent));
+    await page.waitForFunction(() =>
+      /^letter/.test(document.getElementById("file-name").textContent),
+    );
     const drawn = await computed();
     const expected = await preview(svg);
     assert.ok(drawn.strokes.length > 5, "the rectangle, and letters");

@@ -22,7 +22,7 @@
 //! little work that it may pay, too.
 
 #[cfg(feature = "threads")]
-mod stretches;
+mod subproblems;
 
 use super::euler::Unused;
 use super::exchange::Exchanges;

@@ -15,7 +15,7 @@
 //!    they join the parts, `exchange` exchanges moves while that helps (`search` finds the
 //!    exchanges), `orient` chooses the direction of each stroke, and `kicks` changes the tour at
 //!    random where nothing else helps any more. On a computer, all cores may share the last of
-//!    these (`improve::stretches`).
+//!    these (`improve::subproblems`).
 //!
 //! Where the pen begins while this is done, `first` chooses the strokes that it draws meanwhile.
 //!

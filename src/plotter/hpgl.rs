@@ -268,7 +268,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         self.ask(format_args!("[MSG:put in the next sheet, then send ~]"), board)
     }
 
-    /// Whether the machine draws nothing in its present state, so that it needs no pen and no sheet.
+    /// Whether the machine draws nothing in its present state, so that it needs neither pen nor
+    /// sheet.
     fn draws_nothing(&self) -> bool {
         matches!(self.inner.machine.state(), State::Alarm(_) | State::Sleep | State::Check)
     }

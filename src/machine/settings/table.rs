@@ -355,7 +355,14 @@ pub const SETTINGS: &[SettingInfo] = {
         row(StrokeLead, 222, "open strokes begin early by", "mm", (0.0, 10.0, 0.0), false),
         row(StrokeTrail, 223, "open strokes end late by", "mm", (0.0, 10.0, 0.0), false),
         #[cfg(feature = "pen-overlap")]
-        row(PenDownEarly, 224, "pen goes down before a travel ends", "ms", (0.0, 500.0, 0.0), false),
+        row(
+            PenDownEarly,
+            224,
+            "pen goes down before a travel ends",
+            "ms",
+            (0.0, 500.0, 0.0),
+            false,
+        ),
         #[cfg(feature = "pen-overlap")]
         row(TravelEarly, 225, "travel begins before the pen is up", "ms", (0.0, 500.0, 0.0), false),
         #[cfg(feature = "input-shaping")]

@@ -6,8 +6,8 @@
 // interpreter then executes the instruction, before anything of it has been done here.
 //
 // The loop below calls few functions, and writes sums and differences out where they are needed:
-// JavaScript engines no longer inline calls in a function of this size, and a call takes longer than
-// most instructions.
+// JavaScript engines no longer inline calls in a function of this size, and a call takes longer
+// than most instructions.
 //
 // The cycles are those that rp2040js and `core_cycles.mjs` count. The test `pico_core` compares
 // both after each instruction, with random ones.

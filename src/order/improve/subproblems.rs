@@ -1,15 +1,16 @@
 //! Anneals a long tour on all cores of a computer.
 //!
 //! While annealing is hot it changes the tour everywhere, and one core does that. Then the tour is
-//! cut into stretches of some hundred moves, which the cores anneal at the same time. A stretch is
-//! a small tour of its own: all that lies outside it is one chain, which is never changed, so
-//! whatever a stretch becomes, the whole remains one tour. The cuts are elsewhere in each round, so
-//! that each move is sooner or later annealed with most of those around it.
+//! cut into *subproblems*, each of some hundred moves that follow each other, which the cores
+//! anneal at the same time. A subproblem is a small tour of its own: all that lies outside it is
+//! one chain, which is never changed, so whatever it becomes, the whole remains one tour. The cuts
+//! are elsewhere in each round, so that each move is sooner or later annealed with most of those
+//! around it.
 //!
-//! The number of stretches depends on the number of moves and not on that of cores, and so does the
-//! tour. Stretches have memory of their own, beside the working memory of the stage.
-//! After Karp, "Probabilistic analysis of partitioning algorithms for the traveling-salesman
-//! problem in the plane" (1977), and the tour segments of Helsgaun's LKH.
+//! The number of subproblems depends on the number of moves. It does not depend on the number of
+//! cores, nor does the tour. Subproblems have memory of their own, beside the working memory of the
+//! stage. After Karp, "Probabilistic analysis of partitioning algorithms for the traveling-salesman
+//! problem in the plane" (1977), and the subproblems of Helsgaun's LKH.
 
 use super::{
     ANNEALING_REACH, Best, LEAST_SHARED_MOVES, NEIGHBOURS, Until, WHOLE_HEAT, scratch_bytes,
@@ -29,28 +30,29 @@ use std::vec;
 use std::vec::Vec;
 
 /// The heat at which the tour is cut for the first time, in 256 parts of a mean move.
-const HEAT_OF_STRETCHES: u64 = 160;
+const SUBPROBLEM_HEAT: u64 = 160;
 /// The units of work for each move before the tour is cut.
 const WHOLE_UNITS: u64 = 3500;
-/// The units of work for each move in the stretches.
-const STRETCH_UNITS: u64 = 5500;
-/// How often the tour is cut into stretches anew.
+/// The units of work for each move in the subproblems.
+const SUBPROBLEM_UNITS: u64 = 5500;
+/// How often the tour is cut into subproblems anew.
 const ROUNDS: u64 = 8;
-/// The most stretches. More would keep no more cores busy.
-const MOST_STRETCHES: usize = 32;
-/// The bytes of a stretch's table of distances.
+/// The greatest number of subproblems. More would keep no more cores busy.
+const MOST_SUBPROBLEMS: usize = 32;
+/// The bytes of a subproblem's table of distances.
 const TABLE_BYTES: usize = 1 << 15;
-/// How long the calling thread waits for a stretch before it asks whether the user has cancelled.
+/// How long the calling thread waits for a subproblem before it asks whether the user has
+/// cancelled.
 const TIMEOUT: Duration = Duration::from_millis(20);
 
-/// Returns into how many stretches a tour with this many moves is cut: two for the shortest, and a
-/// power of two for all, so that the cores are equally busy.
-fn stretches(moves: u32) -> usize {
+/// Returns into how many subproblems a tour with this many moves is cut: two for the shortest, and
+/// a power of two for all, so that the cores are equally busy.
+fn count(moves: u32) -> usize {
     let parts = (moves / (LEAST_SHARED_MOVES / 2)).max(2);
-    (1 << parts.ilog2()).min(MOST_STRETCHES)
+    (1 << parts.ilog2()).min(MOST_SUBPROBLEMS)
 }
 
-/// What the stretches of a tour have in common.
+/// What the subproblems of a tour have in common.
 struct Whole<'w, I> {
     /// The stations and the chains of the whole tour.
     network: Network<'w, I>,
@@ -76,10 +78,10 @@ impl<I: Index> Best<'_, '_, I> {
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let [hottest, coldest] = WHOLE_HEAT;
-        let [whole_units, stretch_units] =
-            [WHOLE_UNITS, STRETCH_UNITS].map(|units| u64::from(self.moves) * units);
+        let [whole_units, subproblem_units] =
+            [WHOLE_UNITS, SUBPROBLEM_UNITS].map(|units| u64::from(self.moves) * units);
         self.restore(cycle);
-        let heat = [hottest, HEAT_OF_STRETCHES];
+        let heat = [hottest, SUBPROBLEM_HEAT];
         let until = Until::Annealed { units: whole_units, heat };
         self.work_on(cycle, until, scratch.reborrow(), work_budget)?;
         self.restore(cycle);
@@ -88,7 +90,7 @@ impl<I: Index> Best<'_, '_, I> {
         gap.fill(Leg::new(chains, false));
         let mean = self.mean_move(self.cost);
         let heat_at =
-            |round| mean * (coldest + (HEAT_OF_STRETCHES - coldest) * (ROUNDS - round) / ROUNDS);
+            |round| mean * (coldest + (SUBPROBLEM_HEAT - coldest) * (ROUNDS - round) / ROUNDS);
         for round in 0..ROUNDS {
             let whole = Whole {
                 network: self.network,
@@ -96,13 +98,13 @@ impl<I: Index> Best<'_, '_, I> {
                 gap: self.open.then_some(chains),
                 lift_cost: self.lift_cost,
                 heat: [heat_at(round), heat_at(round + 1)],
-                units_per_leg: (stretch_units << 8) / (ROUNDS * cycle.len() as u64).max(1),
+                units_per_leg: (subproblem_units << 8) / (ROUNDS * cycle.len() as u64).max(1),
             };
-            let stretches = stretches(self.moves);
-            // The cuts lie in the middle of the former stretches, or a quarter before or behind it.
+            let count = count(self.moves);
+            // The cuts lie in the middle of the former subproblems, or a quarter beside it.
             let quarters = [2, 1, 2, 3][round as usize % 4];
-            cycle.rotate_left(quarters * cycle.len() / (4 * stretches));
-            whole.anneal(cycle, stretches, &mut self.kicks, work_budget)?;
+            cycle.rotate_left(quarters * cycle.len() / (4 * count));
+            whole.anneal(cycle, count, &mut self.kicks, work_budget)?;
         }
         if self.open {
             begin_after(cycle, chains);
@@ -119,7 +121,7 @@ impl<I: Index> Whole<'_, I> {
         self.gap.is_some_and(|gap| leg.segment() == gap.get())
     }
 
-    /// Cuts `cycle` into `count` stretches and anneals them on all cores.
+    /// Cuts `cycle` into `count` subproblems and anneals them on all cores.
     fn anneal(
         &self,
         cycle: &mut [Leg<I>],
@@ -127,22 +129,22 @@ impl<I: Index> Whole<'_, I> {
         kicks: &mut Kicks,
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
-        let stretches = self.cut(cycle, count, kicks);
+        let subproblems = self.cut(cycle, count, kicks);
         let is_cancelled = &AtomicBool::new(false);
         if rayon::current_num_threads() < 2 {
             // The only thread of a pool may be this one, which must not wait for itself.
-            for stretch in stretches {
-                work_budget.work_long(stretch.anneal(self, is_cancelled)?)?;
+            for subproblem in subproblems {
+                work_budget.work_long(subproblem.anneal(self, is_cancelled)?)?;
             }
             return Ok(());
         }
         rayon::in_place_scope(|scope| {
             let (sender, receiver) = mpsc::channel();
-            for stretch in stretches {
+            for subproblem in subproblems {
                 let sender = sender.clone();
                 scope.spawn(move |_| {
                     // The other end is gone if the work has been cancelled.
-                    let _ = sender.send(stretch.anneal(self, is_cancelled));
+                    let _ = sender.send(subproblem.anneal(self, is_cancelled));
                 });
             }
             drop(sender);
@@ -152,13 +154,13 @@ impl<I: Index> Whole<'_, I> {
         })
     }
 
-    /// Cuts `cycle` into `count` stretches. No cut lies beside the gap, which has no stations.
+    /// Cuts `cycle` into `count` subproblems. No cut lies beside the gap, which has no stations.
     fn cut<'c>(
         &self,
         cycle: &'c mut [Leg<I>],
         count: usize,
         kicks: &mut Kicks,
-    ) -> Vec<Stretch<'c, I>> {
+    ) -> Vec<Subproblem<'c, I>> {
         let beside_gap = |before: Leg<I>, after: Leg<I>| self.is_gap(before) || self.is_gap(after);
         while let (Some(&first), Some(&last)) = (cycle.first(), cycle.last())
             && beside_gap(last, first)
@@ -171,7 +173,7 @@ impl<I: Index> Whole<'_, I> {
         };
         let mut before = self.network.end(last);
         let length = cycle.len().div_ceil(count.max(1));
-        let mut stretches = Vec::new();
+        let mut subproblems = Vec::new();
         let mut rest = cycle;
         while !rest.is_empty() {
             let mut at = length.min(rest.len());
@@ -185,14 +187,14 @@ impl<I: Index> Whole<'_, I> {
             let after = self.network.start(others.first().copied().unwrap_or(first));
             let outside = [after, before];
             before = self.network.end(legs.last().copied().unwrap_or(last));
-            stretches.push(Stretch { legs, outside, kicks: kicks.fork() });
+            subproblems.push(Subproblem { legs, outside, kicks: kicks.fork() });
             rest = others;
         }
-        stretches
+        subproblems
     }
 }
 
-/// Waits until all stretches are annealed, and counts their units of work.
+/// Waits until all subproblems are annealed, and counts their units of work.
 fn wait(
     receiver: &mpsc::Receiver<Result<u64, OrderError>>,
     work_budget: &mut WorkBudget<'_>,
@@ -207,25 +209,26 @@ fn wait(
     }
 }
 
-/// A stretch of a tour.
-struct Stretch<'c, I> {
+/// A subproblem of a tour.
+struct Subproblem<'c, I> {
     /// Its legs, in the order in which they are drawn; no gap is the first or the last.
     legs: &'c mut [Leg<I>],
-    /// The stations at which the rest of the tour begins, after this stretch, and ends, before it.
+    /// The stations at which the rest of the tour begins, after this subproblem, and ends, before
+    /// it.
     outside: [I; 2],
     /// Its own random numbers.
     kicks: Kicks,
 }
 
-impl<I: Index> Stretch<'_, I> {
-    /// Anneals the stretch. Returns the units of work.
+impl<I: Index> Subproblem<'_, I> {
+    /// Anneals the subproblem. Returns the units of work.
     fn anneal(self, whole: &Whole<'_, I>, is_cancelled: &AtomicBool) -> Result<u64, OrderError> {
         let Self { legs, outside, mut kicks } = self;
-        let part = Part::new(whole, legs, outside);
-        let network = part.network(whole);
+        let local = LocalNetwork::new(whole, legs, outside);
+        let network = local.network(whole);
         let mut lists = Vec::new();
-        let neighbours = whole.neighbours.part(&part.stations, &part.number, &mut lists);
-        let mut cycle = part.cycle(whole, legs);
+        let neighbours = whole.neighbours.part(&local.stations, &local.number, &mut lists);
+        let mut cycle = local.cycle(whole, legs);
         let has_gap = legs.iter().any(|&leg| whole.is_gap(leg));
         let gap = has_gap.then(|| network.chains());
         let bytes = scratch_bytes(network, cycle.len(), NEIGHBOURS[0]) + TABLE_BYTES;
@@ -243,14 +246,14 @@ impl<I: Index> Stretch<'_, I> {
         work_budget.grant(budget);
         kicks.improve(&mut tour, plan, budget, choices, work_budget)?;
         let spent = budget - work_budget.left();
-        part.write(whole, &mut cycle, legs);
+        local.write(whole, &mut cycle, legs);
         Ok(spent)
     }
 }
 
-/// The stations and chains of a stretch, with numbers of their own. The chains have the numbers 0,
-/// 1, 2 and so on in the order of the stretch; the last one is all that lies outside.
-struct Part<I> {
+/// The stations and chains of a subproblem, with numbers of their own. The chains have the numbers
+/// 0, 1, 2 and so on in the order of the subproblem; the last one is all that lies outside.
+struct LocalNetwork<I> {
     /// The number of each station in the whole.
     stations: Vec<I>,
     /// The point of each station.
@@ -263,20 +266,20 @@ struct Part<I> {
     legs: Vec<Leg<I>>,
 }
 
-impl<I: Index> Part<I> {
-    /// Numbers the stations and the chains of a stretch.
+impl<I: Index> LocalNetwork<I> {
+    /// Numbers the stations and the chains of a subproblem.
     fn new(whole: &Whole<'_, I>, legs: &[Leg<I>], outside: [I; 2]) -> Self {
         let number = vec![I::NONE; whole.network.stations().get()];
         let legs: Vec<_> = legs.iter().copied().filter(|&leg| !whole.is_gap(leg)).collect();
-        let mut part =
+        let mut local =
             Self { stations: Vec::new(), at: Vec::new(), number, ends: Vec::new(), legs };
-        for at in 0..part.legs.len() {
-            let leg = part.legs[at];
-            part.add([whole.network.start(leg), whole.network.end(leg)]);
+        for at in 0..local.legs.len() {
+            let leg = local.legs[at];
+            local.add([whole.network.start(leg), whole.network.end(leg)]);
         }
-        part.add(outside);
-        part.at = part.stations.iter().map(|&station| whole.network.point(station)).collect();
-        part
+        local.add(outside);
+        local.at = local.stations.iter().map(|&station| whole.network.point(station)).collect();
+        local
     }
 
     /// Adds a chain between these stations of the whole.
@@ -292,7 +295,7 @@ impl<I: Index> Part<I> {
         self.ends.push(ends);
     }
 
-    /// Returns the network of the stretch. Its anchor matters only if the gap is in it.
+    /// Returns the network of the subproblem. Its anchor matters only if the gap is in it.
     fn network<'p>(&'p self, whole: &Whole<'p, I>) -> Network<'p, I> {
         whole.network.part(&self.at, &self.ends)
     }
@@ -302,7 +305,7 @@ impl<I: Index> Part<I> {
         self.legs.len()
     }
 
-    /// Returns the stretch, whose legs in the whole are given, as a cycle.
+    /// Returns the subproblem, whose legs in the whole are given, as a cycle.
     fn cycle(&self, whole: &Whole<'_, I>, legs: &[Leg<I>]) -> Vec<Leg<I>> {
         let mut next = 0;
         let inside = legs.iter().map(|&leg| {
@@ -315,7 +318,7 @@ impl<I: Index> Part<I> {
         inside.chain([Leg::new(I::new(self.outside()), false)]).collect()
     }
 
-    /// Writes the stretch, which is given as a cycle, to its legs in the whole.
+    /// Writes the subproblem, which is given as a cycle, to its legs in the whole.
     fn write(&self, whole: &Whole<'_, I>, cycle: &mut [Leg<I>], legs: &mut [Leg<I>]) {
         begin_after(cycle, I::new(self.outside()));
         for (slot, leg) in legs.iter_mut().zip(cycle.iter()) {
