@@ -44,7 +44,7 @@ function number() {
   const small = random(40);
   const wide = random(0x100000000);
   return [small, -small >>> 0, 0x80000000, 0x7fffffff, wide, RAM + 0x800 + random(4096),
-    RAM + 0x800 + 4 * random(1024), FLASH + 4 * random(1024), 0xd0000000, 0x40054000][random(10)];
+    RAM + 0x800 + 4 * random(1024), FLASH + 4 * random(1024), 0xd0000000, 0xd0000060, 0x40054000][random(11)];
 }
 // The bit that is shifted out last, to the left, to the right, and to the right with the sign.
 function shiftedOut(shift, value, by) {
@@ -56,8 +56,13 @@ for (let count = 0; count < Number(cases); count++) {
   const inFlash = random(2) === 1;
   const pc = inFlash ? FLASH + 0x2000 + 8 * random(64) : CODE + 2 * random(64);
   const isCall = random(8) === 0;
-  const op = [isCall ? 0xf000 | random(0x800) : random(0x10000),
-    isCall ? 0xd000 | random(0x1000) | (random(2) << 13) : random(0x10000)];
+  // Barriers, and what reads the mask of interrupts and other special registers.
+  const isSystem = random(32) === 0;
+  const op = isSystem
+    ? [[0xf3bf, 0x8f00 | random(256)], [0xf3ef, 0x8000 | (random(8) << 8) | 16 * random(2)]][random(2)]
+    : [isCall ? 0xf000 | random(0x800) : random(0x10000),
+      isCall ? 0xd000 | random(0x1000) | (random(2) << 13) : random(0x10000)];
+  const isMasked = random(2) === 1;
   const registers = Array.from({ length: 13 }, number);
   const flags = Array.from({ length: 4 }, () => random(2) === 1);
   // No result is negative and zero.
@@ -68,12 +73,15 @@ for (let count = 0; count < Number(cases); count++) {
       (inFlash ? chip.flash16 : new Uint16Array(chip.sram.buffer))[at >> 1] = half;
     });
     core.registers.set([...registers, RAM + 0x1000, 0x10000101, pc]);
-    [core.N, core.Z, core.C, core.V] = flags;
+    [core.N, core.Z, core.C, core.V, core.PM] = [...flags, isMasked];
     xip.fetch(pc);
     xip.stalled = 0;
   }
-  const shown = ({ core, xip }, cycles) =>
-    [...core.registers, core.N, core.Z, core.C, core.V, cycles + xip.stalled].join(' ');
+  const divider = ({ divDividend, divDivisor, divQuotient, divRemainder, divCSR }) =>
+    [divDividend, divDivisor, divQuotient, divRemainder, divCSR];
+  const shown = ({ chip, core, xip }, cycles) =>
+    [...core.registers, core.N, core.Z, core.C, core.V, core.PM, ...divider(chip.sio),
+      cycles + xip.stalled].join(' ');
   const before = shown(quick, 0);
   const cycles = run(1);
   if (cycles === 0) {

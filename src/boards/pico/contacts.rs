@@ -7,14 +7,14 @@
 //!
 //! At power-up an open contact reads as closed until the pull-up of 50 to 80 kΩ has charged the
 //! filter at the switch, which takes 8 ms for 100 nF. So nothing is sampled for
-//! [`SETTLE_MICROSECONDS`], which is enough for 470 nF.
+//! [`SETTLE_MILLISECONDS`], which is enough for 470 nF.
 
-use core::sync::atomic::{AtomicU8, Ordering};
+use core::sync::atomic::{AtomicBool, AtomicU8, Ordering};
 
 use penup::machine::Contacts;
 
+use super::ROW;
 use super::registers::{Get, SIO};
-use super::{ROW, clock};
 use crate::boards::handler::Owned;
 
 /// The number of milliseconds after a change of a contact in which its further changes are ignored.
@@ -27,18 +27,22 @@ const COUNT: usize = 3;
 /// The bits of all contacts, bit 0 for the limit switch of x.
 const ALL: u8 = (1 << COUNT) - 1;
 
-/// The time from switching the pull-ups on to the first sample, in microseconds.
-const SETTLE_MICROSECONDS: u32 = 50_000;
-/// The time between the samples that are taken at the start, in microseconds.
-const SAMPLE_MICROSECONDS: u32 = 1000;
+/// The time from switching the pull-ups on to the first sample, in milliseconds.
+const SETTLE_MILLISECONDS: u8 = 50;
+/// The number of samples that are taken before the contacts are known for the first time.
+const FIRST_SAMPLES: u8 = 3;
 
 /// The contacts that count as closed, one bit for each. The clock's handler writes it.
 static CLOSED: AtomicU8 = AtomicU8::new(0);
+/// Whether the contacts are known. The clock's handler sets it.
+static ARE_KNOWN: AtomicBool = AtomicBool::new(false);
 /// The samples so far, which belong to the clock's handler.
 static SAMPLES: Owned<Samples> = Owned::empty();
 
 /// What the clock's handler remembers between two samples of the contacts.
 struct Samples {
+    /// The number of milliseconds until the contacts are known for the first time.
+    unknown_for: u8,
     /// One bit for each contact that was closed in the last two samples.
     last: [u8; 2],
     /// The number of samples for which each contact may still bounce.
@@ -61,29 +65,33 @@ fn closed_now() -> u8 {
     !(SIO.gpio_in().get() >> FIRST_PIN) as u8 & ALL
 }
 
-/// Does nothing for `time` microseconds.
-fn wait(time: u32) {
-    let began = clock::microseconds();
-    while clock::microseconds().wrapping_sub(began) < time {}
+/// Has the clock's interrupt sample the contacts. It expects the pull-ups to have been switched on
+/// just now, and the interrupt to be masked.
+pub fn set_up() {
+    let unknown_for = SETTLE_MILLISECONDS + FIRST_SAMPLES;
+    // SAFETY: the clock's interrupt is still masked.
+    unsafe { SAMPLES.fill(Samples { unknown_for, last: [0; 2], bounces: [0; COUNT] }) };
 }
 
-/// Samples the contacts for the first time, before the clock's interrupt runs. It expects the
-/// pull-ups to have been switched on just now.
-pub fn set_up() {
-    wait(SETTLE_MICROSECONDS);
-    let mut samples = Samples { last: [0; 2], bounces: [0; COUNT] };
-    for _ in 0..3 {
-        wait(SAMPLE_MICROSECONDS);
-        CLOSED.store(samples.sample(), Ordering::Relaxed);
+/// Sleeps until the contacts are known. The clock's interrupt must run.
+pub fn wait_until_known() {
+    while !ARE_KNOWN.load(Ordering::Acquire) {
+        cortex_m::asm::wfe();
     }
-    // SAFETY: the clock's interrupt is still masked.
-    unsafe { SAMPLES.fill(samples) };
 }
 
 /// Samples the contacts. The clock's interrupt calls it every millisecond.
 pub fn sample() {
     // SAFETY: the clock's handler owns it, and is the only caller.
     let Some(samples) = (unsafe { SAMPLES.get() }) else { return };
+    if samples.unknown_for > 0 {
+        samples.unknown_for -= 1;
+        if samples.unknown_for < FIRST_SAMPLES {
+            CLOSED.store(samples.sample(), Ordering::Relaxed);
+        }
+        ARE_KNOWN.store(samples.unknown_for == 0, Ordering::Release);
+        return;
+    }
     let before = CLOSED.load(Ordering::Relaxed);
     let changed = samples.sample() ^ before;
     let mut closed = before;

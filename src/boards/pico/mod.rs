@@ -130,6 +130,7 @@ pub fn take() -> (Pico, MemorySlices<'static>, &'static PulserState) {
     serial::open();
     contacts::set_up();
     clock::start(&mut core.NVIC);
+    contacts::wait_until_known();
     watchdog.start(3.secs());
     defmt::info!("pico at {=u32} Hz", clock::HERTZ);
     static MEMORY: ConstStaticCell<BoardMemory> = ConstStaticCell::new(BoardMemory::new());

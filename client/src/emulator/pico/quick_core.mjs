@@ -1,9 +1,10 @@
 // Executes most instructions of a Cortex-M0+ many times as fast as rp2040js does.
 //
 // rp2040js compares each instruction with one pattern after the other, and asks for each address
-// what lies there. Here one switch decides, and only RAM and flash are reached. Everything else, as
-// the registers of the chip, exceptions, special registers and sleep, is left to rp2040js: its
-// interpreter then executes the instruction, before anything of it has been done here.
+// what lies there. Here one switch decides, and only RAM, flash and the divider, which take no heed
+// of the time, are reached. Everything else, as the other registers of the chip, exceptions, special
+// registers and sleep, is left to rp2040js: its interpreter then executes the instruction, before
+// anything of it has been done here.
 //
 // The loop below calls few functions, and writes sums and differences out where they are needed:
 // JavaScript engines no longer inline calls in a function of this size, and a call takes longer
@@ -17,6 +18,10 @@ const RAM = 0x20000000;
 const FLASH_WINDOW = 0x10000000 >>> 26;
 /** The addresses at which the core executes flash. */
 const FLASH_CODE = 0x10;
+/** The registers of the divider, relative to those of the block that it belongs to. */
+const SIO = 0xd0000000;
+const DIVIDER = 0x60;
+const DIVIDER_BYTES = 0x1c;
 
 /** Marks of instructions: one of each address, and of those that differ in the upper bits. */
 export class Marks {
@@ -38,7 +43,7 @@ export class Marks {
  * counts.
  */
 export function quickCore(chip, xip, callCycles) {
-  const { core } = chip;
+  const { core, sio } = chip;
   const r = core.registers;
   const flash16 = chip.flash16;
   const ram8 = chip.sram;
@@ -51,6 +56,8 @@ export function quickCore(chip, xip, callCycles) {
   const canLoad = (address, bytes) =>
     (address & (bytes - 1)) === 0 &&
     (address >>> 26 === FLASH_WINDOW || (address - RAM) >>> 0 <= ramBytes - bytes);
+  const isDivider = (address) =>
+    (address & 3) === 0 && (address - SIO - DIVIDER) >>> 0 < DIVIDER_BYTES;
   const canStore = (address, bytes) =>
     (address & (bytes - 1)) === 0 && (address - RAM) >>> 0 <= ramBytes - bytes;
   const load32 = (address) => {
@@ -232,8 +239,8 @@ export function quickCore(chip, xip, callCycles) {
             taken = 2;
             break;
           }
-          if (d === 13 || d === 15 || m === 15) break run;
-          if (kind === 0) r[d] += r[m];
+          if (d === 15 || m === 15 || (d === 13 && kind !== 0)) break run;
+          if (kind === 0) r[d] = d === 13 ? (r[13] + r[m]) & ~3 : r[d] + r[m];
           else if (kind === 1) {
             const one = r[d];
             const other = r[m];
@@ -281,14 +288,22 @@ export function quickCore(chip, xip, callCycles) {
         }
         case 12: {
           const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
-          if (!canStore(address, 4)) break run;
+          if (!canStore(address, 4)) {
+            if (!isDivider(address)) break run;
+            sio.writeUint32(address - SIO, r[op & 7]);
+            break;
+          }
           ram32[(address - RAM) >>> 2] = r[op & 7];
           taken = 2;
           break;
         }
         case 13: {
           const address = (r[(op >>> 3) & 7] + ((op >>> 4) & 0x7c)) >>> 0;
-          if (!canLoad(address, 4)) break run;
+          if (!canLoad(address, 4)) {
+            if (!isDivider(address)) break run;
+            r[op & 7] = sio.readUint32(address - SIO);
+            break;
+          }
           r[op & 7] = load32(address);
           taken = 2;
           break;
@@ -438,7 +453,17 @@ export function quickCore(chip, xip, callCycles) {
           break;
         case 30: {
           const second = fetch16(pc + 2);
-          if ((second & 0xd000) !== 0xd000) break run;
+          if ((second & 0xd000) !== 0xd000) {
+            if (op === 0xf3ef && (second & 0xf8ff) === 0x8010) {
+              r[(second >>> 8) & 7] = core.PM ? 1 : 0; // MRS of PRIMASK
+            } else {
+              // The barriers DSB, DMB and ISB: nothing is done out of order here.
+              if (op !== 0xf3bf || second < 0x8f40 || second > 0x8f6f) break run;
+            }
+            next = pc + 4;
+            taken = 3;
+            break;
+          }
           const sign = (op >>> 10) & 1;
           const i1 = ~((second >>> 13) ^ sign) & 1;
           const i2 = ~((second >>> 11) ^ sign) & 1;
