@@ -44,7 +44,8 @@ function number() {
   const small = random(40);
   const wide = random(0x100000000);
   return [small, -small >>> 0, 0x80000000, 0x7fffffff, wide, RAM + 0x800 + random(4096),
-    RAM + 0x800 + 4 * random(1024), FLASH + 4 * random(1024), 0xd0000000, 0xd0000060, 0x40054000][random(11)];
+    RAM + 0x800 + 4 * random(1024), FLASH + 4 * random(1024), 0xd0000000, 0xd0000060,
+    0x40054000][random(11)];
 }
 // The bit that is shifted out last, to the left, to the right, and to the right with the sign.
 function shiftedOut(shift, value, by) {
@@ -59,7 +60,8 @@ for (let count = 0; count < Number(cases); count++) {
   // Barriers, and what reads the mask of interrupts and other special registers.
   const isSystem = random(32) === 0;
   const op = isSystem
-    ? [[0xf3bf, 0x8f00 | random(256)], [0xf3ef, 0x8000 | (random(8) << 8) | 16 * random(2)]][random(2)]
+    ? [[0xf3bf, 0x8f00 | random(256)],
+      [0xf3ef, 0x8000 | (random(8) << 8) | 16 * random(2)]][random(2)]
     : [isCall ? 0xf000 | random(0x800) : random(0x10000),
       isCall ? 0xd000 | random(0x1000) | (random(2) << 13) : random(0x10000)];
   const isMasked = random(2) === 1;

@@ -13,6 +13,10 @@ use crate::index::Index;
 use crate::machine::State;
 use crate::protocol::{CommandError, LineReader, Numbering, RealTime, Received};
 
+/// The most bytes of a line that are read in one turn of the main loop. They take a small part of
+/// the time of a turn, which plans steps first.
+const BYTES_IN_TURN: u32 = 32;
+
 impl<I: Index> Plotter<'_, I> {
     /// Answers the serial line, and keeps the queue of step events full. Returns whether there was
     /// anything to do.
@@ -49,7 +53,7 @@ impl<I: Index> Plotter<'_, I> {
         let waits = self.hpgl.must_wait(waits);
         let waits = waits || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
-        let Some((port, byte)) = byte else {
+        let Some((mut port, mut byte)) = byte else {
             #[cfg(feature = "tiles")]
             if self.tend_parts(board) {
                 return true;
@@ -61,19 +65,34 @@ impl<I: Index> Plotter<'_, I> {
             return planned || requests != RealTime::default();
         };
         self.inner.busy_at = board.microseconds();
-        #[cfg(feature = "hpgl")]
-        if self.take_hpgl(port, byte, board) {
-            return true;
-        }
-        // Nothing comes between the instructions of HP-GL that are being carried out.
-        #[cfg(feature = "hpgl")]
-        let is_busy =
-            self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
-        #[cfg(not(feature = "hpgl"))]
-        let is_busy = false;
-        let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
-        let Some((reader, numbering)) = reader else { return true };
-        let Some(line) = reader.push(byte) else { return true };
+        let mut left = BYTES_IN_TURN;
+        // Bytes within a line change nothing and have no reply, so several are read in a turn.
+        let (numbering, line, is_busy) = loop {
+            #[cfg(feature = "hpgl")]
+            if self.take_hpgl(port, byte, board) {
+                return true;
+            }
+            // Nothing comes between the instructions of HP-GL that are being carried out.
+            #[cfg(feature = "hpgl")]
+            let is_busy =
+                self.hpgl.is_drawing() || (self.hpgl.port().is_some() && self.inner.must_wait());
+            #[cfg(not(feature = "hpgl"))]
+            let is_busy = false;
+            let reader = self.readers.get_mut(port).zip(self.numberings.get_mut(port));
+            let Some((reader, numbering)) = reader else { return true };
+            if let Some(line) = reader.push(byte) {
+                break (numbering, line, is_busy);
+            }
+            // A byte that ends HP-GL decides who is answered, which the next turn carries out.
+            #[cfg(feature = "hpgl")]
+            if self.hpgl.port().is_some() {
+                return true;
+            }
+            left -= 1;
+            let next = if left == 0 { None } else { board.read_byte() };
+            let Some(next) = next else { return true };
+            (port, byte) = next;
+        };
         let (mut shows_drive, mut resets) = (false, false);
         let (outcome, label) = match numbering.receive(line) {
             Received::Line(_, label) if is_busy => (Err(CommandError::Busy), label),

@@ -1,10 +1,10 @@
 // Executes most instructions of a Cortex-M0+ many times as fast as rp2040js does.
 //
 // rp2040js compares each instruction with one pattern after the other, and asks for each address
-// what lies there. Here one switch decides, and only RAM, flash and the divider, which take no heed
-// of the time, are reached. Everything else, as the other registers of the chip, exceptions, special
-// registers and sleep, is left to rp2040js: its interpreter then executes the instruction, before
-// anything of it has been done here.
+// what lies there. Here one switch decides, and only RAM, flash and the divider are reached, which
+// do not depend on the time. Everything else, such as the other registers of the chip, exceptions,
+// most special registers and sleep, is left to rp2040js: its interpreter then executes the
+// instruction, before anything of it has been done here.
 //
 // The loop below calls few functions, and writes sums and differences out where they are needed:
 // JavaScript engines no longer inline calls in a function of this size, and a call takes longer
