@@ -52,6 +52,22 @@ fn sides_and_offsets_have_their_values_and_not_only_their_signs() {
 }
 
 #[test]
+fn the_margin_of_a_plane_grows_with_the_differences_of_each_coordinate() {
+    let a = Vertex::new(5, -3, 9);
+    for (n, margin) in [(1, 18 * (1 + 1) + 6), (4, 18 * 4 * (4 + 1) + 6)] {
+        for to in [[n, 0, 0], [0, n, 0], [0, 0, n], [-n, 0, 0], [0, 0, -n]] {
+            let far = Vertex::new(5 + to[0], to[1] - 3, 9 + to[2]);
+            for [b, c, d] in [[far, a, a], [a, far, a], [a, a, far]] {
+                assert_eq!(plane_side_margin(a, b, c, d, 1), margin, "{to:?}");
+            }
+        }
+    }
+    // 18 x 4 x (4 + 3) x 3, and 6 x 3^3.
+    let b = Vertex::new(5, -3, 13);
+    assert_eq!(plane_side_margin(a, b, a, a, 3), 1512 + 162);
+}
+
+#[test]
 fn a_plane_asks_the_same_as_four_points() {
     let mut state = 1u32;
     let mut random = || {

@@ -127,3 +127,31 @@ impl<'f, F: NorFlash> Writer<'f, F> {
         Ok(())
     }
 }
+
+#[cfg(all(test, feature = "host"))]
+mod tests {
+    use super::*;
+    use crate::boards::host::CutFlash;
+    use std::vec::Vec;
+
+    const SLOTS: Slots = Slots { start: 0, bytes: 8192 };
+
+    #[test]
+    fn what_is_finished_is_the_latest_and_each_sector_is_erased_once() {
+        let mut flash = CutFlash::new(4 * 4096);
+        // With the header's page, a state of 3840 bytes fills a sector.
+        for (length, sectors) in [(0, 1), (255, 1), (256, 1), (3840, 1), (3841, 2), (7000, 2)] {
+            let before: u32 = flash.erasures.iter().sum();
+            let state: Vec<u8> = (0..length).map(|at| (at as u8).wrapping_mul(29)).collect();
+            let mut writer = SLOTS.write(&mut flash).unwrap();
+            // In pieces that are no pages.
+            state.chunks(100).for_each(|piece| writer.write(piece).unwrap());
+            writer.finish().unwrap();
+            assert_eq!(flash.erasures.iter().sum::<u32>() - before, sectors, "{length}");
+            let mut reader = SLOTS.latest(&mut flash).unwrap();
+            let mut read = std::vec![0; reader.left()];
+            assert_eq!(reader.read(&mut read), length);
+            assert_eq!(read, state);
+        }
+    }
+}

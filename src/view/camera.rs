@@ -363,6 +363,23 @@ mod tests {
     }
 
     #[test]
+    fn the_automatic_eye_sees_a_model_that_is_far_from_the_origin() {
+        let corners = [[100, 200, 300], [104, 206, 301]];
+        let cuboid = Cuboid(corners.map(|[x, y, z]| Position { x, y, z }));
+        let (middle, radius) = middle_and_radius(&cuboid).unwrap();
+        assert_eq!(middle, [102.0, 203.0, 300.5]);
+        // Half of the diagonal, some 5 % off.
+        let half = libm::sqrt(4.0 + 9.0 + 0.25);
+        assert!((radius / half - 1.0).abs() < 0.07, "{radius} {half}");
+        // Without a turn one looks along z, from below.
+        let camera = Camera::turned(&cuboid, Lens::Perspective, [0.0; 3], None).unwrap();
+        let eye = [102.0, 203.0, 300.5 - EYE_DISTANCE * radius];
+        assert_eq!(camera.pose, Pose::Turned { eye, angles: [0.0; 3] });
+        let given = Camera::turned(&cuboid, Lens::Orthographic, [0.0; 3], Some([1.0; 3])).unwrap();
+        assert_eq!(given.pose, Pose::Turned { eye: [1.0; 3], angles: [0.0; 3] });
+    }
+
+    #[test]
     fn quarter_turns_are_exact() {
         for (degrees, sin_cos) in [
             (0.0, (0.0, 1.0)),

@@ -225,3 +225,19 @@ fn the_stretch_of_depth_is_that_of_a_length_along_the_view() {
         }
     });
 }
+
+#[test]
+fn the_first_vertex_behind_the_eye_is_named() {
+    with_model(&CUBE, |model| {
+        let before = View::new(&camera([-3.0, 0.5, 0.5], [0.5; 3]), model).unwrap();
+        assert_eq!(before.refuse_behind(model), Ok(()));
+        // The eye is inside: the vertices with x = 0 are behind it.
+        let within = View::new(&camera([0.5, 0.5, 0.5], [2.0, 0.5, 0.5]), model).unwrap();
+        assert_eq!(within.refuse_behind(model), Err(ViewError::BehindEye { vertex: 1 }));
+        let back = View::new(&camera([0.5, 0.5, 0.5], [-1.0, 0.5, 0.5]), model).unwrap();
+        assert_eq!(back.refuse_behind(model), Err(ViewError::BehindEye { vertex: 2 }));
+        let parallel =
+            Camera { lens: Lens::Orthographic, ..camera([0.5, 0.5, 0.5], [2.0, 0.5, 0.5]) };
+        assert_eq!(View::new(&parallel, model).unwrap().refuse_behind(model), Ok(()));
+    });
+}
