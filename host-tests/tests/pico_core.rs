@@ -13,12 +13,12 @@ const LEAST_EXECUTED: u32 = 25_000;
 
 /// Compares the two, and prints how many instructions both have executed.
 const COMPARE: &str = "
-const [directory, models, cases, seed] = process.argv.slice(-4);
+import { readFileSync } from 'node:fs';
+const [directory, models, wasm, cases, seed] = process.argv.slice(-5);
 const { RP2040 } = await import(`file://${directory}/dist/esm/index.js`);
 const { CALL_CYCLES, countMissingCycles } = await import(`file://${models}/core_cycles.mjs`);
 const { mendCore, refuseMisaligned } = await import(`file://${models}/mended_core.mjs`);
-const { quickCore } = await import(`file://${models}/quick_core.mjs`);
-const { XipCache } = await import(`file://${models}/xip_cache.mjs`);
+const { QuickCore } = await import(`file://${models}/quick_core.mjs`);
 const RAM = 0x20000000, FLASH = 0x10000000, CODE = RAM + 0x2000, BLX_LR = 0x47f0;
 let state = BigInt(seed);
 function random(below) {
@@ -28,16 +28,16 @@ function random(below) {
 function machine() {
   const chip = new RP2040();
   chip.logger = { debug() {}, info() {}, warn() {}, error() {} };
-  const xip = new XipCache(chip);
+  const quick = new QuickCore(readFileSync(wasm), CALL_CYCLES);
+  quick.attach(chip);
   mendCore(chip);
-  countMissingCycles(chip, xip);
-  return { chip, core: chip.core, xip };
+  countMissingCycles(chip, quick);
+  return { chip, core: chip.core, quick };
 }
-const quick = machine(), slow = machine();
-const run = quickCore(quick.chip, quick.xip, CALL_CYCLES);
+const fast = machine(), slow = machine();
 for (let at = 0; at < 1 << 14; at++) {
   const byte = random(256);
-  for (const { chip } of [quick, slow]) chip.flash[at] = chip.sram[at] = byte;
+  for (const { chip } of [fast, slow]) chip.flash[at] = chip.sram[at] = byte;
 }
 // Numbers at the ends of their range, small ones, and addresses.
 function number() {
@@ -69,31 +69,31 @@ for (let count = 0; count < Number(cases); count++) {
   const flags = Array.from({ length: 4 }, () => random(2) === 1);
   // No result is negative and zero.
   if (flags[0]) flags[1] = false;
-  for (const { chip, core, xip } of [quick, slow]) {
+  for (const { chip, core, quick } of [fast, slow]) {
     op.forEach((half, index) => {
       const at = pc - (inFlash ? FLASH : RAM) + 2 * index;
-      (inFlash ? chip.flash16 : new Uint16Array(chip.sram.buffer))[at >> 1] = half;
+      (inFlash ? chip.flashView : chip.sramView).setUint16(at, half, true);
     });
     core.registers.set([...registers, RAM + 0x1000, 0x10000101, pc]);
     [core.N, core.Z, core.C, core.V, core.PM] = [...flags, isMasked];
-    xip.fetch(pc);
-    xip.stalled = 0;
+    quick.fetch(pc);
+    quick.stalled = 0;
   }
   const divider = ({ divDividend, divDivisor, divQuotient, divRemainder, divCSR }) =>
     [divDividend, divDivisor, divQuotient, divRemainder, divCSR];
-  const shown = ({ chip, core, xip }, cycles) =>
+  const shown = ({ chip, core, quick }, cycles) =>
     [...core.registers, core.N, core.Z, core.C, core.V, core.PM, ...divider(chip.sio),
-      cycles + xip.stalled].join(' ');
-  const before = shown(quick, 0);
-  const cycles = run(1);
+      cycles + quick.stalled].join(' ');
+  const before = shown(fast, 0);
+  const cycles = fast.quick.run(1);
   if (cycles === 0) {
-    if (shown(quick, 0) !== before) throw new Error(`${op}: something was done`);
+    if (shown(fast, 0) !== before) throw new Error(`${op}: something was done`);
     continue;
   }
   executed++;
   // rp2040js overwrites the register before it reads where to go.
   if (op[0] === BLX_LR) {
-    if (quick.core.registers[15] !== 0x10000100) throw new Error('BLX LR goes elsewhere');
+    if (fast.core.registers[15] !== 0x10000100) throw new Error('BLX LR goes elsewhere');
     continue;
   }
   const [value, by] = [registers[op[0] & 7], registers[(op[0] >> 3) & 7] & 0xff];
@@ -102,11 +102,11 @@ for (let count = 0; count < Number(cases); count++) {
   const shift = [2, 3, 4].indexOf((op[0] >> 6) - 0x100);
   if (shift >= 0) slow.core.C = by === 0 ? flags[2] : shiftedOut(shift, value, by);
   const expected = shown(slow, slowly);
-  if (shown(quick, cycles) !== expected) {
+  if (shown(fast, cycles) !== expected) {
     throw new Error(`${op.map((half) => half.toString(16))}\\n${before}\\n` +
-      `${shown(quick, cycles)}\\n${expected}`);
+      `${shown(fast, cycles)}\\n${expected}`);
   }
-  if (Buffer.compare(quick.chip.sram, slow.chip.sram)) throw new Error(`${op}: memory differs`);
+  if (Buffer.compare(fast.chip.sram, slow.chip.sram)) throw new Error(`${op}: memory differs`);
 }
 let faults = 0;
 refuseMisaligned(slow.core, () => faults++);
@@ -114,7 +114,7 @@ const LDR = 0x6808, LDRH = 0x8808, STR = 0x6008, STRH = 0x8008, LDRB = 0x7808;
 for (const [op, by, expected] of [[LDR, 2, 1], [LDR, 4, 0], [STR, 1, 1], [STRH, 1, 1],
   [LDRH, 1, 1], [LDRH, 2, 0], [LDRB, 1, 0]]) {
   faults = 0;
-  new Uint16Array(slow.chip.sram.buffer)[(CODE - RAM) >> 1] = op;
+  slow.chip.sramView.setUint16(CODE - RAM, op, true);
   slow.core.registers.set([0, RAM + 0x800 + by]);
   slow.core.registers[15] = CODE;
   slow.core.executeInstruction();
@@ -131,6 +131,7 @@ fn each_instruction_does_what_it_does_in_rp2040js() -> Result<(), Box<dyn Error>
             .args(["--input-type=module", "--eval", COMPARE, "--"])
             .arg(project.join("target/rp2040js/node_modules/rp2040js"))
             .arg(project.join("client/src/emulator/pico"))
+            .arg(project.join("target/wasm32-unknown-unknown/release/penup_emulated_core.wasm"))
             .args([CASES.to_string(), seed.to_string()])
             .output()?;
         assert!(node.status.success(), "{}", String::from_utf8_lossy(&node.stderr));

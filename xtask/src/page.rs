@@ -8,11 +8,8 @@ use anyhow::Result;
 
 use crate::command::{cargo, run};
 use crate::firmware;
-use crate::set_up;
+use crate::set_up::{self, WEB_ASSEMBLY};
 use crate::table::LM3S6965;
-
-/// The target that a browser runs.
-const TARGET: &str = "wasm32-unknown-unknown";
 
 /// The packages of the page's programs. The first is loaded with the page, the other when it is
 /// needed.
@@ -20,14 +17,14 @@ const PROGRAMS: [&str; 2] = ["penup-page", "penup-page-files"];
 
 /// Builds the page into `target/page`.
 pub fn build() -> Result<()> {
-    set_up::target(TARGET)?;
+    set_up::target(WEB_ASSEMBLY)?;
     let root = crate::root();
-    let built = root.join("target").join(TARGET).join("browser");
+    let built = root.join("target").join(WEB_ASSEMBLY).join("browser");
     for package in PROGRAMS {
         // Together, the first would have the features of the second.
         run(cargo()
             .current_dir(&root)
-            .args(["build", "--quiet", "--profile=browser", "--target", TARGET])
+            .args(["build", "--quiet", "--profile=browser", "--target", WEB_ASSEMBLY])
             .args(["--package", package]))?;
     }
     // What builds the page is a workspace of its own, so that no other build compiles it.

@@ -5,6 +5,7 @@
 //! | `core` for the board | rustc's target directory | rustup; else Debian's compiler and sources |
 //! | QEMU | `qemu-system-arm` | apt, or brew |
 //! | rp2040js | `node` and `npm`; rp2040js in the target directory | apt, or brew; npm |
+//! | the core of rp2040js | rustc's target directory | rustup |
 //! | Chromium | `chromium` or another name of it | apt, or brew |
 //! | playwright-core | as rp2040js is | apt, or brew; npm |
 //! | rustfmt, clippy | `cargo fmt`, `cargo clippy` | rustup |
@@ -63,6 +64,9 @@ pub fn toolchain(target: &str) -> Result<Toolchain> {
     }
     Ok(Toolchain::Debian)
 }
+
+/// The target that browsers and Node run.
+pub const WEB_ASSEMBLY: &str = "wasm32-unknown-unknown";
 
 /// Finds or installs `target` for the compiler in use, by rustup alone.
 ///
@@ -172,9 +176,23 @@ const LEAST_NODE: u32 = 18;
 const LEAST_NODE_OF_PLAYWRIGHT: u32 = 20;
 
 /// Finds or installs Node, and rp2040js in the version of the lock file beside the client's
-/// emulator.
+/// emulator. Compiles the core with which that emulator is fast.
 fn rp2040js() -> Result<()> {
-    node_packages("rp2040js", LEAST_NODE, "client/src/emulator/rp2040js").map(drop)
+    const CORE: &str = "penup-emulated-core";
+    node_packages("rp2040js", LEAST_NODE, "client/src/emulator/rp2040js")?;
+    target(WEB_ASSEMBLY)?;
+    if !crate::root().join("target").join(WEB_ASSEMBLY).join("release").exists() {
+        say!("penup: compiling the core of the emulated Pico, which takes a few seconds")?;
+    }
+    run(cargo().current_dir(crate::root()).args([
+        "build",
+        "--quiet",
+        "--release",
+        "--target",
+        WEB_ASSEMBLY,
+        "--package",
+        CORE,
+    ]))
 }
 
 /// What the tests of the page need.

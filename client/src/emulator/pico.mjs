@@ -3,8 +3,9 @@
 // It is longer than 500 lines, because what it adds to rp2040js shares one list of events in order
 // of time; what stands alone is in the folder pico.
 //
-// Usage: node pico.mjs RP2040JS-DIRECTORY IMAGE.uf2 LOG-ADDRESS BOARD, where BOARD is the JSON that
-// process.rs makes of the board's row in the table.
+// Usage: node pico.mjs RP2040JS-DIRECTORY CORE.wasm IMAGE.uf2 LOG-ADDRESS BOARD, where CORE.wasm is
+// the compiled package `penup-emulated-core` and BOARD is the JSON that process.rs makes of the
+// board's row in the table.
 //
 // Standard input and output carry records of 8 bytes: what, a value, and the core cycle (48 bits,
 // little-endian). In: 0 a byte for the serial line (its error bits in the cycle's place), 1 a level
@@ -56,15 +57,14 @@ import { InterruptTimes } from './pico/interrupt_times.mjs';
 import { joinQueues } from './pico/joined_queue.mjs';
 import { delayAlarm } from './pico/late_alarm.mjs';
 import { mendCore, refuseMisaligned } from './pico/mended_core.mjs';
-import { Marks, quickCore } from './pico/quick_core.mjs';
+import { QuickCore } from './pico/quick_core.mjs';
 import * as resets from './pico/resets.mjs';
 import { SlowContacts } from './pico/slow_contacts.mjs';
 import { Uart } from './pico/uart.mjs';
 import { Usb } from './pico/usb_host.mjs';
 import { settled, wear } from './pico/worn_flash.mjs';
-import { brownOut, XipCache } from './pico/xip_cache.mjs';
 
-const [directory, imagePath, logAddress, boardText] = process.argv.slice(-4);
+const [directory, corePath, imagePath, logAddress, boardText] = process.argv.slice(-5);
 const board = JSON.parse(boardText);
 const { RP2040 } = await import(pathToFileURL(`${directory}/dist/esm/index.js`));
 
@@ -247,7 +247,7 @@ function serveRom(number) {
     changeFlash(first, second, erase);
     flashNanos += (second / 4096) * sectorMicroseconds * 1000;
   } else if (number === FLUSH_CACHE) {
-    xip.flush();
+    quick.flush();
   } else if (number === PROGRAM) {
     const write = (at, before) => before & chip.readUint8(second + at - first);
     noteFlash(false, first, third, PAGE_MICROSECONDS, write);
@@ -262,7 +262,8 @@ function serveRom(number) {
 
 // --- The chip ------------------------------------------------------------------------------------
 
-let chip, clock, core, uart, machines, xip, contacts, executeQuickly;
+const quick = new QuickCore(readFileSync(corePath), CALL_CYCLES);
+let chip, clock, core, uart, machines, contacts;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
@@ -301,22 +302,21 @@ function tell(byte) {
 
 /** After how many reads flash returns garbage from the next reset on. */
 let garbleNext = Infinity;
-brownOut.from = board.records;
-brownOut.happened = () => report(GARBLED, 0, now());
 
 /** A chip that begins with this flash, after such a reset. */
 function start(flash, kind) {
-  brownOut.after = garbleNext;
-  brownOut.reads = 0;
+  quick.garble(board.records, garbleNext);
   garbleNext = Infinity;
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
   const before = chip;
   chip = new RP2040();
-  resets.carryOver(kind, before, chip);
   ({ clock, core } = chip);
   chip.logger = { debug() {}, info() {}, warn, error: (from, what) => console.error(from, what) };
+  // This erases the flash that the chip then has.
   chip.loadBootrom(bootRom());
+  quick.attach(chip);
+  resets.carryOver(kind, before, chip);
   chip.flash.set(flash);
   chip.onBreak = serveRom;
   core.VTOR = VECTORS;
@@ -329,12 +329,10 @@ function start(flash, kind) {
   } else for (let at = RAM; at < core.SP; at++) chip.writeUint8(at, PAINT);
   mendCore(chip);
   faultDue = isLockedUp = false;
-  xip = new XipCache(chip);
-  countMissingCycles(chip, xip);
+  countMissingCycles(chip, quick);
   refuseMisaligned(core, () => {
     faultDue = true;
   });
-  executeQuickly = quickCore(chip, xip, CALL_CYCLES);
   contacts = new SlowContacts(chip, CONTACTS, now, (pin, cycle) => {
     bounces.push({ pin, cycle });
     bounces.sort((one, other) => one.cycle - other.cycle);
@@ -600,8 +598,8 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === ASK_IN_ERASURES) asksInErasures = entry.value !== 0;
     else if (rest[at] === GARBLE) {
       if (entry.value) garbleNext = entry.cycle;
-      else brownOut.after = entry.cycle;
-    } else if (rest[at] === READS) report(WERE_READ, 0, brownOut.reads);
+      else quick.garble(board.records, entry.cycle);
+    } else if (rest[at] === READS) report(WERE_READ, 0, quick.reads);
     else if (rest[at] === TIMED) timeFunction(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {
       const axis = CONTACTS.indexOf(entry.value);
@@ -715,8 +713,7 @@ function takeInput(cycle) {
   }
 }
 
-// --- The log: SEGGER's real-time transfer, read where the image keeps it
-// ---------------------------
+// --- The log: SEGGER's real-time transfer, read where the image keeps it -------------------------
 
 const transfer = Number(logAddress);
 
@@ -734,19 +731,15 @@ function takeLog() {
   chip.writeUint32(transfer + 40, read);
 }
 
-// --- Functions that are timed
-// ----------------------------------------------------------------------
+// --- Functions that are timed --------------------------------------------------------------------
 
 /** Their numbers, by address. */
 const timed = new Map();
-/** The instructions with which they begin and to which they return, once there are any. */
-let marks = null;
 /** Those that have been called, and where each returns to. */
 const calls = [];
 
 function timeFunction(address, number) {
-  marks ??= new Marks();
-  marks.add(address, 1);
+  quick.mark(address, true);
   timed.set(address, number);
 }
 
@@ -755,13 +748,13 @@ function timeFunctions() {
   const last = calls.at(-1);
   if (last && core.PC === last.returnsTo && core.SP === last.stack) {
     calls.pop();
-    marks.add(last.returnsTo, -1);
+    quick.mark(last.returnsTo, false);
     report(RETURNED, last.number, now() - last.began);
   }
   const number = timed.get(core.PC);
   if (number === undefined) return;
   const returnsTo = core.LR & ~1;
-  marks.add(returnsTo, 1);
+  quick.mark(returnsTo, true);
   calls.push({ number, returnsTo, stack: core.SP, began: now() });
 }
 
@@ -800,21 +793,22 @@ function executeUntil(due) {
   do {
     if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
     const alarm = clock.nextAlarm ? clock.nextAlarm.nanos : Infinity;
-    const cycles = executeQuickly((Math.min(alarm, nanos) - clock.nanosCounter) / NANOS, marks);
+    const cycles = quick.run((Math.min(alarm, nanos) - clock.nanosCounter) / NANOS);
+    if (quick.takeGarbled()) report(GARBLED, 0, now());
     if (cycles !== 0) {
       pass(cycles * NANOS);
       continue;
     }
     // The core is at an instruction for which quick execution is not meant.
-    if ((core.registers[15] - xip.from) >>> 0 >= 6) xip.fetch(core.registers[15]);
-    if (xip.stalled !== 0) {
+    quick.fetch(core.registers[15]);
+    if (quick.stalled !== 0) {
       // Time may bring something before the core goes on.
-      const stalled = xip.stalled;
-      xip.stalled = 0;
+      const { stalled } = quick;
+      quick.stalled = 0;
       pass(stalled * NANOS);
       continue;
     }
-    if (marks) timeFunctions();
+    if (timed.size) timeFunctions();
     pass(core.executeInstruction() * NANOS);
     if (faultDue) takeFault();
     if (flashNanos) waitForFlash();

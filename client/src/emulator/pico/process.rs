@@ -30,7 +30,7 @@ pub(super) const PROGRAM: &str = "node";
 const LOADER: &str = "
     const url = (text) =>
         'data:text/javascript;base64,' + Buffer.from(text).toString('base64');
-    let [script, ...modules] = process.argv.slice(1, -4);
+    let [script, ...modules] = process.argv.slice(1, -5);
     for (; modules.length; modules.splice(0, 2)) {
         script = script.replace(modules[0], url(modules[1]));
     }
@@ -52,10 +52,12 @@ const MODULES: &[(&str, &str)] = &[
     ("./pico/uart.mjs", include_str!("uart.mjs")),
     ("./pico/usb_host.mjs", include_str!("usb_host.mjs")),
     ("./pico/worn_flash.mjs", include_str!("worn_flash.mjs")),
-    ("./pico/xip_cache.mjs", include_str!("xip_cache.mjs")),
 ];
 /// The directory in which `cargo xtask set-up` installs rp2040js, relative to the workspace's root.
 const RP2040JS: &str = "target/rp2040js/node_modules/rp2040js";
+/// The package `penup-emulated-core` as `cargo xtask set-up` compiles it, relative to the
+/// workspace's root.
+const CORE: &str = "target/wasm32-unknown-unknown/release/penup_emulated_core.wasm";
 /// The number of the emulator's own lines that are kept.
 const SAID_LINES: usize = 20;
 
@@ -125,7 +127,8 @@ pub(super) fn function(
     Ok(symbol.address() & !1)
 }
 
-/// Checks that rp2040js is installed in the version that this program needs.
+/// Checks that rp2040js is installed in the version that this program needs, and that the emulated
+/// core is compiled.
 pub(super) fn check_version(root: &Path) -> Result<(), EmulatorError> {
     const PROGRAM: &str = "rp2040js";
     let read = |text: &str, pointer: &str| {
@@ -140,7 +143,9 @@ pub(super) fn check_version(root: &Path) -> Result<(), EmulatorError> {
         Some(needed) if needed != found => {
             Err(EmulatorError::WrongVersion { program: PROGRAM, found, needed })
         }
-        _ => Ok(()),
+        _ => fs::metadata(root.join(CORE))
+            .map(drop)
+            .map_err(|source| EmulatorError::NotInstalled { program: "the emulated core", source }),
     }
 }
 
@@ -149,8 +154,9 @@ pub(super) fn command(image: &Path, log_address: u64) -> Command {
     let mut command = quitting_with_parent(PROGRAM);
     command.args(["--input-type=module", "--eval", LOADER, "--", SCRIPT]);
     command.args(MODULES.iter().flat_map(|(name, text)| [name, text]));
-    command.arg(crate::workspace::root().join(RP2040JS)).arg(image).arg(log_address.to_string());
-    command.arg(board());
+    let root = crate::workspace::root();
+    command.arg(root.join(RP2040JS)).arg(root.join(CORE));
+    command.arg(image).arg(log_address.to_string()).arg(board());
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     // The emulator gets its own process group, so that Ctrl-C at the terminal reaches only this
     // process, which ends the emulator when it is done with it.
