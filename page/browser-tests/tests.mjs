@@ -73,8 +73,14 @@ async function preview(file, ...more) {
   return { svg: await readFile(svg, "utf8"), ...JSON.parse(await readFile(json, "utf8")) };
 }
 
+/**
+ * The longest time for a drawing on an emulated board, in milliseconds: many times what it takes on
+ * an idle computer. Only what hangs takes longer.
+ */
+const LONGEST = 600_000;
+
 /** Waits until the page says this of the plotter. An emulated board may take its time. */
-const state = (expected, timeout = 60_000) =>
+const state = (expected, timeout = LONGEST) =>
   page.waitForFunction(
     (want) => document.getElementById("plot-state").textContent.startsWith(want),
     expected,
@@ -502,12 +508,12 @@ test("through the client: turn, dash, plot, hold, resume; the ink is the preview
     await page.waitForFunction(
       () => document.getElementById("plot-state").textContent === "Ready.",
       undefined,
-      { timeout: 120_000 },
+      { timeout: LONGEST },
     );
     assert.ok(held > 0 && (await count()) > 0);
     // Once more, whole: the ink from the pins of the firmware is that of the preview.
     await page.click("#plot");
-    await state("Drawn", 120_000);
+    await state("Drawn");
     const ink = await page.evaluate(() => {
       const { path, count } = window.penup.plotting;
       return [...path.subarray(0, count)];

@@ -2,6 +2,7 @@ use super::*;
 use crate::fixed::Decimal;
 use crate::model::Corner;
 use crate::model::no_undo;
+use crate::stage::{NeverCancel, Scratch};
 
 fn with_model(vertices: &[[&str; 3]], test: impl FnOnce(&Model<'_>)) {
     let mut memory = ([Position::ORIGIN; 16], [<Corner>::ZERO; 16]);
@@ -240,4 +241,49 @@ fn the_first_vertex_behind_the_eye_is_named() {
             Camera { lens: Lens::Orthographic, ..camera([0.5, 0.5, 0.5], [2.0, 0.5, 0.5]) };
         assert_eq!(View::new(&parallel, model).unwrap().refuse_behind(model), Ok(()));
     });
+}
+
+/// Of two curves of degree 1 the chords are the sides of their control polygons. Each becomes a bar
+/// behind the elements that were there, and no bar joins one curve to the other.
+#[test]
+fn the_chords_of_curves_become_bars() {
+    let decimals = |text: &'static str| text.split(' ').map(|part| Decimal::parse(part).unwrap());
+    let mut memory = ([Position::ORIGIN; 16], [<Corner>::ZERO; 64]);
+    let mut model = Model::new(&mut memory.0, &mut memory.1);
+    for at in ["0 0 0", "4 0 0", "4 3 0", "9 1 0", "9 5 0", "2 7 0", "1 6 0"] {
+        let mut at = decimals(at);
+        let vertex = [(); 3].map(|()| at.next().unwrap());
+        model.add_vertex(vertex, &mut no_undo).unwrap();
+    }
+    model.add_polyline([1, 7].into_iter(), &mut no_undo).unwrap();
+    model.set_degree(1).unwrap();
+    for (last, controls, knots) in
+        [("2", &[1, 2, 3][..], "0 0 1 2 2"), ("3", &[4, 5, 6, 7], "0 0 1 2 3 3")]
+    {
+        let ends = ["0", last].map(|text| Decimal::parse(text).unwrap());
+        model.begin_curve(ends, controls.iter().copied()).unwrap();
+        model.add_knots(decimals(knots)).unwrap();
+        model.end_curve(&mut no_undo).unwrap();
+    }
+    let above = Camera {
+        pose: Pose::Towards { eye: [4.5, 3.5, 9.0], at: [4.5, 3.5, 0.0], up: None },
+        lens: Lens::Orthographic,
+    };
+    let view = View::new(&above, &model).unwrap();
+    let flattening = Flattening { on_page: &|x, y, _| [x, y], tolerance: 128 };
+    let mut words = [0; 512];
+    let mut scratch = Scratch::new(&mut words);
+    let (vertices, elements) =
+        flattening.add(&view, &model, model.elements(), &mut scratch, &mut NeverCancel).unwrap();
+    let bars: std::vec::Vec<[u16; 2]> = elements
+        .corners()
+        .chunks(2)
+        .map(|bar| [0, 1].map(|end: usize| bar[end].vertex()))
+        .collect();
+    // The ends of chords are numbered behind the seven vertices: three, then four.
+    assert_eq!(bars, [[0, 6], [7, 8], [8, 9], [10, 11], [11, 12], [12, 13]]);
+    for (end, control) in (7..).zip([0, 1, 2, 3, 4, 5, 6]) {
+        assert_eq!(vertices[end], vertices[control], "{end}");
+    }
+    assert!(elements.corners().chunks(2).all(|bar| !bar[0].is_last() && bar[1].is_last()));
 }

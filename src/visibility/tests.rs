@@ -300,3 +300,104 @@ fn a_face_hides_although_its_coarse_depth_is_that_of_a_cover() {
         assert!(!whole.visible, "{lowest}: {of_bar:?}");
     }
 }
+
+/// Returns the vertices, positions and corners of boxes, from the least and the greatest corner of
+/// each, seen as [`seen`] describes.
+fn boxes(
+    boxes: &[[[i32; 3]; 2]],
+    page: [[i32; 3]; 3],
+) -> (Vec<Vertex>, Vec<[i32; 3]>, Vec<Corner>) {
+    /// The faces of a box, anticlockwise from outside; the bits of a number choose the ends.
+    const FACES: [[u16; 4]; 6] =
+        [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+    let corner_of = |ends: &[[i32; 3]; 2], number: usize| {
+        [0, 1, 2].map(|axis: usize| ends[number >> axis & 1][axis])
+    };
+    let positions: Vec<[i32; 3]> =
+        boxes.iter().flat_map(|ends| (0..8).map(move |n| corner_of(ends, n))).collect();
+    let corners = (0..boxes.len() as u16).flat_map(|n| {
+        let faces = FACES.into_iter().flat_map(|face| (0..4).zip(face));
+        faces.map(move |(at, corner)| Corner::new(8 * n + corner, false, at == 3))
+    });
+    let corners = corners.collect();
+    (seen(&positions, page), positions, corners)
+}
+
+/// Maps positions to the page by these rows, without rounding.
+fn seen(positions: &[[i32; 3]], page: [[i32; 3]; 3]) -> Vec<Vertex> {
+    let along = |row: [i32; 3], at: &[i32; 3]| (0..3).map(|axis| row[axis] * at[axis]).sum();
+    let vertex = |at: &[i32; 3]| Vertex {
+        x: along(page[0], at),
+        y: along(page[1], at),
+        z: along(page[2], at) + 100_000,
+    };
+    positions.iter().map(vertex).collect()
+}
+
+/// Returns the sum of the lengths of all visible stretches on the page, in units of the view.
+fn visible_length(found: &[Stretch]) -> f64 {
+    let part = |at: EdgeParameter| at.numerator as f64 / at.denominator as f64;
+    let length = |stretch: &Stretch| {
+        let (from, to) = stretch.ends;
+        let [x, y] = [to.x - from.x, to.y - from.y].map(f64::from);
+        libm::sqrt(x * x + y * y) * (part(stretch.to) - part(stretch.from))
+    };
+    found.iter().filter(|stretch| stretch.visible).map(length).sum()
+}
+
+/// Views from above and the front, from below, from behind, and from the side.
+const PAGES: [[[i32; 3]; 3]; 4] = [
+    [[5, -3, 0], [2, 3, 6], [3, 5, -4]],
+    [[5, 3, 1], [1, -3, 6], [3, -5, 4]],
+    [[-7, 2, 0], [1, 4, 7], [-2, -6, -5]],
+    [[2, 7, 1], [-3, 1, 8], [-6, 2, 3]],
+];
+
+/// Two blocks that touch and are flush on three sides look as the one solid that they make: an L.
+#[test]
+fn merged_blocks_look_as_the_solid_that_they_make() {
+    let merged = Options { merged_blocks: true, ..Options::default() };
+    // The long block lies, and the short one stands on its end.
+    let (long, short) = ([[0, 0, 0], [900, 300, 200]], [[0, 0, 200], [400, 300, 700]]);
+    let profile = [[0, 0], [900, 0], [900, 200], [400, 200], [400, 700], [0, 700]];
+    let solid: Vec<[i32; 3]> =
+        [0, 300].into_iter().flat_map(|y| profile.map(|[x, z]| [x, y, z])).collect();
+    let mut faces: Vec<Vec<u16>> = std::vec![(0..6).collect(), (6..12).rev().collect()];
+    faces.extend((0..6).map(|n| [n, n + 6, (n + 1) % 6 + 6, (n + 1) % 6].to_vec()));
+    let solid_corners = faces.iter().flat_map(|face| {
+        (1..=face.len()).zip(face).map(|(n, &to)| Corner::new(to, false, n == face.len()))
+    });
+    let solid_corners: Vec<Corner> = solid_corners.collect();
+    for page in PAGES {
+        // In either order, because the faces are asked in the order of depth.
+        for blocks in [[long, short], [short, long]] {
+            let (vertices, positions, corners) = boxes(&blocks, page);
+            let unrounded = Unrounded::new(&positions, Precision::default(), 1);
+            let scene = Scene { unrounded, ..parallel(&vertices, &corners) };
+            let apart = stretches(&scene, Options::default(), 1 << 12);
+            let found = stretches(&scene, merged, 1 << 12);
+            let vertices = seen(&solid, page);
+            let whole =
+                stretches(&parallel(&vertices, &solid_corners), Options::default(), 1 << 12);
+            let [apart, found, whole] = [apart, found, whole].map(|lines| visible_length(&lines));
+            assert!((found - whole).abs() < 1e-6 * whole, "{page:?}: {found}, not {whole}");
+            assert!(apart > whole + 300.0, "{page:?}: {apart} {whole}");
+        }
+    }
+}
+
+/// The line where a block stands on another is kept, although the underside of the one and the top
+/// of the other lie in one plane.
+#[test]
+fn a_block_that_stands_on_another_keeps_its_line() {
+    let merged = Options { merged_blocks: true, ..Options::default() };
+    for page in PAGES {
+        let blocks = [[[0, 0, 0], [900, 700, 200]], [[300, 200, 200], [500, 400, 600]]];
+        let (vertices, positions, corners) = boxes(&blocks, page);
+        let unrounded = Unrounded::new(&positions, Precision::default(), 1);
+        let scene = Scene { unrounded, ..parallel(&vertices, &corners) };
+        let (apart, found) =
+            (stretches(&scene, Options::default(), 1 << 12), stretches(&scene, merged, 1 << 12));
+        assert_eq!(apart, found, "{page:?}");
+    }
+}
