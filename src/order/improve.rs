@@ -151,7 +151,8 @@ pub(super) fn improve<'t, I: Index>(
     }
     #[cfg(feature = "threads")]
     if let Some(time_model) = all_cores {
-        (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
+        best.charge_lifts(lift_cost);
+        best.cost += 1;
         return best.anneal_on_all_cores(cycle, time_model, scratch, work_budget);
     }
     let last = match effort {
@@ -166,7 +167,9 @@ pub(super) fn improve<'t, I: Index>(
     };
     // Lifts get their cost only now: with a cost from the start, the exchanges that shorten the
     // moves would be rejected.
-    (best.lift_cost, best.cost) = (lift_cost, u64::MAX);
+    best.charge_lifts(lift_cost);
+    // Of two tours that cost the same, the one that was found last is kept.
+    best.cost += 1;
     best.restore(cycle);
     best.work_on(cycle, last, scratch, work_budget)?;
     Ok(())
@@ -187,14 +190,7 @@ pub(super) fn improve_further<'r, I: Index>(
 ) -> Result<(), OrderError> {
     if let Some(mut best) = Best::new(network, route, true, &mut scratch, work_budget)? {
         let cycle = scratch.take(best.route.len() + 1)?;
-        best.lift_cost = lift_cost;
-        // Only what is shorter is kept.
-        let begin = best.route.first().map(|&leg| network.start(leg));
-        let first_move = network.anchor().zip(begin);
-        let first_move = first_move.map(|(from, to)| u64::from(network.distance(from, to)));
-        let moves = route_moves(network, best.route, true).filter(|&length| length > 0);
-        let lift = u64::from(lift_cost) + 1;
-        best.cost = first_move.into_iter().chain(moves).map(|length| length + lift).sum();
+        best.charge_lifts(lift_cost);
         best.restore(cycle);
         let until = Until::Annealed { units, heat: WHOLE_HEAT };
         best.work_on(cycle, until, scratch, work_budget)?;
@@ -328,6 +324,19 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
         };
         let (route, _) = cycle.split_at_mut(self.route.len());
         unused.nearest_first(start, Some(self.neighbours), route, work_budget)
+    }
+
+    /// Gives each lift this cost from now on, also in the cost of the shortest tour found so far.
+    fn charge_lifts(&mut self, lift_cost: u32) {
+        let network = self.network;
+        let begin = self.route.first().map(|&leg| network.start(leg));
+        let first_move = network.anchor().zip(begin);
+        let first_move = first_move.map(|(from, to)| u64::from(network.distance(from, to)));
+        let moves = route_moves(network, self.route, self.open).filter(|&length| length > 0);
+        // As `Exchanges::distance` counts them.
+        let lift = u64::from(lift_cost) + 1;
+        let costs = first_move.into_iter().chain(moves).map(|length| length + lift);
+        (self.lift_cost, self.cost) = (lift_cost, costs.sum());
     }
 
     /// Copies the shortest tour found so far into `cycle`, to be changed there.

@@ -108,6 +108,27 @@ fn small_drawings_have_the_shortest_tour() {
     }
 }
 
+/// A few strokes all over the largest page are worth annealing, which must not make them longer.
+/// Distances there no longer fit the weights of the matching, which then lack their last bit.
+#[test]
+fn drawings_as_large_as_the_page_have_nearly_the_shortest_tour() {
+    const CELL: i32 = (PAGE_LIMIT - 20) / 8;
+    for shape in [Shape::OpenPath, Shape::ClosedCycle] {
+        for seed in 0..30 {
+            let (mut points, segments) = drawing(5, 16, seed);
+            for point in &mut points {
+                let spread = |at: i32, step: i32| (at / step - 7) * CELL + at / step * 7 % 13;
+                *point = PagePoint { x: spread(point.x, 37), y: spread(point.y, 41) };
+            }
+            let options = Options { shape, ..Options::default() };
+            let (strokes, report) = ordered(&points, &segments, options);
+            let least = shortest(&mut strokes.clone(), &mut Vec::new(), shape);
+            assert!(report.pen_up <= least + least / 100, "{shape:?}, {seed}: {report:?}, {least}");
+            assert!(report.bound <= least, "{shape:?}, {seed}: {report:?}, {least}");
+        }
+    }
+}
+
 #[test]
 fn odd_points_and_parts_are_counted() {
     for seed in 0..40 {

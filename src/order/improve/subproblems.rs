@@ -109,7 +109,6 @@ impl<I: Index> Best<'_, '_, I> {
         if self.open {
             begin_after(cycle, chains);
         }
-        self.cost = u64::MAX;
         self.work_on(cycle, Until::Exchanged(time_model), scratch, work_budget)?;
         Ok(())
     }
