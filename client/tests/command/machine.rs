@@ -60,6 +60,27 @@ fn a_port_that_another_program_uses_is_named() {
     assert_eq!(code, Some(0), "{error}");
 }
 
+/// A program that is slow to read gets each byte of an answer that is longer than the buffer of the
+/// pseudo-terminal.
+#[test]
+fn no_byte_is_lost_while_a_program_does_not_read() {
+    let plotter = Library::new();
+    let mut port = serialport::new(&plotter.device, 115_200).open().expect("opened");
+    port.set_timeout(Duration::from_secs(60)).expect("set");
+    let questions = 8;
+    for _ in 0..questions {
+        port.write_all(b"$$\n").expect("sent");
+    }
+    std::thread::sleep(Duration::from_secs(2));
+    let (mut heard, mut bytes) = (String::new(), [0; 256]);
+    while heard.matches("ok\r\n").count() < questions {
+        let count = port.read(&mut bytes).expect("bytes");
+        heard += std::str::from_utf8(&bytes[..count]).expect("text");
+    }
+    let settings = heard.lines().filter(|line| line.starts_with('$')).count();
+    assert_eq!(settings, questions * penup::machine::SETTINGS.len());
+}
+
 #[test]
 fn the_machine_moves_is_set_and_refuses_in_its_words() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -7,14 +7,25 @@ use penup_job::room::Room;
 use rustix::io::ioctl_fionbio;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
 use rustix::termios::{OptionalActions, tcgetattr, tcsetattr};
+use std::collections::VecDeque;
 use std::fs;
-use std::io::{Read as _, Write as _};
+use std::io::{self, Read as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::thread::JoinHandle;
 use std::time::Duration;
+
+/// Writes as many of the bytes as the wire takes, and forgets those that it took. Where no program
+/// holds the other end, it forgets them all, as a serial line would.
+fn say(wire: &mut fs::File, unread: &mut VecDeque<u8>) {
+    match wire.write(unread.make_contiguous()) {
+        Ok(count) => drop(unread.drain(..count)),
+        Err(error) if error.kind() == io::ErrorKind::WouldBlock => {}
+        Err(_) => unread.clear(),
+    }
+}
 
 /// A plotter of the library at the other end of a pseudo-terminal. Its time passes some fifty times
 /// as fast as ours, and only while it is plugged in.
@@ -66,6 +77,7 @@ impl Library {
             let flash = CutFlash::new(LAYOUT.end() as usize);
             let mut plotter = InMemory::<u16>::with_flash(room(), flash);
             let mut heard = Vec::new();
+            let mut unread = VecDeque::new();
             let mut buffer = [0; 64];
             let is_bad = name.is_some();
             // Only what stands in lines is damaged: other bytes may stop the machine.
@@ -111,8 +123,9 @@ impl Library {
                 let count = plotter.receive(&mut buffer, Duration::ZERO).expect("memory");
                 if !is_deaf.load(Ordering::Relaxed) {
                     damage(&mut buffer[..count]);
-                    let _ = wire.write_all(&buffer[..count]);
+                    unread.extend(&buffer[..count]);
                 }
+                say(&mut wire, &mut unread);
                 let pause = if is_slow.load(Ordering::Relaxed) { 20 } else { 1 };
                 std::thread::sleep(Duration::from_millis(pause));
             }

@@ -76,7 +76,8 @@ fn settings_in(said: &str) -> Vec<(String, f64)> {
 fn assert_told(plotter: &Library, folder: &Path, told: &[(String, f64)]) {
     let (_, now) = plotter.json(folder, &["settings", "show"]);
     let (_, new) = Library::new().json(folder, &["settings", "show"]);
-    let (now, new) = (now["settings"].as_object().expect("a table"), &new["settings"]);
+    let (said, new) = (now, &new["settings"]);
+    let now = said["settings"].as_object().unwrap_or_else(|| panic!("no settings: {said}"));
     let differs: Vec<(&String, f64)> = now
         .iter()
         .filter(|(number, value)| new[number.as_str()] != **value)
