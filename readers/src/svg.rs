@@ -28,10 +28,10 @@ mod drawing;
 mod embedded;
 mod encoding;
 mod flatten;
+mod lengths;
 mod markup;
 mod pens;
 mod runs;
-mod size;
 #[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
 mod text;
 mod unread;

@@ -3,9 +3,11 @@
 //!
 //! Transforms get the form that they have in SVG. The line height in `font` is left out, and so are
 //! custom properties, because `usvg` reads nothing that follows them. The pseudo-class `:root`
-//! becomes an attribute selector, which counts as much, for an attribute that the root is given.
+//! becomes an attribute selector, which counts as much, for an attribute that the root is given. Units
+//! in capitals become small letters, and the marks of a comment of HTML around a style sheet are left
+//! out, as CSS wants it.
 
-use super::unread;
+use super::{lengths, unread};
 use std::borrow::Cow;
 use std::ops::Range;
 use usvg::roxmltree::{Document, Node};
@@ -29,15 +31,19 @@ pub(super) fn names_root(document: &Document<'_>) -> bool {
 pub(super) fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<Edit> {
     let mut ranges: Vec<_> =
         node.attribute_node("style").map(|style| style.range_value()).into_iter().collect();
+    let mut found = Vec::new();
     if is_sheet(node) {
-        ranges.extend(contents(node, text));
+        let sheets = contents(node, text);
+        let marks = sheets.iter().flat_map(|sheet| html_marks(text, sheet.clone()));
+        found.extend(marks.map(|mark| (mark, String::new())));
+        ranges.extend(sheets);
     }
-    let found = ranges.into_iter().flat_map(|range| {
+    for range in ranges {
         let start = range.start;
-        let found = edits(text.get(range).unwrap_or_default()).into_iter();
-        found.map(move |(it, instead)| (start + it.start..start + it.end, instead))
-    });
-    found.collect()
+        let edits = edits(text.get(range).unwrap_or_default()).into_iter();
+        found.extend(edits.map(|(it, instead)| (start + it.start..start + it.end, instead)));
+    }
+    found
 }
 
 /// Where the contents of a style sheet lie in the text.
@@ -56,6 +62,14 @@ fn contents(sheet: Node<'_, '_>, text: &str) -> Vec<Range<usize>> {
         only.end = only.start + length;
     }
     ranges
+}
+
+/// The marks of comments of HTML in a range of the text that holds a style sheet. CSS passes over
+/// them, though not over what lies between them (CSS Syntax 3, section 5.4.1).
+fn html_marks(text: &str, sheet: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    let css = text.get(sheet.clone()).unwrap_or_default();
+    let marks = ["<!--", "-->"].into_iter().flat_map(|mark| css.match_indices(mark));
+    marks.map(move |(at, mark)| sheet.start + at..sheet.start + at + mark.len())
 }
 
 fn is_sheet(node: Node<'_, '_>) -> bool {
@@ -182,7 +196,7 @@ fn edit_of_declaration(part: &Part<'_>) -> Option<Edit> {
     let instead = match name.trim_end() {
         "transform" => unread::plain_transform(&plain)?,
         "font" => without_line_height(&plain)?,
-        _ => return None,
+        name => lengths::plain_value(name, &plain)?,
     };
     (instead != value).then(|| (start..start + value.len(), instead))
 }

@@ -6,7 +6,7 @@
 use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
-use super::{css, runs, size, unread};
+use super::{css, lengths, runs, unread};
 use crate::page::Page;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -144,7 +144,9 @@ fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<css::Edit> {
     let own_condition = own_condition.filter(|_| !is_one_of(node, &["foreignObject"]));
     edits.extend(own_condition.map(|it| (it.range_value(), FEATURE.to_owned())));
     if node == node.document().root_element() {
-        edits.extend(size::edits_of(node));
+        edits.extend(lengths::edits_of_size(node));
+    } else {
+        edits.extend(lengths::edits_of_attributes(node));
     }
     edits
 }
@@ -295,7 +297,7 @@ impl<'a, 'input> Markup<'a, 'input> {
 
     /// Says how large a unit is taken to be, if the file does not say the size of its `page`.
     pub(super) fn size_note(&self, page: Page) -> Option<String> {
-        if size::is_said(self.document.root_element()) {
+        if lengths::is_said(self.document.root_element()) {
             return None;
         }
         let Page { width, height } = page;

@@ -2,6 +2,7 @@
 //! animations, and paints of other programs. All of it is counted, for the user.
 
 use super::css::without_comments;
+use super::lengths;
 use super::markup::{Count, SHAPES, is_one_of};
 use std::collections::BTreeMap;
 use std::str::FromStr as _;
@@ -98,7 +99,10 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
     if is_unread {
         return Some(format!("the property {name} of CSS"));
     }
-    value.contains("var(").then(|| "a variable of CSS".to_owned())
+    if value.contains("var(") {
+        return Some("a variable of CSS".to_owned());
+    }
+    lengths::unread(name, value)
 }
 
 /// What is not read of a style sheet.

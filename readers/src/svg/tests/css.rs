@@ -109,6 +109,8 @@ fn a_style_sheet_moves_shapes_as_an_attribute_does() {
         "/* .a{ */.a{transform:translate(10px,5px)",
         "/*<![CDATA[*/.a{transform:translate(10px,5px)}/*]]>*/.b{--c:d",
         "<![CDATA[.a{transform:translate(10px,5px)}.b{--c:d]]>",
+        "<![CDATA[<!--\n.a{transform:translate(10px,5px)}\n-->]]>",
+        "<![CDATA[<!-- .b{fill:red} --> .a{transform:translate(10px,5px)}]]>",
     ] {
         assert_eq!(sheet(moved), [[[20.0, 85.0], [30.0, 85.0]]], "{moved}");
     }

@@ -49,3 +49,41 @@ fn a_size_that_depends_on_the_window_or_is_no_length_is_not_said() {
         assert_eq!(sized(size), ([26.458, 13.229], [2.646, 6.614], true), "{size}");
     }
 }
+
+#[test]
+fn units_in_capitals_are_units_and_other_lengths_are_named() {
+    let drawn = |shape: &str| {
+        let contents = read(&in_mm(shape)).expect("an SVG");
+        (polylines(&contents), contents.notes().to_vec())
+    };
+    let small = drawn("<rect x='5mm' y='1cm' width='20mm' height='10mm' stroke='red'/>");
+    for shape in [
+        "<rect x='5MM' y='1Cm' width='80Q' height='40q' stroke='red'/>",
+        "<rect x='5MM' y='1CM' width='20mm' height='10MM' stroke='red' stroke-width='1MM'/>",
+    ] {
+        assert_eq!(drawn(shape), small, "{shape}");
+    }
+    let dashes = |dashes: &str| drawn(&format!("<path d='M5 5H30' stroke='red' {dashes}/>"));
+    let small = dashes("stroke-dasharray='1mm,2mm'");
+    for capitals in [
+        "stroke-dasharray='1MM,  8Q'",
+        "style='stroke-dasharray:1MM /* a */ 8q'",
+        "class='a'/><style>.a{stroke-dasharray:1MM,8q}</style><g",
+    ] {
+        assert_eq!(dashes(capitals), small, "{capitals}");
+    }
+    let line = "<path d='M5 5H30' stroke='red'/>";
+    for (shape, what) in [
+        ("<circle cx='9' cy='9' r='2rem' stroke='red'/>", "a length in rem as r"),
+        ("<rect width='10vw' height='5' stroke='red'/>", "a length in vw as width"),
+        ("<circle r='calc(1px + 2px)' stroke='red'/>", "a calculation as r"),
+        ("<path d='M5 5H30' stroke='red' style='stroke-dasharray:1,2vh'/>", "a length in vh as st"),
+    ] {
+        let (_, notes) = drawn(&format!("{line}{shape}"));
+        let said = format!("1 element or style sheet has {what}");
+        assert!(notes.iter().any(|note| note.starts_with(&said)), "{shape}: {notes:?}");
+    }
+    for harmless in ["font-size='medium'", "letter-spacing='normal'", "r='50%' x='1e1 -2E-1,3'"] {
+        assert!(drawn(&format!("<g {harmless}>{line}</g>")).1.is_empty(), "{harmless}");
+    }
+}

@@ -1,0 +1,116 @@
+//! Reads lengths with all units that have a length of their own, also in capitals, and first of all
+//! the size that an SVG says it has.
+
+use super::css::Edit;
+use usvg::roxmltree::Node;
+
+/// A length of CSS as `usvg` reads it: with a unit in small letters; `None` if it is no length, or
+/// depends on the window.
+fn plain_length(length: &str) -> Option<String> {
+    let length = length.trim();
+    let number = length.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+    let unit = length.strip_prefix(number)?.to_ascii_lowercase();
+    let value: f64 = number.parse().ok().filter(|value: &f64| value.is_finite())?;
+    match unit.as_str() {
+        // A quarter of a millimetre.
+        "q" => Some(format!("{}mm", value / 4.0)),
+        "" | "px" | "in" | "cm" | "mm" | "pt" | "pc" | "em" | "ex" => {
+            Some(number.to_owned() + &unit)
+        }
+        _ => None,
+    }
+}
+
+/// The attributes and properties whose values are lengths, or lists of them.
+const LENGTHS: [&str; 22] = [
+    "cx",
+    "cy",
+    "dx",
+    "dy",
+    "font-size",
+    "height",
+    "letter-spacing",
+    "r",
+    "rx",
+    "ry",
+    "startOffset",
+    "stroke-dasharray",
+    "stroke-dashoffset",
+    "stroke-width",
+    "textLength",
+    "width",
+    "word-spacing",
+    "x",
+    "x1",
+    "x2",
+    "y",
+    "y1",
+];
+
+/// The lengths in a list, with what separates them.
+fn listed(value: &str) -> impl Iterator<Item = &str> {
+    value.split_inclusive([' ', ',', '\t', '\n', '\r'])
+}
+
+/// The value of this attribute or property as `usvg` reads it; `None` if it does so already, or if
+/// it is no length.
+pub(super) fn plain_value(name: &str, value: &str) -> Option<String> {
+    let is_special = |letter: char| letter.is_ascii_uppercase() || letter == 'q';
+    if !LENGTHS.contains(&name) || !value.contains(is_special) {
+        return None;
+    }
+    let lengths = listed(value).map(|part| {
+        let length = part.trim_end_matches([' ', ',', '\t', '\n', '\r']);
+        let plain = if length.is_empty() || length.ends_with('%') {
+            length.to_owned()
+        } else {
+            plain_length(length)?
+        };
+        Some(plain + part.get(length.len()..).unwrap_or_default())
+    });
+    lengths.collect::<Option<String>>().filter(|plain| plain != value)
+}
+
+/// What `usvg` does not read of the value of this attribute or property.
+pub(super) fn unread(name: &str, value: &str) -> Option<String> {
+    if !LENGTHS.contains(&name) {
+        return None;
+    }
+    if value.contains('(') {
+        return Some(format!("a calculation as {name}"));
+    }
+    let unit = listed(value).find_map(|part| {
+        let length = part.trim_matches([' ', ',', '\t', '\n', '\r']);
+        let number = length.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+        let is_number = number.parse::<f64>().is_ok();
+        (is_number && plain_length(length).is_none()).then(|| length.get(number.len()..))?
+    })?;
+    Some(format!("a length in {unit} as {name}"))
+}
+
+/// The corrections of the lengths of an element.
+pub(super) fn edits_of_attributes(node: Node<'_, '_>) -> impl Iterator<Item = Edit> {
+    node.attributes()
+        .filter(|it| it.namespace().is_none())
+        .filter_map(|it| plain_value(it.name(), it.value()).map(|plain| (it.range_value(), plain)))
+}
+
+/// Whether the root of an SVG has a width or a height that is a length.
+pub(super) fn is_said(root: Node<'_, '_>) -> bool {
+    let mut sides = ["width", "height"].into_iter().filter_map(|name| root.attribute(name));
+    sides.any(|side| plain_length(side).is_some())
+}
+
+/// The corrections of the size of an SVG, whose root this is. Where one side has a length and the
+/// other is a part of the window, that other is left out, so that it follows from the viewBox.
+pub(super) fn edits_of_size(root: Node<'_, '_>) -> Vec<Edit> {
+    let sides = ["width", "height"].map(|name| root.attribute_node(name));
+    if !is_said(root) {
+        return Vec::new();
+    }
+    let edits = sides.into_iter().flatten().map(|side| {
+        let length = plain_length(side.value()).unwrap_or_default();
+        (side.value() != length).then(|| (side.range_value(), length))
+    });
+    edits.flatten().collect()
+}
