@@ -174,7 +174,7 @@ enum Task {
         #[arg(default_value_t = 30)]
         minutes: u32,
         /// The seed of the random numbers.
-        #[arg(default_value_t = 1)]
+        #[arg(long, default_value_t = 1)]
         seed: u64,
         /// Draws one job of half an hour instead, which is cut ten times.
         #[arg(long, conflicts_with_all = ["minutes", "streamed"])]
@@ -197,7 +197,7 @@ enum Task {
         #[arg(default_value_t = 60)]
         minutes: u32,
         /// The seed of the random numbers.
-        #[arg(default_value_t = 1)]
+        #[arg(long, default_value_t = 1)]
         seed: u64,
     },
     /// Changes the library in small ways, and lists the changes that no unit test finds; needs
