@@ -135,7 +135,7 @@ enum Task {
         /// The first seed.
         #[arg(default_value_t = 1)]
         first: u64,
-        /// How many seeds, of 70 jobs each (a minute for 100).
+        /// How many seeds, of 90 jobs each (a minute for 100).
         #[arg(default_value_t = 100)]
         seeds: u64,
     },
