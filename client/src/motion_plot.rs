@@ -6,7 +6,7 @@
 //! grey. Only Cartesian machines are plotted.
 
 use penup::drawing::PagePoint;
-use penup::machine::{Machine, MachineError, Path, PulserState, Setting, Settings, Target};
+use penup::machine::{Machine, MachineError, Path, PulserState, Setting, Settings, State, Target};
 use penup::motion::{Block, EventKind, EventQueue, StepEvent, TICKS_PER_SECOND};
 use std::fmt::Write as _;
 
@@ -78,7 +78,8 @@ impl Recorder {
     }
 }
 
-/// Plans a whole job, which starts at the page's origin, and passes its step events to `queue`.
+/// Plans a whole job, which starts at the page's origin, and passes its step events to `queue`. It
+/// goes on at once where the machine waits for another pen or for ink.
 ///
 /// # Errors
 /// The machine refuses the job.
@@ -92,7 +93,14 @@ pub(crate) fn plan(
     let mut machine = Machine::new(settings, &mut blocks, &pins, u32::MAX);
     machine.start(path)?;
     machine.fill(path, queue);
-    Ok(())
+    while matches!(machine.state(), State::Hold { .. }) {
+        machine.resume();
+        machine.fill(path, queue);
+    }
+    match machine.state() {
+        State::Idle => Ok(()),
+        state => Err(MachineError::State(state)),
+    }
 }
 
 /// Measures the moves of a job, which starts at the page's origin.

@@ -6,7 +6,7 @@
 //! including its refusals.
 
 use crate::error::Error;
-use crate::link::Link;
+use crate::link::{Answer, Link};
 use crate::motion_plot::{self, Motion};
 use crate::planned::PlannedBoard;
 use penup::boards::host::CutFlash;
@@ -345,6 +345,11 @@ impl<I: Index> Link for InMemory<I> {
     fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
         self.board.steps.change_pen(pen);
         Ok(true)
+    }
+
+    /// Goes on at once: the pen of a preview is full again after a pause for ink (`$215`).
+    fn ask_to_resume(&mut self, _first: bool) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     fn now(&self) -> Instant {

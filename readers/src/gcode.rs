@@ -19,6 +19,7 @@ mod systems;
 mod text;
 
 use super::arrange::Arrangement;
+use super::counted;
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::Plan;
@@ -79,6 +80,8 @@ struct Interpreter {
     home: [Option<f64>; 2],
     /// The number of moves along x or y by `G53`, and the line of the first.
     machine_moves: (usize, usize),
+    /// The number of lines that begin with `/`, and the first of them.
+    optional: (usize, usize),
     /// The words that were not obeyed, with their count and the first line.
     unknown: BTreeMap<String, (usize, usize)>,
 }
@@ -115,6 +118,7 @@ impl Interpreter {
             is_at_home: [false; 2],
             home: [None; 2],
             machine_moves: (0, 0),
+            optional: (0, 0),
             unknown: BTreeMap::new(),
         }
     }
@@ -142,7 +146,15 @@ impl Interpreter {
                 "{count} words {word} have no meaning for a drawing (the first in line {line})"
             ),
         });
-        machine_moves.into_iter().chain(unknown)
+        let optional = match self.optional {
+            (0, _) => None,
+            (1, line) => Some(format!("line {line} begins with / and is drawn, as Grbl draws it")),
+            (count, line) => Some(format!(
+                "{count} lines begin with / and are drawn, as Grbl draws them (the first is line \
+                 {line})"
+            )),
+        };
+        machine_moves.into_iter().chain(optional).chain(unknown)
     }
 
     /// Carries out a line. Returns whether the program continues after it.
@@ -151,6 +163,13 @@ impl Interpreter {
         let words = match parse(text)? {
             Line::Words(words) => words,
             Line::Skipped => return Ok(true),
+            Line::Optional(rest) => {
+                self.optional.0 += 1;
+                if self.optional.0 == 1 {
+                    self.optional.1 = number;
+                }
+                return self.line(&rest, number);
+            }
             Line::Pause => {
                 self.changes.pause(number);
                 return Ok(true);
@@ -467,8 +486,10 @@ impl Format for GCode {
         let is_read = |(index, line): (usize, &&str)| interpreter.line(line, index).is_ok();
         lines.iter().enumerate().all(is_read)
             && interpreter.unknown.keys().all(|word| {
-                word.strip_prefix(['G', 'M'])
-                    .is_some_and(|rest| rest.starts_with(|it: char| it.is_ascii_digit()))
+                word.starts_with('$')
+                    || word
+                        .strip_prefix(['G', 'M'])
+                        .is_some_and(|rest| rest.starts_with(|it: char| it.is_ascii_digit()))
             })
             && interpreter.moves.len() > 0
     }
@@ -481,16 +502,23 @@ impl Format for GCode {
             line: index + 1,
             text: line.chars().take(Origin::MOST_SHOWN + 1).collect(),
         };
-        for (index, line) in text.lines().enumerate() {
+        let mut lines = text.lines().enumerate();
+        let mut end = None;
+        for (index, line) in lines.by_ref() {
             if line.contains('\0') {
                 return Err(ReadError::NotText { origin: origin(index, line), kind: "G-code" });
             }
             match interpreter.line(line, index + 1) {
                 Ok(true) => {}
-                Ok(false) => break,
+                Ok(false) => {
+                    end = Some(index + 1);
+                    break;
+                }
                 Err(reason) => return Err(ReadError::Line { origin: origin(index, line), reason }),
             }
         }
+        let is_code = |line: &str| !matches!(parse(line), Ok(Line::Skipped));
+        let behind = lines.filter(|(_, line)| is_code(line)).count();
         let mut plan = Plan::new(file.clone());
         let drawn = signals::inked(&interpreter.moves, interpreter.has_absolute_heights);
         let mut inked = interpreter.moves.iter().zip(&drawn).filter(|(_, draws)| **draws);
@@ -519,6 +547,12 @@ impl Format for GCode {
         }
         notes.extend(interpreter.changes.draw(&interpreter.moves, drawn, &text, &mut plan));
         notes.extend(interpreter.notes());
+        if let Some(end) = end.filter(|_| behind > 0) {
+            let lines = counted(behind, ["line", "lines"]);
+            notes.push(format!(
+                "{lines} behind the end of the program (M2 or M30 in line {end}) not drawn"
+            ));
+        }
         if plan.is_empty() {
             let mut reason = "there is nothing to draw in this G-code".to_owned();
             notes.iter().for_each(|note| reason += &format!("; {note}"));

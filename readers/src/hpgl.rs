@@ -62,6 +62,8 @@ struct Reader {
     unknown: BTreeMap<String, usize>,
     /// The byte where the label begins that the file does not end.
     endless: Option<usize>,
+    /// The byte where the polygon begins that is not complete.
+    polygon: Option<usize>,
 }
 
 impl Reader {
@@ -79,6 +81,7 @@ impl Reader {
             sheets: 1,
             unknown: BTreeMap::new(),
             endless: None,
+            polygon: None,
         }
     }
 
@@ -228,6 +231,8 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
         let begin = instruction.begin;
         let refused = |reason| (begin, reason);
         reader.push(byte, begin).map_err(refused)?;
+        let is_in_polygon = reader.interpreter.is_in_polygon();
+        reader.polygon = is_in_polygon.then(|| reader.polygon.unwrap_or(begin));
         if let Some(error) = reader.interpreter.take_error() {
             let name = instruction.name.clone();
             reader.judge(error, &name).map_err(refused)?;
@@ -290,6 +295,13 @@ impl Format for HpGl {
                 "the file fills {} sheets of paper (PG), and only the first one is drawn: make a \
                  file of each",
                 reader.sheets
+            ));
+        }
+        if let Some(begin) = reader.polygon {
+            notes.push(format!(
+                "the polygon that begins in line {} has no end (PM2): all moves that follow it are \
+                 its points, and are not drawn",
+                line_of(begin)
             ));
         }
         if let Some(begin) = reader.endless {

@@ -50,13 +50,13 @@ impl Format for Stl {
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let mut mesh = Mesh::new(file.clone());
         let refused = |reason| Err(ReadError::Content { file: file.clone(), reason });
-        let mut behind = 0;
+        let (mut behind, mut is_cut) = (0, false);
         match Binary::of(&bytes) {
             Binary::Faces(faces, rest) => {
                 read_binary(&file, faces, &mut mesh)?;
                 behind = rest;
             }
-            _ if is_text(&bytes) => read_text(&file, &bytes, &mut mesh)?,
+            _ if is_text(&bytes) => is_cut = read_text(&file, &bytes, &mut mesh)?,
             Binary::Short { has, tells } if tells <= MOST_FACES => {
                 return refused(format!(
                     "the file ends after {has} of {tells} faces: copy or download it again"
@@ -67,6 +67,10 @@ impl Format for Stl {
         let mut contents = mesh.finish()?;
         if behind > 0 {
             contents.notes.push(format!("{behind} bytes behind the last face are not read"));
+        }
+        if is_cut {
+            let note = "the last solid has no end (endsolid): is the file complete?";
+            contents.notes.push(note.to_owned());
         }
         Ok(contents)
     }
@@ -130,9 +134,11 @@ fn read_binary(file: &str, faces: &[[u8; FACE]], mesh: &mut Mesh) -> Result<(), 
     Ok(())
 }
 
-fn read_text(file: &str, bytes: &[u8], mesh: &mut Mesh) -> Result<(), ReadError> {
+/// Reads a text file. Returns whether the end of its last solid is missing.
+fn read_text(file: &str, bytes: &[u8], mesh: &mut Mesh) -> Result<bool, ReadError> {
     let text = String::from_utf8_lossy(bytes);
     let (mut corners, mut number) = (Vec::new(), 0);
+    let (mut is_in_facet, mut is_in_solid) = (false, false);
     for (index, line) in text.lines().enumerate() {
         let refused = |reason: &str| {
             let text = line.chars().take(Origin::MOST_SHOWN + 1).collect();
@@ -152,16 +158,20 @@ fn read_text(file: &str, bytes: &[u8], mesh: &mut Mesh) -> Result<(), ReadError>
                     mesh.face(number, &corners);
                     corners.clear();
                 }
+                is_in_facet &= word.eq_ignore_ascii_case("endloop");
             }
-            "solid" | "facet" | "outer" | "endsolid" => {}
+            "facet" => is_in_facet = true,
+            "solid" => is_in_solid = true,
+            "endsolid" => is_in_solid = false,
+            "outer" => {}
             _ => return refused("this is no line of an STL file"),
         }
     }
-    if !corners.is_empty() {
+    if is_in_facet || !corners.is_empty() {
         let reason = "the file ends within a face: is it complete?".to_owned();
         return Err(ReadError::Content { file: file.to_owned(), reason });
     }
-    Ok(())
+    Ok(is_in_solid)
 }
 
 /// The point that the words of a line tell.
@@ -239,6 +249,14 @@ mod tests {
     }
 
     #[test]
+    fn a_text_without_its_end_is_told() {
+        let end = TEXT.rfind("endsolid").expect("an end");
+        let told = ["the last solid has no end (endsolid): is the file complete?"];
+        assert_eq!(notes("a.stl", &TEXT.as_bytes()[..end]), told);
+        assert_eq!(notes("a.stl", TEXT.as_bytes()), [""; 0]);
+    }
+
+    #[test]
     fn a_face_without_three_corners_is_counted() {
         let (a, b, c) = ([0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]);
         let bytes = binary("", &[[a, b, c], [a, a, b], [a, b, a]]);
@@ -260,6 +278,8 @@ mod tests {
             (b"solid\nfacet normal 0 0 1\nouter loop\nvertex 1 2\n", "a.stl:4: a vertex has three"),
             (b"solid\nfacet\nvertex 1 2 inf\n", "a.stl:3: a vertex has three finite numbers"),
             (b"solid\nvertex 1 2 3\n", "a.stl: the file ends within a face"),
+            (b"solid\nfacet\nvertex 0 0 0\nvertex 1 0 0\nvertex 0 1 0\nendloop\nendfacet\nfacet\n",
+                "a.stl: the file ends within a face"),
             (b"solid\nbanana\n", "a.stl:2: this is no line of an STL file"),
         ] {
             let error = sent("a.stl", bytes).expect_err("refused");

@@ -326,6 +326,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
+    /// Whether a polygon (PM) has begun and has not ended, so that moves become its points.
+    pub fn is_in_polygon(&self) -> bool {
+        self.polygon.is_open
+    }
+
     /// Returns the next action that results from the bytes so far. Take all actions before the next
     /// byte comes.
     pub fn next_action(&mut self) -> Option<Action> {

@@ -10,7 +10,7 @@ use penup_job::protocol::{ABORT, Reply, ReplyReader};
 use penup_readers::lines::acts_at_once;
 use serde_json::json;
 use std::collections::VecDeque;
-use std::io::{self, IsTerminal as _, Write as _};
+use std::io::{self, BufRead as _, IsTerminal as _, Write as _};
 use std::sync::atomic::AtomicBool;
 use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::Duration;
@@ -51,11 +51,14 @@ pub fn console(args: &PortArgs, is_json: bool, interrupt: &AtomicBool) -> Result
     Ok(Outcome { text: String::new(), json: json!({ "refused": refused }), is_answer: false })
 }
 
-/// Starts a thread that reads the standard input line by line.
-fn typed() -> Receiver<String> {
+/// Starts a thread that reads the standard input line by line. The last message may be an error.
+fn typed() -> Receiver<io::Result<String>> {
     let (sender, receiver) = mpsc::channel();
     std::thread::spawn(move || {
-        io::stdin().lines().map_while(Result::ok).all(|line| sender.send(line).is_ok())
+        let lines = io::stdin().lock().split(b'\n');
+        // Letters that are not UTF-8, such as those of a comment in Latin-1, do not end the input.
+        let text = |line: Vec<u8>| String::from_utf8_lossy(&line).trim_end_matches('\r').to_owned();
+        lines.map(|line| line.map(text)).all(|line| sender.send(line).is_ok())
     });
     receiver
 }
@@ -81,7 +84,7 @@ fn objects(bytes: &[u8], line: &mut Vec<u8>) -> Vec<u8> {
 /// come, which answers no line. Returns how many lines were refused.
 fn talk(
     link: &mut dyn Link,
-    typed: &Receiver<String>,
+    typed: &Receiver<io::Result<String>>,
     is_reset: bool,
     is_json: bool,
 ) -> Result<usize, Error> {
@@ -100,16 +103,17 @@ fn talk(
         || silences < LAST_SILENCES
     {
         match typed.try_recv() {
-            Ok(line) if line.trim() == ABORT_WORD => {
+            Ok(Err(error)) => return Err(error.into()),
+            Ok(Ok(line)) if line.trim() == ABORT_WORD => {
                 link.send(&[ABORT])?;
                 // The plotter forgets what it has not carried out, and answers by its greeting.
                 waiting.clear();
                 (is_answered, awaits_greeting) = (true, true);
             }
-            Ok(line) if !line.is_empty() && line.chars().all(acts_at_once) => {
+            Ok(Ok(line)) if !line.is_empty() && line.chars().all(acts_at_once) => {
                 link.send(line.as_bytes())?;
             }
-            Ok(line) => waiting.push_back(line),
+            Ok(Ok(line)) => waiting.push_back(line),
             Err(TryRecvError::Disconnected) => is_open = false,
             Err(TryRecvError::Empty) => {}
         }
@@ -196,7 +200,7 @@ mod tests {
             let mut plotter = Slow { greets_in, answers_in: None, lines: 0 };
             let (sender, typed) = mpsc::channel();
             for line in ["$H", "G0 X1"] {
-                sender.send(line.to_owned()).expect("it is read");
+                sender.send(Ok(line.to_owned())).expect("it is read");
             }
             drop(sender);
             let refused = talk(&mut plotter, &typed, true, true).expect("a conversation");

@@ -360,7 +360,7 @@ fn closed_lines_begin_at_random_points_if_the_user_wishes() {
 }
 
 /// Has the plotter carry out lines as they are.
-fn console(plotter: &Library, lines: &str) -> String {
+fn console(plotter: &Library, lines: impl AsRef<[u8]>) -> String {
     let mut console = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(["console", "--port", &plotter.device])
         .stdin(Stdio::piped())
@@ -368,7 +368,7 @@ fn console(plotter: &Library, lines: &str) -> String {
         .spawn()
         .expect("the program runs");
     let mut typed = console.stdin.take().expect("a pipe");
-    typed.write_all(lines.as_bytes()).expect("written");
+    typed.write_all(lines.as_ref()).expect("written");
     drop(typed);
     let output = console.wait_with_output().expect("it ends");
     assert_eq!(output.status.code(), Some(0));
@@ -379,9 +379,10 @@ fn console(plotter: &Library, lines: &str) -> String {
 fn the_console_sends_lines_and_prints_the_answers() {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
-    let said = console(&plotter, "$I\n$100=0\nG0 X5\nv 1 2\n?\n");
+    // The comment is in Latin-1.
+    let said = console(&plotter, b"$I\n$100=0\n(caf\xE9)\r\nG0 X5\nv 1 2\n?\n");
     assert!(said.contains("[VER:1.1h.penup"), "{said}");
-    assert_eq!(said.matches("ok\r\n").count(), 2, "{said}");
+    assert_eq!(said.matches("ok\r\n").count(), 3, "{said}");
     assert_eq!(said.matches("error:").count(), 2, "{said}");
     assert!(said.contains("|MPos:"), "{said}");
     let (_, status) = plotter.json(folder.path(), &["status"]);

@@ -35,6 +35,40 @@ fn the_standard_input_and_output_are_those_of_tape_and_fit_too() {
     assert_eq!(files(folder.path()), ["plan-fitted.obj", "plan.obj", "plan.tape"]);
 }
 
+/// A tape has no pens, and the plot of the motion shows what all of them draw.
+#[test]
+fn all_pens_and_every_refill_are_on_a_tape_and_in_the_plot_of_the_motion() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let vertices = "v 20 20 0\nv 40 20 0\nv 40 30 0\n";
+    let pens = "usemtl a\nl 1 2\nusemtl b\nl 2 3\n";
+    fs::write(folder.path().join("pens.obj"), format!("{vertices}{pens}")).expect("written");
+    fs::write(folder.path().join("one.obj"), format!("{vertices}l 1 2 3\n")).expect("written");
+    let lengths = |name: &str| {
+        let (code, _, error) = penup(folder.path(), &["tape", "encode", name, "--quiet"]);
+        assert_eq!(code, Some(0), "{error}");
+        let (_, said, _) = penup(folder.path(), &["tape", "decode", &name.replace("obj", "tape")]);
+        let words = said.split_ascii_whitespace();
+        words.filter_map(|word| word.parse::<u32>().ok()).sum::<u32>()
+    };
+    assert_eq!(lengths("pens.obj"), lengths("one.obj"));
+    let lines = format!("{vertices}v 20 30 0\nl 1 2\nl 3 4\n");
+    fs::write(folder.path().join("lines.obj"), &lines).expect("written");
+    let by_pens = lines.replace("l 3", "usemtl b\nl 3");
+    fs::write(folder.path().join("lines-by-pens.obj"), by_pens).expect("written");
+    let seconds = |name: &str, more: &[&str]| {
+        let plot = [&["preview", name, "--motion", "motion.svg"][..], more].concat();
+        let (code, _, error) = penup(folder.path(), &plot);
+        assert_eq!(code, Some(0), "{error}");
+        let plot = fs::read_to_string(folder.path().join("motion.svg")).expect("readable");
+        let (before, _) = plot.split_once(" s; greatest").expect("the duration");
+        before.rsplit(' ').next().and_then(|it| it.parse::<f64>().ok()).expect("seconds")
+    };
+    let whole = seconds("lines.obj", &[]);
+    assert!(whole > 1.5, "{whole}");
+    assert_eq!(seconds("lines-by-pens.obj", &[]), whole);
+    assert_eq!(seconds("lines.obj", &["--set", "215=0.01"]), whole);
+}
+
 #[test]
 fn no_result_replaces_its_file_or_another_result() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -185,7 +185,8 @@ fn each_tool_draws_with_a_pen() {
         let program = program(changes);
         assert_eq!(pens(&program), expected, "{program}");
         let said = notes("a.nc", program.as_bytes());
-        assert!(said.iter().all(|it| it.starts_with("M10")), "{program}{said:?}");
+        let is_expected = |it: &String| it.starts_with("M10") || it.contains("behind the end");
+        assert!(said.iter().all(is_expected), "{program}{said:?}");
     }
     // A stroke ends where another pen goes on.
     let program = "T1\nG0 X1\nG1 X5\nT2\nG1 X9\n";
@@ -575,4 +576,32 @@ fn what_only_looks_like_a_move_is_none() {
                    G0 X0 Y0\n";
     assert_eq!(strokes(drilled), line);
     assert_eq!(notes("a.nc", drilled.as_bytes()), ["G81 has no meaning for a drawing (line 6)"]);
+}
+
+#[test]
+fn what_is_left_out_or_drawn_by_choice_is_told() {
+    let line = "G0 X0 Y0\nM3\nG1 X9\nM5\n";
+    let said = |program: &str| notes("a.nc", program.as_bytes()).join("; ");
+    for end in ["", "M2\n", "M30\n%\n\n(end)\n; of all\n"] {
+        assert_eq!(said(&format!("{line}{end}")), "", "{end}");
+    }
+    let behind = "5 lines behind the end of the program (M2 or M30 in line 5) not drawn";
+    assert_eq!(said(&format!("{line}M2\n%\n{line}M30\n")), behind);
+    // As the plotter itself reads them.
+    let choice = "G0 X10 Y10\nM3\nG1 X20\n/G1 Y20\n/ / G1 X10\nG1 Y10\nM5\n";
+    assert_eq!(strokes(choice), [[[10., 10.], [20., 10.], [20., 20.], [10., 20.], [10., 10.]]]);
+    assert_eq!(
+        said(choice),
+        "2 lines begin with / and are drawn, as Grbl draws them (the first is line 4)"
+    );
+    assert_eq!(
+        said(&format!("$100=80\n{line}/M5\n")),
+        "line 6 begins with / and is drawn, as \
+        Grbl draws it"
+    );
+    for command in ["$J", "$H"] {
+        let told = said(&format!("{}=G91 X5\n{line}", command.to_lowercase()));
+        assert_eq!(told, format!("{command} has no meaning for a drawing (line 1)"));
+    }
+    strokes(&format!("{}G0 X0\n{line}", "/".repeat(1_000_000)));
 }

@@ -9,6 +9,8 @@ pub(super) enum Line {
     Words(Vec<(char, f64)>),
     /// A line that orders nothing.
     Skipped,
+    /// What follows a `/`: the machine may have a switch by which it leaves such lines out.
+    Optional(String),
     /// A pause, which may have a message (`M0`, `M1`).
     Pause,
     /// A command of this name that takes no words, but text or named values.
@@ -52,8 +54,17 @@ const CONTROL: [&str; 23] = [
 pub(super) fn parse(text: &str) -> Result<Line, RefusalText> {
     let text = without_comments(text);
     let text = text.trim();
-    // A block delete, a mark of the beginning or end, or a setting of the machine.
-    if text.starts_with(['/', '%', '$']) || text.is_empty() {
+    if text.starts_with('/') {
+        let rest = text.trim_start_matches(|letter: char| letter == '/' || letter.is_whitespace());
+        return Ok(Line::Optional(rest.to_owned()));
+    }
+    // Of the machine's own commands these move.
+    let command = text.get(..2).unwrap_or_default().to_ascii_uppercase();
+    if matches!(command.as_str(), "$J" | "$H") {
+        return Ok(Line::Command(command));
+    }
+    // A mark of the beginning or end, or a setting of the machine.
+    if text.starts_with(['%', '$']) || text.is_empty() {
         return Ok(Line::Skipped);
     }
     let rest = after_number(text);

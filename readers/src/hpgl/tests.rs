@@ -118,6 +118,16 @@ fn a_label_without_an_end_is_told() {
 }
 
 #[test]
+fn a_polygon_without_an_end_is_told() {
+    let line = "IN;PU0,0;PD400,0;\n";
+    let told = "the polygon that begins in line 2 has no end (PM2): all moves that follow it are \
+                its points, and are not drawn";
+    assert_eq!(notes("a.plt", format!("{line}PM0;PD400,400,\n0,400;").as_bytes()), [told]);
+    let whole = format!("{line}PM0;PD400,400,0,400;PM2;EP;");
+    assert!(notes("a.plt", whole.as_bytes()).is_empty());
+}
+
+#[test]
 fn of_several_sheets_the_first_is_drawn_and_the_others_are_told() {
     let first = "IN;PG;PD40,0;PU;";
     let rest = "PG;IN;PU0,40;PD40,40;PU;PG;PU0,80;PD;PG;";

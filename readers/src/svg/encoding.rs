@@ -1,7 +1,21 @@
-//! The text of an SVG: compressed or not, in UTF-8, UTF-16, or Latin-1 if the file says so.
+//! The text of an SVG: compressed or not, in UTF-8, UTF-16, or if the file says so in Latin-1 or
+//! Windows-1252.
 
 /// The bytes with which a file begins that gzip has compressed.
 pub(super) const GZIP: &[u8] = b"\x1F\x8B";
+
+/// The letters of Windows-1252 from 0x80 on, which Latin-1 leaves to control characters. Browsers
+/// take files in Latin-1 for Windows-1252, too. Those that neither has stay as they are.
+const WINDOWS: [char; 32] = [
+    '€', '\u{81}', '‚', 'ƒ', '„', '…', '†', '‡', 'ˆ', '‰', 'Š', '‹', 'Œ', '\u{8D}', 'Ž', '\u{8F}',
+    '\u{90}', '‘', '’', '“', '”', '•', '–', '—', '˜', '™', 'š', '›', 'œ', '\u{9D}', 'ž', 'Ÿ',
+];
+
+/// The letter of a byte in Windows-1252.
+fn letter(byte: u8) -> char {
+    let special = byte.checked_sub(0x80).and_then(|index| WINDOWS.get(usize::from(index)));
+    special.copied().unwrap_or(char::from(byte))
+}
 
 /// The text in `bytes`, the contents of a file.
 ///
@@ -45,7 +59,21 @@ fn latin1(bytes: &[u8]) -> Result<String, String> {
     let is_said =
         ["iso-8859-1", "latin1", "windows-1252"].iter().any(|it| declaration.contains(it));
     match is_said {
-        true => Ok(bytes.iter().map(|byte| char::from(*byte)).collect()),
+        true => Ok(bytes.iter().map(|byte| letter(*byte)).collect()),
         false => Err("this is not UTF-8 text: save it as UTF-8".to_owned()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_letters_are_those_of_windows_1252() {
+        for byte in 0..=u8::MAX {
+            let bytes = [byte];
+            let (text, ..) = encoding_rs::WINDOWS_1252.decode(&bytes);
+            assert_eq!(text.chars().next(), Some(letter(byte)), "{byte:#x}");
+        }
     }
 }

@@ -258,7 +258,7 @@ impl<'a, 'input> Markup<'a, 'input> {
                     Some(true) => &mut shortened,
                     Some(false) => continue,
                 }
-            } else if is_one_of(node, &["path"]) && has_error(node) {
+            } else if has_error(node) {
                 &mut broken
             } else if (is_one_of(node, &SHAPES) || is_one_of(node, &["use"]))
                 && !is_within(node, &NOT_DRAWN)
@@ -287,7 +287,7 @@ impl<'a, 'input> Markup<'a, 'input> {
                     wrap";
         shortened.say(&mut said, ["text in HTML is", "texts in HTML are"], what);
         let what = "not drawn as a whole: there is an error in the data, and the rest is left out";
-        broken.say(&mut said, ["path is", "paths are"], what);
+        broken.say(&mut said, ["shape is", "shapes are"], what);
         let what = "not drawn: hidden, or without a size or points, or with one in a unit that is \
                     not read, or a reference to nothing";
         missing.say(&mut said, ["element is", "elements are"], what);
@@ -436,9 +436,16 @@ fn is_in_documentation(node: Node<'_, '_>) -> bool {
     })
 }
 
-/// Whether the path data of `node` has an error, at which the path ends.
+/// Whether the data of a path, or the points of a polyline or polygon, have an error, at which what
+/// is drawn ends.
 fn has_error(node: Node<'_, '_>) -> bool {
-    let data = node.attribute("d").unwrap_or_default();
+    if is_one_of(node, &["polyline", "polygon"]) {
+        let points = node.attribute("points").unwrap_or_default();
+        let mut numbers = svgtypes::NumberListParser::from(points);
+        let is_odd = numbers.count() % 2 == 1;
+        return is_odd || numbers.any(|number| number.is_err());
+    }
+    let data = node.attribute("d").filter(|_| is_one_of(node, &["path"])).unwrap_or_default();
     data.trim() != "none" && svgtypes::PathParser::from(data).any(|segment| segment.is_err())
 }
 

@@ -504,7 +504,7 @@ fn what_is_not_drawn_is_counted() {
             "2 texts are not drawn, because a page has no fonts: open the file with penup page \
              (the first in line 2)",
             "1 image is not drawn: only those that are SVG are (line 3)",
-            "1 path is not drawn as a whole: there is an error in the data, and the rest is left \
+            "1 shape is not drawn as a whole: there is an error in the data, and the rest is left \
              out (line 4)",
             "2 elements are not drawn: hidden, or without a size or points, or with one in a \
              unit that is not read, or a reference to nothing (the first in line 5)",

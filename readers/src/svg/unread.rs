@@ -14,7 +14,7 @@ const NOT_READ: [&str; 7] =
     ["d", "offset-path", "rotate", "scale", "shape-inside", "transform-box", "translate"];
 
 /// The attributes of shapes that CSS may set, which are read as attributes only.
-const SIZES: [&str; 8] = ["cx", "cy", "height", "r", "rx", "ry", "width", "x"];
+const SIZES: [&str; 9] = ["cx", "cy", "height", "r", "rx", "ry", "width", "x", "y"];
 
 /// The rules of a style sheet that change nothing which is drawn.
 const HARMLESS_RULES: [&str; 5] = ["charset", "font-face", "keyframes", "namespace", "page"];

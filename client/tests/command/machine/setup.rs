@@ -77,7 +77,7 @@ fn assert_told(plotter: &Library, folder: &Path, told: &[(String, f64)]) {
     let (_, now) = plotter.json(folder, &["settings", "show"]);
     let (_, new) = Library::new().json(folder, &["settings", "show"]);
     let (said, new) = (now, &new["settings"]);
-    let now = said["settings"].as_object().unwrap_or_else(|| panic!("no settings: {said}"));
+    let now = said["settings"].as_object().expect(&said.to_string());
     let differs: Vec<(&String, f64)> = now
         .iter()
         .filter(|(number, value)| new[number.as_str()] != **value)

@@ -12,6 +12,9 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
         ("<path d='M1 1H9' stroke='red' style='rotate:20deg'/>", "property rotate of CSS"),
         ("<path d='M1 1H9' stroke='red' transform='rotate(1turn)'/>", "property transform of CSS"),
         ("<circle r='5' cx='9' cy='9' style='r:9px'/>", "property r of CSS"),
+        ("<rect width='5' height='9' style='y:9px'/>", "property y of CSS"),
+        ("<polyline points='5,5 20,5 NaN,9 20,20' stroke='red'/>", "1 shape is not drawn as a"),
+        ("<polygon points='5,5 20,5 9,9,9' stroke='red'/>", "1 shape is not drawn as a whole"),
         (
             "<style>@media print{path{d:none}}</style>",
             "1 element or style sheet has the rule @media",
