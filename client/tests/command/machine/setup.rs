@@ -77,7 +77,8 @@ fn assert_told(plotter: &Library, folder: &Path, told: &[(String, f64)]) {
     let (_, now) = plotter.json(folder, &["settings", "show"]);
     let (_, new) = Library::new().json(folder, &["settings", "show"]);
     let (said, new) = (now, &new["settings"]);
-    let now = said["settings"].as_object().expect(&said.to_string());
+    assert!(said["settings"].is_object(), "{said}");
+    let now = said["settings"].as_object().expect("a table");
     let differs: Vec<(&String, f64)> = now
         .iter()
         .filter(|(number, value)| new[number.as_str()] != **value)
