@@ -3,9 +3,9 @@
 //!
 //! Transforms get the form that they have in SVG. The line height in `font` is left out, and so are
 //! custom properties, because `usvg` reads nothing that follows them. The pseudo-class `:root`
-//! becomes an attribute selector, which counts as much, for an attribute that the root is given. Units
-//! in capitals become small letters, and the marks of a comment of HTML around a style sheet are left
-//! out, as CSS wants it.
+//! becomes an attribute selector, which counts as much, for an attribute that the root is given.
+//! Units in capitals become small letters, and the marks of a comment of HTML around a style sheet
+//! are left out, as CSS wants it.
 
 use super::{lengths, unread};
 use std::borrow::Cow;
