@@ -548,9 +548,9 @@ impl Format for GCode {
         notes.extend(interpreter.changes.draw(&interpreter.moves, drawn, &text, &mut plan));
         notes.extend(interpreter.notes());
         if let Some(end) = end.filter(|_| behind > 0) {
-            let lines = counted(behind, ["line", "lines"]);
+            let lines = counted(behind, ["line is", "lines are"]);
             notes.push(format!(
-                "{lines} behind the end of the program (M2 or M30 in line {end}) not drawn"
+                "{lines} not drawn, behind the end of the program (M2 or M30 in line {end})"
             ));
         }
         if plan.is_empty() {

@@ -585,7 +585,7 @@ fn what_is_left_out_or_drawn_by_choice_is_told() {
     for end in ["", "M2\n", "M30\n%\n\n(end)\n; of all\n"] {
         assert_eq!(said(&format!("{line}{end}")), "", "{end}");
     }
-    let behind = "5 lines behind the end of the program (M2 or M30 in line 5) not drawn";
+    let behind = "5 lines are not drawn, behind the end of the program (M2 or M30 in line 5)";
     assert_eq!(said(&format!("{line}M2\n%\n{line}M30\n")), behind);
     // As the plotter itself reads them.
     let choice = "G0 X10 Y10\nM3\nG1 X20\n/G1 Y20\n/ / G1 X10\nG1 Y10\nM5\n";

@@ -22,7 +22,7 @@ fn plain_length(length: &str) -> Option<String> {
 }
 
 /// The attributes and properties whose values are lengths, or lists of them.
-const LENGTHS: [&str; 22] = [
+const LENGTHS: [&str; 23] = [
     "cx",
     "cy",
     "dx",
@@ -45,6 +45,7 @@ const LENGTHS: [&str; 22] = [
     "x2",
     "y",
     "y1",
+    "y2",
 ];
 
 /// The lengths in a list, with what separates them.

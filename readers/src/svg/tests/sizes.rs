@@ -63,6 +63,8 @@ fn units_in_capitals_are_units_and_other_lengths_are_named() {
     ] {
         assert_eq!(drawn(shape), small, "{shape}");
     }
+    let diagonal = "<line x1='5mm' y1='1cm' x2='25mm' y2='20mm' stroke='red'/>";
+    assert_eq!(drawn(&diagonal.replace("mm", "MM").replace("cm", "CM")), drawn(diagonal));
     let dashes = |dashes: &str| drawn(&format!("<path d='M5 5H30' stroke='red' {dashes}/>"));
     let small = dashes("stroke-dasharray='1mm,2mm'");
     for capitals in [
