@@ -184,6 +184,7 @@ impl Plot<'_> {
         host.set_reloops(self.args.reloop);
         let form = sender.form(&known.settings.unwrap_or_default())?;
         let (streamed, report) = host.streamed(form, self.args.from)?;
+        self.note(&host.left_out());
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(
             "it sends {} with {points} points, {:.1} bytes a point",
@@ -221,6 +222,7 @@ impl Plot<'_> {
         host.set_reloops(self.args.reloop);
         // The drawing may have begun behind its first strokes, by --from.
         let (mut whole, report) = host.streamed(Form::Strokes, 0)?;
+        self.note(&host.left_out());
         let begin = whole.size().strokes.checked_sub(stopped.all);
         if let Some(begin) = begin.filter(|begin| *begin > 0) {
             whole = host.streamed(Form::Strokes, begin)?.0;

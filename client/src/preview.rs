@@ -148,6 +148,24 @@ impl<I: Index> InMemory<I> {
         self.plotter.model().is_plan()
     }
 
+    /// What the drawing that was computed last leaves out of the model: sentences without a full
+    /// stop. A plotter says the same when it draws by `$plot`.
+    pub fn left_out(&self) -> Vec<String> {
+        let job = self.plotter.job();
+        let faces = match job.degenerate_faces() {
+            0 => None,
+            1 => Some("1 face has no area and is left out".to_owned()),
+            count => Some(format!("{count} faces have no area and are left out")),
+        };
+        let edges = match job.joined_edges() {
+            0 => None,
+            count => Some(format!(
+                "edges are left out ({count}): within the precision, the faces beside them are one"
+            )),
+        };
+        faces.into_iter().chain(edges).collect()
+    }
+
     /// Computes the drawing of the model that was sent.
     fn compute(
         &mut self,

@@ -341,6 +341,9 @@ fn encode_tape(
         sender.end();
     }
     let tape = plotter.tape()?;
+    if !quiet {
+        note(&args.file, &plotter.left_out());
+    }
     output::write(&output, &tape)?;
     let text = format!("{}: {} bytes", output.display(), tape.len());
     Ok(Outcome::done(text, json!({ "files": [output], "bytes": tape.len() })))

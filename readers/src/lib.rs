@@ -18,6 +18,7 @@ mod arrange;
 #[cfg(feature = "dxf")]
 mod dxf;
 mod error;
+mod flat;
 pub mod files;
 pub mod fonts;
 mod foreign;

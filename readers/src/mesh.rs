@@ -2,6 +2,7 @@
 //! equal.
 
 use super::error::ReadError;
+use super::flat::Flat;
 use super::format::Contents;
 use crate::lines::{JobLine, Lines, Origin};
 use crate::words::MOSTLY_FLAT;
@@ -70,6 +71,9 @@ pub(super) struct Mesh {
     elements: Vec<(u32, u32)>,
     /// The number of faces with fewer than three different corners, which are left out.
     degenerate: usize,
+    /// The number of edges between equal vertices, which are left out.
+    #[cfg(feature = "ply")]
+    points: usize,
 }
 
 impl Mesh {
@@ -124,6 +128,8 @@ impl Mesh {
         if ends[0] != ends[1] {
             self.corners.extend(ends);
             self.elements.push((self.corners.len() as u32, number));
+        } else {
+            self.points += 1;
         }
     }
 
@@ -240,9 +246,15 @@ impl Mesh {
             let count = super::counted(self.degenerate, ["face is", "faces are"]);
             notes.push(format!("{count} not drawn, for want of three different corners"));
         }
+        #[cfg(feature = "ply")]
+        if self.points > 0 {
+            let count = super::counted(self.points, ["edge has", "edges have"]);
+            notes.push(format!("{count} no length, and nothing is drawn of that"));
+        }
         notes.extend(self.crease_note());
         notes.extend(super::capacity(self.vertices.len()));
-        Ok(Contents { notes, ..Contents::of(self) })
+        let bounds = Flat::of(&self).bounds(&self);
+        Ok(Contents { bounds, notes, ..Contents::of(self) })
     }
 }
 

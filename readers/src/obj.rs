@@ -18,6 +18,7 @@ mod irregular;
 
 use super::arrange::Arrangement;
 use super::error::ReadError;
+use super::flat::Flat;
 use super::format::{Contents, Format};
 use super::mesh::Mesh;
 use crate::lines::acts_at_once;
@@ -61,7 +62,7 @@ impl Format for Obj {
         let has_y_up = has_y_up(&bytes);
         let mut contents = match ObjLines::checked(file, bytes, true)? {
             Checked::Regular(lines) => {
-                let bounds = lines.flat.bounds();
+                let bounds = lines.flat.bounds(&lines);
                 let notes = crease_note(&lines).into_iter().collect();
                 Contents { bounds, notes, ..Contents::of(lines) }
             }
@@ -115,47 +116,8 @@ pub(super) struct ObjLines {
     /// are asked for in order.
     next: Cell<Option<(usize, Cursor)>>,
     count: usize,
-    /// The bounds of the plan, if the file is a plan.
+    /// Whether the file may be a plan.
     flat: Flat,
-}
-
-/// Finds out whether a file is a plan of polylines at one height, and where it lies.
-#[derive(Debug, Default)]
-struct Flat {
-    /// The least and the greatest x, y and z; `None` before the first vertex.
-    bounds: Option<[[f64; 3]; 2]>,
-    /// Whether there is a face, or a curve, whose control points do not bound it.
-    has_others: bool,
-    has_lines: bool,
-}
-
-impl Flat {
-    /// Follows a line that is sent.
-    fn follow(&mut self, line: &str) {
-        let mut words = line.split(' ');
-        match words.next() {
-            Some("v") => {
-                let mut number = || words.next().and_then(|word| word.parse().ok());
-                let (Some(x), Some(y), Some(z)) = (number(), number(), number()) else { return };
-                let point: [f64; 3] = [x, y, z];
-                let [low, high] = self.bounds.get_or_insert([point; 2]);
-                for axis in 0..3 {
-                    low[axis] = low[axis].min(point[axis]);
-                    high[axis] = high[axis].max(point[axis]);
-                }
-            }
-            Some("l") => self.has_lines = true,
-            Some("f" | "curv") => self.has_others = true,
-            _ => {}
-        }
-    }
-
-    /// The least and the greatest x and y of a plan; `None` if the file is none.
-    fn bounds(&self) -> Option<[[f64; 2]; 2]> {
-        let [low, high] = self.bounds?;
-        let is_plan = self.has_lines && !self.has_others && low[2] == high[2];
-        is_plan.then_some([[low[0], low[1]], [high[0], high[1]]])
-    }
 }
 
 /// A position of the reader in the bytes of a file.

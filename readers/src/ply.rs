@@ -9,7 +9,7 @@ use super::arrange::Arrangement;
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::mesh::{Coordinate, Mesh};
-use ply_rs_bw::parser::Parser;
+use ply_rs_bw::parser::{Parser, Reader};
 use ply_rs_bw::ply::{Property, PropertyAccess, PropertyAccessResult};
 use std::borrow::Cow;
 
@@ -120,8 +120,13 @@ impl Format for Ply {
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
         let refused = |reason| ReadError::Content { file: file.clone(), reason };
         let bytes = without_empty_lines(&bytes);
-        let ply = Parser::<Element>::new().read_ply(&mut &*bytes);
-        let ply = ply.map_err(|error| {
+        let mut rest = &*bytes;
+        let mut reader = Reader::new(&mut rest);
+        let parser = Parser::<Element>::new();
+        let payload = parser
+            .read_header(&mut reader)
+            .and_then(|header| parser.read_payload(&mut reader, &header));
+        let payload = payload.map_err(|error| {
             // The crate's messages have several lines, with whole lines of the file.
             let said = error.to_string();
             let said: Vec<&str> = said.split_whitespace().take(20).collect();
@@ -129,7 +134,7 @@ impl Format for Ply {
         })?;
         let mut mesh = Mesh::new(file.clone());
         let mut numbers = Vec::new();
-        for (index, vertex) in ply.payload.get("vertex").into_iter().flatten().enumerate() {
+        for (index, vertex) in payload.get("vertex").into_iter().flatten().enumerate() {
             let [Some(x), Some(y), Some(z)] = vertex.point else {
                 return Err(refused(format!("vertex {index} does not have x, y and z")));
             };
@@ -139,7 +144,7 @@ impl Format for Ply {
             numbers.push(mesh.vertex([x, y, z]));
         }
         let number = |corner: &i64| numbers.get(usize::try_from(*corner).ok()?).copied();
-        for (index, face) in ply.payload.get("face").into_iter().flatten().enumerate() {
+        for (index, face) in payload.get("face").into_iter().flatten().enumerate() {
             let Some(corners) = &face.corners else {
                 return Err(refused(format!("face {index} has no list of vertices")));
             };
@@ -149,13 +154,13 @@ impl Format for Ply {
             }
             mesh.face(index as u32 + 1, &known);
         }
-        for (index, edge) in ply.payload.get("edge").into_iter().flatten().enumerate() {
+        for (index, edge) in payload.get("edge").into_iter().flatten().enumerate() {
             let [Some(from), Some(to)] = edge.ends.map(|end| number(&end?)) else {
                 return Err(refused(format!("edge {index} has an end that is no vertex")));
             };
             mesh.edge(index as u32 + 1, [from, to]);
         }
-        let others = ply.payload.iter().filter(|(name, elements)| {
+        let others = payload.iter().filter(|(name, elements)| {
             !["vertex", "face", "edge"].contains(&name.as_str()) && !elements.is_empty()
         });
         let others =
@@ -171,6 +176,14 @@ impl Format for Ply {
         }
         let mut contents = mesh.finish()?;
         contents.notes.extend(others);
+        // A line end behind the elements is usual, in binary files too.
+        let unread = rest.trim_ascii().len();
+        if unread > 0 {
+            contents.notes.push(format!(
+                "behind the elements that its head announces the file has {unread} more bytes, \
+                 which are not read"
+            ));
+        }
         Ok(contents)
     }
 }
@@ -241,6 +254,26 @@ mod tests {
         let cloud = format!("{head}end_header\n{points}");
         let error = sent("a.ply", cloud.as_bytes()).expect_err("refused");
         assert!(error.contains("there are 3 points and no face to draw: make a mesh"), "{error}");
+    }
+
+    #[test]
+    fn what_is_left_out_is_told() {
+        let head = "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n\
+                    property float z\nelement edge 2\nproperty int vertex1\n\
+                    property int vertex2\nend_header\n0 0 0\n1 0 0\n1 1 0\n1 1 0\n0 1\n";
+        let notes = |edges: &str| {
+            let file = format!("{head}{edges}");
+            let file = crate::SourceFile::new("a.ply".to_owned(), file.into_bytes());
+            file.expect("a file that is drawn").notes().join("; ")
+        };
+        assert_eq!(notes("1 2\n \n"), "");
+        let plan = format!("{head}2 0\n");
+        let plan = crate::SourceFile::new("a.ply".to_owned(), plan.into_bytes());
+        assert_eq!(plan.expect("drawn").bounds(), Some([[0.0, 0.0], [1.0, 1.0]]));
+        assert_eq!(notes("2 3\n"), "1 edge has no length, and nothing is drawn of that");
+        let more = notes("1 2\n2 0\n3 0\n");
+        assert!(more.starts_with("behind the elements"), "{more}");
+        assert!(more.contains("the file has 7 more bytes"), "{more}");
     }
 
     #[test]

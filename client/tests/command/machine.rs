@@ -157,6 +157,23 @@ fn a_refusal_of_a_drawing_names_its_file() {
     assert!(error.starts_with("penup: the plotter refuses the steps per mm"), "{error}");
 }
 
+/// The same is told whoever computes the drawing: this computer, the plotter, or a preview.
+#[test]
+fn faces_that_are_left_out_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let solid = "v 0 0 0\nv 9 0 0\nv 0 9 0\nv 0 0 9\nv 18 0 0\nf 1 2 3\nf 1 2 4\nf 1 2 5\n";
+    fs::write(folder.path().join("a.obj"), solid).expect("written");
+    let plots =
+        ["host", "board"].map(|by| vec!["plot", "a.obj", "--port", "auto", "--compute", by]);
+    let others = [vec!["preview", "a.obj", "--svg", "a.svg"], vec!["tape", "encode", "a.obj"]];
+    for arguments in plots.into_iter().chain(others) {
+        let (code, _, noted) = plotter.run(folder.path(), &arguments);
+        assert_eq!(code, Some(0), "{noted}");
+        assert!(noted.contains("have no area") || noted.contains("has no area"), "{noted}");
+    }
+}
+
 #[test]
 fn a_page_beyond_the_travel_is_told_with_both_sizes() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -52,6 +52,10 @@ fn options_that_change_nothing_on_a_plan_are_told() {
     assert_eq!(told(plan, &[]), None);
     assert_eq!(told(plan, &["--lift", "3", "--page", "A4"]), None);
     assert_eq!(told(plan, &[&idle[..], &["--eye=9,-9,9"]].concat()), None);
+    let more = ["p 1\n", "deg 1\ncurv 0 1 1 2\nparm u 0 0 1 1\nend\n"];
+    for plan in more.map(|more| format!("{plan}{more}")) {
+        assert_eq!(told(&plan, &idle).as_deref(), Some("--hidden, --crease"), "{plan}");
+    }
     assert_eq!(told(solid, &idle), None);
     assert_eq!(told(solid, &["--fit"]).as_deref(), Some("--fit"));
     assert_eq!(told(solid, &["--title-size", "9"]).as_deref(), Some("--title-size"));

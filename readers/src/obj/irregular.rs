@@ -7,6 +7,7 @@
 //! materials than pens are all drawn with one.
 
 use super::super::error::ReadError;
+use super::super::flat::Flat;
 use super::super::format::Contents;
 use super::{LineFault, Words, decoded, is_sent, sendable};
 use crate::lines::{JobLine, Lines, Origin};
@@ -282,7 +283,8 @@ pub(super) fn read(name: String, bytes: &[u8]) -> Result<Contents, ReadError> {
         ));
     }
     notes.extend(super::crease_note(&file));
-    Ok(Contents { notes, ..Contents::of(file) })
+    let bounds = Flat::of(&file).bounds(&file);
+    Ok(Contents { bounds, notes, ..Contents::of(file) })
 }
 
 impl Irregular {

@@ -151,3 +151,27 @@ fn what_no_plotter_takes_is_refused_before_anything_is_sent() {
         assert!(error.ends_with(line), "{line}: {error}");
     }
 }
+
+#[test]
+fn the_bounds_of_a_plan_are_those_of_what_is_drawn() {
+    let bounds = |text: &str| {
+        let file = Obj.read("f.obj".to_owned(), text.into(), &Arrangement::default());
+        file.expect("a file that can be sent").bounds
+    };
+    let square = "v 10.1 10 7\nv 30.1 10 7\nv 30.1 30 7\nv 10.1 30 7\n";
+    let drawn = |lines: &str| bounds(&format!("{square}{lines}"));
+    assert_eq!(drawn("l 1 2 3\n"), Some([[10.1, 10.0], [30.1, 30.0]]));
+    assert_eq!(drawn("l -4 -3\n"), Some([[10.1, 10.0], [30.1, 10.0]]));
+    // Lines that a plotter does not understand make it no solid.
+    assert_eq!(drawn("p 1\nl 1 2\n"), Some([[10.1, 10.0], [30.1, 10.0]]));
+    assert_eq!(bounds(&format!("l 1 2 3\n{square}")), Some([[10.1, 10.0], [30.1, 30.0]]));
+    // A cubic from the first to the last vertex bulges to three quarters of the way.
+    let bezier = drawn("usemtl red\ndeg 3\ncurv 0 1 1 2 3 4\nparm u 0 0 0 0 1 1 1 1\nend\n");
+    let Some([[left, low], [right, high]]) = bezier else { return assert_eq!(bezier, None) };
+    let is_near = |value: f64, expected: f64| (value - expected).abs() < 0.01;
+    assert!(is_near(left, 10.1) && is_near(low, 10.0) && is_near(high, 30.0), "{bezier:?}");
+    assert!(is_near(right, 25.1), "{bezier:?}");
+    for no_plan in ["", "p 1\n", "f 1 2 3\n", "l 1 2\nf 1 2 3\n", "v 0 0 8\nl 1 2\n"] {
+        assert_eq!(drawn(no_plan), None, "{no_plan}");
+    }
+}

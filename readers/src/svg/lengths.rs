@@ -72,21 +72,43 @@ pub(super) fn plain_value(name: &str, value: &str) -> Option<String> {
     lengths.collect::<Option<String>>().filter(|plain| plain != value)
 }
 
-/// What `usvg` does not read of the value of this attribute or property.
-pub(super) fn unread(name: &str, value: &str) -> Option<String> {
+/// Whether the value of this attribute or property is a list of lengths, which text has as `x`.
+fn is_list(name: &str, is_shape: bool) -> bool {
+    name == "stroke-dasharray" || matches!(name, "x" | "y" | "dx" | "dy") && !is_shape
+}
+
+/// Whether this is a number, or the beginning of a number with an end that is no unit.
+fn begins_as_number(length: &str) -> bool {
+    let digits = length.trim_start_matches(['+', '-', '.']);
+    digits.starts_with(|letter: char| letter.is_ascii_digit())
+}
+
+/// What `usvg` does not read of the value of this attribute or property of a shape or of another
+/// element. A value that it does not read is taken for 0, or for the value without it.
+pub(super) fn unread(name: &str, value: &str, is_shape: bool) -> Option<String> {
     if !LENGTHS.contains(&name) {
         return None;
     }
     if value.contains('(') {
         return Some(format!("a calculation as {name}"));
     }
-    let unit = listed(value).find_map(|part| {
-        let length = part.trim_matches([' ', ',', '\t', '\n', '\r']);
+    let unread = |length: &str| {
         let number = length.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
-        let is_number = number.parse::<f64>().is_ok();
-        (is_number && plain_length(length).is_none()).then(|| length.get(number.len()..))?
-    })?;
-    Some(format!("a length in {unit} as {name}"))
+        let percent = length.strip_suffix('%').map(str::parse::<f64>);
+        if plain_length(length).is_some() || percent.is_some_and(|part| part.is_ok()) {
+            None
+        } else if number.parse::<f64>().is_ok_and(f64::is_finite) {
+            Some(format!("a length in {} as {name}", length.get(number.len()..)?))
+        } else {
+            begins_as_number(length).then(|| format!("the value \"{length}\" as {name}"))
+        }
+    };
+    if is_list(name, is_shape) {
+        let is_separator = |letter: char| [' ', ',', '\t', '\n', '\r'].contains(&letter);
+        value.split(is_separator).find_map(unread)
+    } else {
+        unread(value.trim())
+    }
 }
 
 /// The corrections of the lengths of an element.

@@ -4,7 +4,7 @@
 use super::css::without_comments;
 use super::lengths;
 use super::markup::{Count, SHAPES, is_one_of};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr as _;
 use svgtypes::FontShorthand;
 use usvg::roxmltree::{Document, Node};
@@ -38,16 +38,17 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
             paints.add(document, node);
         } else if is_one_of(node, &["style"]) {
             let sheet: String = node.children().filter_map(|it| it.text()).collect();
-            for what in of_sheet(&sheet) {
+            for what in of_sheet(&sheet, &sized(document)) {
                 unread.entry(what).or_default().add(document, node);
             }
         }
         if is_one_of(node, &["symbol"]) && node.attribute("transform").is_some() {
             unread.entry("the transform of a symbol".to_owned()).or_default().add(document, node);
         }
-        let is_shape = is_one_of(node, &SHAPES);
+        let is_shape = has_size(node);
         let own = declarations(node.attribute("style").unwrap_or_default());
-        let attributes = node.attributes().filter(|it| it.name() != "style");
+        let attributes =
+            node.attributes().filter(|it| it.namespace().is_none() && it.name() != "style");
         let as_attribute = attributes.map(|it| (it.name(), it.value(), false));
         for (name, value, is_style) in
             own.map(|(name, value)| (name, value, true)).chain(as_attribute)
@@ -84,6 +85,37 @@ pub(super) fn without_important(value: &str) -> &str {
     word.map_or(value, |(value, _)| value).trim()
 }
 
+/// Whether an element has a size that CSS may set, which is read as attributes only. That of the
+/// whole picture is told as its page.
+fn has_size(node: Node<'_, '_>) -> bool {
+    is_one_of(node, &SHAPES)
+        || is_one_of(node, &["image", "use", "svg"]) && node.parent_element().is_some()
+}
+
+/// The names, the classes and the identifiers of all elements that have a size, as selectors write
+/// them.
+fn sized(document: &Document<'_>) -> BTreeSet<String> {
+    let nodes = document.descendants().filter(|node| has_size(*node));
+    let selectors = nodes.flat_map(|node| {
+        let classes = node.attribute("class").unwrap_or_default().split_whitespace();
+        let id = node.attribute("id").map(|id| format!("#{id}"));
+        let name = node.tag_name().name().to_owned();
+        classes.map(|class| format!(".{class}")).chain(id).chain([name]).collect::<Vec<_>>()
+    });
+    selectors.collect()
+}
+
+/// Whether selectors may select one of the elements that are `sized`.
+fn selects_sized(selectors: &str, sized: &BTreeSet<String>) -> bool {
+    selectors.split(',').filter_map(|it| it.split([' ', '>', '+']).next_back()).any(|last| {
+        let is_sign = |letter: char| matches!(letter, '.' | '#' | '[' | ':');
+        let starts = last.char_indices().filter(|(_, it)| is_sign(*it)).map(|(at, _)| at);
+        let starts: Vec<usize> = [0].into_iter().chain(starts).chain([last.len()]).collect();
+        let mut parts = starts.windows(2).filter_map(|ends| last.get(ends[0]..ends[1]));
+        parts.any(|part| sized.contains(part))
+    })
+}
+
 /// What is not read of a property.
 fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> Option<String> {
     let is_usual = matches!(value, "" | "none" | "auto" | "inherit" | "initial" | "unset");
@@ -102,11 +134,12 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
     if value.contains("var(") {
         return Some("a variable of CSS".to_owned());
     }
-    lengths::unread(name, value)
+    lengths::unread(name, value, is_shape)
 }
 
-/// What is not read of a style sheet.
-fn of_sheet(sheet: &str) -> Vec<String> {
+/// What is not read of a style sheet of a picture in which elements with these selectors are
+/// `sized`.
+fn of_sheet(sheet: &str, sized: &BTreeSet<String>) -> Vec<String> {
     let mut unread = Vec::new();
     let plain = without_comments(sheet);
     let mut rest = plain.as_ref();
@@ -127,9 +160,10 @@ fn of_sheet(sheet: &str) -> Vec<String> {
         };
         let list = block.split('}').next().unwrap_or_default();
         unread.extend(of_selectors(prelude, list));
-        // Sizes may be those of the whole picture.
-        let properties =
-            declarations(list).filter(|(name, _)| !matches!(*name, "width" | "height"));
+        // Other sizes are those of the whole picture, or of none.
+        let reads_sizes = selects_sized(prelude, sized);
+        let properties = declarations(list)
+            .filter(|(name, _)| reads_sizes || !matches!(*name, "width" | "height"));
         unread.extend(properties.filter_map(|(name, value)| {
             if name.starts_with("--") { None } else { unread_property(name, value, true, true) }
         }));
@@ -235,6 +269,7 @@ mod tests {
 
     #[test]
     fn a_style_sheet_says_what_is_not_read_of_it() {
+        let sized = BTreeSet::from(["rect", ".big", "#photo"].map(str::to_owned));
         for (sheet, unread) in [
             (".a{stroke:red;fill:none} /* @import x; */ #b:hover, path:first-child {d:none}", ""),
             ("@font-face{src:url(a;b)} @charset 'x'; .a{width:5px}", ""),
@@ -244,6 +279,10 @@ mod tests {
             (".a{stroke:var(--b)} :root{--b:red}", "a variable of CSS"),
             (":root{--b:red;--c:d}", ""),
             (":root{--b:red;stroke:red}", "a selector :root of CSS"),
+            ("svg{width:100%} rect .a, a{height:5px}", ""),
+            ("g > rect.b{width:5px}", "the property width of CSS"),
+            ("a, .a.big:hover{height:5px}", "the property height of CSS"),
+            ("#photo{height:5px}", "the property height of CSS"),
             (".a, .b ~ .c{}", "a selector with ~ of CSS"),
             ("#\\31 a{}", "a selector with \\ of CSS"),
             ("svg|path{}", "a selector with | of CSS"),
@@ -257,9 +296,9 @@ mod tests {
             ("@media {", "the rule @media of CSS"),
             ("}}{;@", ""),
         ] {
-            let said = of_sheet(sheet);
+            let said = of_sheet(sheet, &sized);
             assert_eq!(said.first().map_or("", String::as_str), unread, "{sheet}");
         }
-        assert_eq!(of_sheet("@media print{.a{x:1}} .c{r:5px}").len(), 2);
+        assert_eq!(of_sheet("@media print{.a{x:1}} .c{r:5px}", &sized).len(), 2);
     }
 }

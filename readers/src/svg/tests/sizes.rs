@@ -80,6 +80,11 @@ fn units_in_capitals_are_units_and_other_lengths_are_named() {
         ("<rect width='10vw' height='5' stroke='red'/>", "a length in vw as width"),
         ("<circle r='calc(1px + 2px)' stroke='red'/>", "a calculation as r"),
         ("<path d='M5 5H30' stroke='red' style='stroke-dasharray:1,2vh'/>", "a length in vh as st"),
+        ("<rect x='12,5' width='5' height='5' stroke='red'/>", "the value \"12,5\" as x"),
+        ("<rect width='5 mm' height='5' stroke='red'/>", "the value \"5 mm\" as width"),
+        ("<text x='1 2;' y='-.5'>a</text>", "the value \"2;\" as x"),
+        ("<use href='#a' style='width:5mm'/>", "the property width of CSS"),
+        ("<style>use{height:5mm}</style><use href='#a'/>", "the property height of CSS"),
     ] {
         let (_, notes) = drawn(&format!("{line}{shape}"));
         let said = format!("1 element or style sheet has {what}");
