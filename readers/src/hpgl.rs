@@ -42,6 +42,11 @@ const STYLES: [&str; 22] = [
     "SR", "SS", "TL", "VS", "WU", "AS",
 ];
 
+/// Instructions that a plotter takes without a word although something looks otherwise for it: they
+/// define lines and fills, choose a pen of a group, draw a label that was sent before, or all of it
+/// once more. Each has parameters, but for the label.
+const WITHOUT_A_WORD: [&str; 6] = ["PB", "RF", "RP", "SG", "SV", "UL"];
+
 /// The state of reading a file: the interpreter, and the strokes drawn so far.
 #[derive(Debug)]
 struct Reader {
@@ -180,13 +185,19 @@ struct Instruction {
     /// The first byte of the instruction.
     begin: usize,
     name: String,
+    /// Whether a digit or a sign has followed the name.
+    has_parameters: bool,
 }
 
 impl Instruction {
-    /// Follows a byte of an instruction.
-    fn follow(&mut self, at: usize, byte: u8) {
+    /// Follows a byte of an instruction. Returns whether the name is complete by it, or the first
+    /// parameter begins.
+    fn follow(&mut self, at: usize, byte: u8) -> bool {
         match self.letter.take() {
-            _ if !byte.is_ascii_alphabetic() => {}
+            _ if !byte.is_ascii_alphabetic() => {
+                let is_number = byte.is_ascii_digit() || matches!(byte, b'+' | b'-' | b'.');
+                return is_number && !std::mem::replace(&mut self.has_parameters, true);
+            }
             None => self.letter = Some((at, byte)),
             Some((begin, first)) => {
                 self.begin = begin;
@@ -194,8 +205,16 @@ impl Instruction {
                     .map(|byte| char::from(byte.to_ascii_uppercase()))
                     .into_iter()
                     .collect();
+                self.has_parameters = false;
+                return true;
             }
         }
+        false
+    }
+
+    /// Whether it is one of [`WITHOUT_A_WORD`], and has the parameters that it needs.
+    fn is_without_a_word(&self) -> bool {
+        WITHOUT_A_WORD.contains(&self.name.as_str()) && self.has_parameters == (self.name != "PB")
     }
 }
 
@@ -226,7 +245,9 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
         }
         if token == Token::Code {
             // The first letter of the next instruction ends this one; the second begins it.
-            instruction.follow(at, byte);
+            if instruction.follow(at, byte) && instruction.is_without_a_word() {
+                *reader.unknown.entry(instruction.name.clone()).or_default() += 1;
+            }
         }
         let begin = instruction.begin;
         let refused = |reason| (begin, reason);

@@ -148,6 +148,19 @@ fn what_is_not_drawn_is_counted_or_refused() {
             "2 instructions UC are not obeyed"
         ]
     );
+    // A plotter takes these without an error, and draws as if they were not there.
+    let silent = b"IN;UL;UL2,50,50;SG2;sg 3;RP 2;RF1,2,2,0,1;SV1,2;SV;CT1;PD40,0;PB;";
+    assert_eq!(
+        notes("a.plt", silent),
+        [
+            "1 instruction PB is not obeyed",
+            "1 instruction RF is not obeyed",
+            "1 instruction RP is not obeyed",
+            "2 instructions SG are not obeyed",
+            "1 instruction SV is not obeyed",
+            "1 instruction UL is not obeyed",
+        ]
+    );
     let points = "0,40,40,0,".repeat(500_000);
     let polygon = format!("PU0,0;PM0;\nPD{points}0,0;PM2;FP;");
     for (text, reason) in [
