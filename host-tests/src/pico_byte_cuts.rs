@@ -44,6 +44,15 @@ pub struct Tally {
 }
 
 impl Tally {
+    /// Adds what another board has done.
+    pub fn add(&mut self, other: &Self) {
+        for (name, count) in &other.cuts {
+            *self.cuts.entry(name).or_default() += count;
+        }
+        self.instants += other.instants;
+        self.completed += other.completed;
+    }
+
     /// All starts behind a cut.
     pub fn all(&self) -> u32 {
         self.cuts.values().sum::<u32>() + self.instants
@@ -63,6 +72,9 @@ pub struct Effort {
     pub completes_each: bool,
     /// One cut in so many is completed besides.
     pub complete: i32,
+    /// Of the cuts, numbered from 0, those are tried that are the first number more than a multiple
+    /// of the second one. Several boards share the cuts so.
+    pub share: [u32; 2],
 }
 
 /// A board whose power is cut at points of a record.
@@ -72,6 +84,8 @@ pub struct RecordedPico {
     pub operations: Vec<FlashOperation>,
     /// The changes of the pins in the recorded run, until nothing moved any more.
     changes: Vec<PinChange>,
+    /// The number of cuts so far, those included that another board tries.
+    cuts: u32,
     /// What has been done.
     pub tally: Tally,
 }
@@ -112,7 +126,15 @@ impl RecordedPico {
     pub fn start() -> Result<Self> {
         let line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
         let (operations, changes) = (Vec::new(), Vec::new());
-        Ok(Self { line, operations, changes, tally: Tally::default() })
+        Ok(Self { line, operations, changes, cuts: 0, tally: Tally::default() })
+    }
+
+    /// Counts the next cut. Returns whether this board tries it.
+    fn is_next_mine(&mut self, effort: Effort) -> bool {
+        let number = self.cuts;
+        self.cuts += 1;
+        let [first, boards] = effort.share;
+        number % boards.max(1) == first
     }
 
     /// Sends a line and returns the lines of the answer, the last of which is `ok` or an error.
@@ -281,13 +303,21 @@ impl RecordedPico {
             states.push(self.boot(PowerCut::Between(done), &questions)?);
             let last = operations.len() - 1;
             let place = operations.get(done as usize).unwrap_or(&operations[last]);
-            *self.tally.cuts.entry(name_of(place)).or_default() += 1;
+            // Every board needs these states, and one counts each.
+            if self.is_next_mine(effort) {
+                *self.tally.cuts.entry(name_of(place)).or_default() += 1;
+            }
         }
         scenario.judge(&operations, &states);
         let mut seen = BTreeSet::new();
+        // All boards that share the cuts must number the same ones.
+        let of_cuts = &mut Random::new(random.next_number());
         let front = operations.iter().map(|operation| operation.offset).min().unwrap_or_default();
         for (number, operation) in (0..).zip(&operations) {
-            for cut in cuts_within(number, operation, front, effort, random) {
+            for cut in cuts_within(number, operation, front, effort, of_cuts) {
+                if !self.is_next_mine(effort) {
+                    continue;
+                }
                 self.try_one(scenario, cut, &states, &mut seen, effort, random)?;
                 *self.tally.cuts.entry(name_of(operation)).or_default() += 1;
             }
@@ -316,12 +346,16 @@ impl RecordedPico {
         let mut states = vec![None; self.operations.len() + 1];
         let begin = self.operations[0].began;
         let end = self.changes.last().map_or(begin, |change| change.at);
+        let of_cuts = &mut Random::new(random.next_number());
         for _ in 0..effort.instants {
-            let instant = if random.once_in(3) {
-                self.instant_of_a_write(random)
+            let instant = if of_cuts.once_in(3) {
+                self.instant_of_a_write(of_cuts)
             } else {
-                begin + share_of(end - begin, random)
+                begin + share_of(end - begin, of_cuts)
             };
+            if !self.is_next_mine(effort) {
+                continue;
+            }
             self.try_instant(scenario, instant, &[], &mut states, effort, random)?;
         }
         Ok(())
@@ -345,8 +379,12 @@ impl RecordedPico {
             scenario.questions().iter().map(|text| (*text).to_owned()).collect();
         let questions: Vec<&str> = questions.iter().map(String::as_str).collect();
         let mut states = vec![None; self.operations.len() + 1];
+        let of_cuts = &mut Random::new(random.next_number());
         for _ in 0..effort.instants {
-            let instant = self.instant_of_a_write(random);
+            let instant = self.instant_of_a_write(of_cuts);
+            if !self.is_next_mine(effort) {
+                continue;
+            }
             self.try_instant(scenario, instant, &questions, &mut states, effort, random)?;
         }
         Ok(())

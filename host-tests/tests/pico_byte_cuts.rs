@@ -4,13 +4,14 @@
 
 use penup::board_table::PICO;
 use penup_host_tests::pico_byte_cuts::{
-    Effort, KeptJob, OldOrNew, RecordedPico, SentDrawing, UploadedModel,
+    Effort, KeptJob, OldOrNew, RecordedPico, SentDrawing, Tally, UploadedModel,
 };
 use penup_host_tests::pico_cuts::Job;
 use penup_host_tests::random::Random;
 use penup_host_tests::streamed_drawing::StreamedDrawing;
 use penup_host_tests::wish::wish;
 use std::error::Error;
+use std::thread;
 use std::time::Instant;
 
 type TestResult = Result<(), Box<dyn Error>>;
@@ -27,8 +28,10 @@ fn strokes(ends: &[[i32; 4]]) -> Vec<String> {
     lines.iter().flat_map(|line| line.lines()).map(str::to_owned).chain(all).collect()
 }
 
-fn every_byte() -> Effort {
+/// Every byte, divided between so many boards.
+fn every_byte(board: u32, boards: u32) -> Effort {
     Effort {
+        share: [board, boards],
         bytes: wish("PENUP_STEP", 1) as u32,
         instants: 1000,
         scattered: 5,
@@ -157,7 +160,14 @@ const PORTIONS: [(&str, Portion); 6] = [
 /// A few cuts of a job, in each of its operations.
 #[test]
 fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
-    let few = Effort { bytes: 1000, instants: 1, scattered: 0, completes_each: false, complete: 4 };
+    let few = Effort {
+        bytes: 1000,
+        instants: 1,
+        scattered: 0,
+        completes_each: false,
+        complete: 4,
+        share: [0, 1],
+    };
     let mut board = RecordedPico::start()?;
     cut_job(&mut board, few, &mut Random::new(2211))?;
     eprintln!("{:?}", board.tally);
@@ -165,7 +175,17 @@ fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
     Ok(())
 }
 
-/// Prints how many cuts there were of each kind.
+/// One of several boards, which try the cuts of a portion between them. Returns what it did.
+fn share_of(portion: Portion, seed: u64, board: u32, boards: u32) -> Result<Tally, String> {
+    let tried = || {
+        let mut pico = RecordedPico::start()?;
+        portion(&mut pico, every_byte(board, boards), &mut Random::new(seed))?;
+        Ok(pico.tally)
+    };
+    tried().map_err(|error: Box<dyn Error>| error.to_string())
+}
+
+/// Prints how many cuts there were of each kind. Each core of the computer emulates a board.
 #[test]
 #[ignore = "`cargo xtask power-soak --bytes` runs it for more than an hour"]
 fn before_every_byte() -> TestResult {
@@ -173,13 +193,21 @@ fn before_every_byte() -> TestResult {
     let only = std::env::var("PENUP_PORTION").ok();
     let wanted = |(name, _): &(&str, Portion)| only.as_deref().is_none_or(|only| only == *name);
     assert!(PORTIONS.iter().any(wanted), "there is no portion {only:?}");
+    let boards = thread::available_parallelism().map_or(1, |cores| cores.get() as u32);
     for (name, portion) in PORTIONS.into_iter().filter(wanted) {
+        println!("{name}: begins, on {boards} boards");
         let begun = Instant::now();
-        let mut board = RecordedPico::start()?;
-        let mut random = Random::new(seed);
-        portion(&mut board, every_byte(), &mut random)
-            .map_err(|error| format!("seed {seed}: {name}: {error}"))?;
-        let (tally, took) = (&board.tally, begun.elapsed());
+        let mut tally = Tally::default();
+        thread::scope(|scope| {
+            let share = |board| scope.spawn(move || share_of(portion, seed, board, boards));
+            let shares: Vec<_> = (0..boards).map(share).collect();
+            shares.into_iter().try_for_each(|share| {
+                let share = share.join().map_err(|_| "a board has failed".to_owned())?;
+                tally.add(&share.map_err(|error| format!("seed {seed}: {name}: {error}"))?);
+                Ok::<(), String>(())
+            })
+        })?;
+        let took = begun.elapsed();
         println!("{name}: {} cuts in {took:?}: {tally:?}", tally.all());
     }
     Ok(())

@@ -1,14 +1,18 @@
 //! Finds out whether lines of OBJ are a plan, and where it lies.
 //!
 //! A plan has only lines and curves, and all of its vertices are at one height: see
-//! [`Model::is_plan`]. Its bounds are those of what is drawn: vertices without a line do not count,
-//! and a curve is followed, because it does not reach its control points.
+//! [`penup::model::Model::is_plan`]. Its bounds are those of what is drawn: vertices without a line do not count,
+//! and a curve is followed, because it does not reach its control points. In a browser
+//! those count, because the page has no room for more.
 
 use crate::lines::Lines;
-use penup::curve::Point;
-use penup::model::{Corner, Model, Position, no_undo};
-use penup::protocol::Command;
-use penup::stage::NeverCancel;
+#[cfg(not(target_arch = "wasm32"))]
+use penup::{
+    curve::Point,
+    model::{Corner, Model, Position, no_undo},
+    protocol::Command,
+    stage::NeverCancel,
+};
 
 /// The least and the greatest x and y, in mm.
 type Bounds = [[f64; 2]; 2];
@@ -18,9 +22,13 @@ type Bounds = [[f64; 2]; 2];
 pub(super) struct Flat {
     /// The height of all vertices.
     height: Option<f64>,
-    vertices: usize,
-    /// At least as many numbers as the model needs for its lines and curves.
+    /// The x and y of each vertex.
+    points: Vec<[f64; 2]>,
+    /// The bounds of what the lines of the plan reach.
+    bounds: Option<Bounds>,
+    /// At least as many numbers as a model needs for the lines and curves.
     numbers: usize,
+    has_curves: bool,
     /// Whether a vertex at another height or a face was found.
     is_in_space: bool,
 }
@@ -44,35 +52,78 @@ impl Flat {
         let mut words = line.split(' ');
         match words.next() {
             Some("v") => {
-                let Some(z) = words.nth(2).and_then(|word| word.parse().ok()) else { return };
+                let mut number = || words.next().and_then(|word| word.parse().ok());
+                let (Some(x), Some(y), Some(z)) = (number(), number(), number()) else { return };
                 self.is_in_space = *self.height.get_or_insert(z) != z;
-                self.vertices += 1;
+                self.points.push([x, y]);
             }
             Some("f") => self.is_in_space = true,
-            // A line takes two numbers for each vertex at most, and so does a knot.
-            Some("l" | "parm") => self.numbers += 2 * words.count(),
-            Some("curv" | "usemtl" | "g") => self.numbers += words.count() + 16,
+            Some("l") => {
+                for word in words {
+                    self.numbers += 2;
+                    self.reach(word);
+                }
+            }
+            Some("curv") => {
+                self.has_curves = true;
+                self.numbers += 16;
+                for word in words.skip(2) {
+                    self.numbers += 1;
+                    // A browser has no room for what follows a curve.
+                    if cfg!(target_arch = "wasm32") {
+                        self.reach(word);
+                    }
+                }
+            }
+            Some("parm") => self.numbers += 2 * words.count(),
+            Some("usemtl" | "g") => self.numbers += 16,
             _ => {}
+        }
+        if self.is_in_space {
+            self.points = Vec::new();
         }
     }
 
-    /// The bounds of the plan that the followed lines make; `None` if they make none. It costs as
-    /// much time as a plotter needs to read them, and some 40 bytes for each vertex.
+    /// Extends the bounds to the vertex with this number.
+    fn reach(&mut self, number: &str) {
+        let number = number.split('/').next().and_then(|number| number.parse::<i64>().ok());
+        let count = self.points.len() as i64;
+        let index = number.map(|number| if number < 0 { count + number } else { number - 1 });
+        let point = index.and_then(|index| self.points.get(usize::try_from(index).ok()?));
+        if let Some(point) = point {
+            extend(&mut self.bounds, *point);
+        }
+    }
+
+    /// The bounds of the plan that the followed `lines` make; `None` if they make none. Curves cost
+    /// as much time as a plotter needs to read them, and some 40 bytes for each vertex.
     pub(super) fn bounds(&self, lines: &dyn Lines) -> Option<Bounds> {
-        if self.is_in_space || self.numbers == 0 {
+        if self.is_in_space {
             return None;
         }
-        let mut vertices = vec![Position::ORIGIN; self.vertices];
+        let mut bounds = self.bounds;
+        if self.has_curves {
+            self.extend_by_curves(lines, &mut bounds)?;
+        }
+        bounds
+    }
+
+    #[cfg(target_arch = "wasm32")]
+    #[allow(clippy::unnecessary_wraps, reason = "elsewhere the lines may be refused")]
+    fn extend_by_curves(&self, _: &dyn Lines, _: &mut Option<Bounds>) -> Option<()> {
+        Some(())
+    }
+
+    /// Extends `bounds` to what the curves reach; `None` if a plotter would refuse a line.
+    #[cfg(not(target_arch = "wasm32"))]
+    fn extend_by_curves(&self, lines: &dyn Lines, bounds: &mut Option<Bounds>) -> Option<()> {
+        let mut vertices = vec![Position::ORIGIN; self.points.len()];
         let mut corners = vec![Corner::<u32>::ZERO; self.numbers];
         let mut model = Model::new(&mut vertices, &mut corners);
-        let mut points = Vec::with_capacity(self.vertices);
         for line in lines.in_order() {
             let undo = &mut no_undo;
             let added = match Command::parse(&line.sent).ok()? {
-                Command::Vertex(position) => {
-                    points.push(place(&line.sent)?);
-                    model.add_vertex(position, undo)
-                }
+                Command::Vertex(position) => model.add_vertex(position, undo),
                 Command::Polyline(numbers) => model.add_polyline(numbers.iter(), undo),
                 Command::Degree(degree) => model.set_degree(degree),
                 Command::Curve { ends, control } => model.begin_curve(ends, control.iter()),
@@ -80,34 +131,26 @@ impl Flat {
                 Command::EndCurve => model.end_curve(undo),
                 _ => Ok(()),
             };
-            // A plotter refuses the same line, and says why.
+            // The plotter says why.
             added.ok()?;
         }
-        let mut bounds: Option<Bounds> = None;
-        let mut add = |[x, y]: [f64; 2]| {
-            let [low, high] = bounds.get_or_insert([[x, y]; 2]);
-            *low = [low[0].min(x), low[1].min(y)];
-            *high = [high[0].max(x), high[1].max(y)];
-        };
-        let ends = model.elements().corners().iter().map(|corner| corner.vertex());
-        ends.filter_map(|number| points.get(number as usize)).for_each(|point| add(*point));
         let unit = (-f64::from(model.fraction_bits())).exp2();
         let control: Vec<Point> = model.vertices().iter().map(|p| [p.x, p.y, p.z]).collect();
         // In hundredths of a millimetre, of which the library knows 256 parts, like a plotter that
         // makes a hundred steps in each.
         let scale = unit * 100.0;
         let on_page = |[x, y, _]: [i64; 3]| Some([x, y].map(|c| (c as f64 * scale) as i64));
-        let mut point = |[x, y, _]: Point, _| {
-            add([x, y].map(|c| f64::from(c) * unit));
+        let mut reach = |[x, y, _]: Point, _| {
+            extend(bounds, [x, y].map(|c| f64::from(c) * unit));
             Ok(())
         };
-        model.curves().flatten(&control, &on_page, 32, &mut NeverCancel, &mut point).ok()?;
-        bounds
+        model.curves().flatten(&control, &on_page, 32, &mut NeverCancel, &mut reach).ok()
     }
 }
 
-/// The x and y of the line of a vertex.
-fn place(line: &str) -> Option<[f64; 2]> {
-    let mut numbers = line.split(' ').skip(1).map(|word| word.parse().ok());
-    Some([numbers.next()??, numbers.next()??])
+/// Extends bounds to a point.
+fn extend(bounds: &mut Option<Bounds>, [x, y]: [f64; 2]) {
+    let [low, high] = bounds.get_or_insert([[x, y]; 2]);
+    *low = [low[0].min(x), low[1].min(y)];
+    *high = [high[0].max(x), high[1].max(y)];
 }
