@@ -13,9 +13,7 @@
 //!
 //! [`operate`] are the commands for the machine itself, [`ports`] finds it, [`rejoin`] waits for it
 //! when it is gone, and [`keyboard`] are the keys that act while it draws. Every command
-//! returns an [`outcome`].
-//!
-//! [`idle`] tells which options change nothing.
+//! returns an [`outcome`]. [`penup_job::notes`] tells which options change nothing.
 //!
 //! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a
 //! job as single motor steps, and [`motion_plot`] plots its speed.
@@ -29,7 +27,6 @@ pub mod error;
 pub mod fake;
 pub mod files;
 pub mod fit;
-pub mod idle;
 pub mod interrupt;
 pub mod keyboard;
 pub mod link;

@@ -239,8 +239,10 @@ impl Plot<'_> {
                  pen at the origin by hand and add --at-origin",
             ));
         }
-        if self.args.at_origin {
+        if stopped.is_lost {
             sender.ask(GO_ON_AT_ORIGIN)?;
+        } else if self.args.at_origin {
+            self.note(&[KNOWS_PLACE.to_owned()]);
         }
         let mut rest = host.streamed(Form::Strokes, begin + stopped.drawn)?.0;
         rest.set_id(stopped.id);
@@ -327,6 +329,10 @@ fn beyond(page: Page, settings: &machine::Settings) -> Option<String> {
         )
     })
 }
+
+/// What the user is told who says that the pen is at the origin although its place is known.
+pub const KNOWS_PLACE: &str =
+    "the plotter knows where the pen is, so the drawing goes on from there, without --at-origin";
 
 /// What the user is told who goes on with a drawing once more.
 const GO_ON_AGAIN: &str = "to go on at the stroke that was begun last, do the same again";

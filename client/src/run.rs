@@ -8,7 +8,6 @@ use crate::cli::{
 use crate::error::Error;
 use crate::files;
 use crate::fit::fit_obj;
-use crate::idle::{changed, idle_options};
 use crate::machine_settings::{AssignedSetting, simulated};
 use crate::manual;
 use crate::operate::{self, SavedSettings};
@@ -24,13 +23,13 @@ use penup::index::Index;
 use penup::machine::Setting;
 use penup::step::tape::BadCode;
 use penup_job::export::{self, Retracing};
+use penup_job::notes;
 use penup_job::picture::Picture;
 use penup_job::results::{JobReport, JobResult};
 use penup_job::room::Room;
 use penup_job::streamed::StreamedJob;
 use penup_job::{Job, Settings};
 use penup_readers::page::Page;
-use penup_readers::words::{MOSTLY_FLAT, PROBABLY_Y_UP};
 use penup_readers::{Arrangement, ReadError, SourceFile};
 use serde::Serialize;
 use serde_json::{Value, json};
@@ -376,63 +375,21 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Sourc
         .settings_for(&source)
         .map_err(|reason| ReadError::Content { file: file.display().to_string(), reason })?;
     if !quiet {
-        let names = changed(&settings).1;
-        let is_known = |note: &String| {
-            let options: &[&str] = match note.as_str() {
-                MOSTLY_FLAT => &["crease"],
-                PROBABLY_Y_UP => &["up", "angles"],
-                _ => &[],
-            };
-            options.iter().any(|option| names.iter().any(|name| name == option))
-        };
-        let notes = source.notes().iter().filter(|note| !is_known(note));
-        note(file, &notes.cloned().collect::<Vec<_>>());
+        let known = notes::followed(&settings);
+        let of_file = source.notes().iter().filter(|note| !known.contains(&note.as_str()));
+        note(file, &of_file.cloned().collect::<Vec<_>>());
         if let Some(bounds) = source.bounds() {
-            note(file, settings.moves_plan(bounds).as_slice());
-            note(file, settings.fits_turned(bounds).as_slice());
-            note(file, too_small(&settings, bounds).as_slice());
-            note(file, fits_own_page(&settings, &source).as_slice());
+            note(file, &notes::of_plan(&settings, bounds));
+            let own = notes::fits_own_page(&settings, source.page(), source.sheet());
+            note(file, own.as_slice());
         }
-        note(file, &idle_options(&settings, source.bounds().is_some()));
+        note(file, &notes::idle_options(&settings, source.bounds().is_some()));
     }
     let (extent, is_plan) = (source.extent(), source.bounds().is_some());
     let is_scaled_by_plotter =
         is_plan && settings.value("fit") == Some("on") && !view.arrangement().scales_to_page();
     let job = Job::new(source, &settings);
     Ok((job, Source { settings, extent, is_plan, is_scaled_by_plotter }))
-}
-
-/// The length in mm below which nothing is drawn: about a step of the usual motors.
-const SMALLEST: f64 = 0.0125;
-
-/// Says that a plan with these least and greatest coordinates is so small that nothing, or hardly
-/// anything, is drawn of it at true size.
-fn too_small(settings: &Settings, [low, high]: [[f64; 2]; 2]) -> Option<String> {
-    let [width, height] = [0, 1].map(|axis: usize| high[axis] - low[axis]);
-    let is_small = width.max(height) < SMALLEST && settings.value("fit") == Some("off");
-    // What coordinates of many decimals add is left out.
-    let digits = |length: f64| (length * 1e9).round() / 1e9;
-    is_small.then(|| {
-        format!(
-            "the drawing is {} x {} mm at true size, which is less than a step of the motors: \
-             --fit scales it to the page",
-            digits(width),
-            digits(height)
-        )
-    })
-}
-
-/// Says which page a plan is scaled to, if it is that of the file: a user may think of a sheet.
-fn fits_own_page(settings: &Settings, source: &SourceFile) -> Option<String> {
-    let Page { width, height } = source.page()?;
-    let sheet = source.sheet();
-    let is_own = [sheet.width, sheet.height] == [width, height];
-    (is_own && settings.value("fit") == Some("on")).then(|| {
-        format!(
-            "--fit scales to the page of the file, which is {width} x {height} mm: --page A4 is \
-             another one"
-        )
-    })
 }
 
 /// What is known of a file that was read beside its lines.

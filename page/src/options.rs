@@ -42,9 +42,16 @@ struct Control {
     is_switch: bool,
     /// Which values are valid, in words.
     range: Option<String>,
-    /// The value before it is set; `None` if the plotter then chooses.
+    /// The value before it is set; `None` if the plotter then chooses, or the file.
     default: Option<String>,
+    /// What holds before it is set, in words; `None` if there is nothing to say.
+    unset: Option<&'static str>,
 }
+
+/// What holds before an option is set that depends on the file: a value is then another one than
+/// the default.
+const BY_FILE: [(&str, &str); 2] =
+    [(PAGE, "that of the file, or A4"), ("margin", "10, or 0 on the page of the file")];
 
 /// The names of the option that lays the page on its long side, and of its values.
 const LANDSCAPE: &str = "landscape";
@@ -59,6 +66,8 @@ pub fn options() -> String {
     for option in OPTIONS {
         let Some(flag) = option.flag.get() else { continue };
         // The row after an option may explain more values of it.
+        let by_file = BY_FILE.iter().find(|(name, _)| *name == option.name);
+        let unset = by_file.map(|(_, said)| *said);
         let same = OPTIONS.iter().filter(|other| other.name == option.name);
         controls.push(Control {
             name: option.name,
@@ -68,7 +77,8 @@ pub fn options() -> String {
             choices: flag.choices,
             is_switch: flag.is_switch,
             range: option.range(),
-            default: default_of(option.name),
+            default: default_of(option.name).filter(|_| unset.is_none()),
+            unset,
         });
         if option.name == PAGE {
             controls.push(Control {
@@ -154,6 +164,7 @@ impl Control {
             is_switch: placeholder.is_empty(),
             range: None,
             default: None,
+            unset: None,
         }
     }
 }
@@ -307,15 +318,10 @@ impl NamedValues {
     /// It is no page.
     fn page(&self) -> Result<Option<Page>, String> {
         let Some(text) = self.given(PAGE) else { return Ok(None) };
-        let lower = text.to_lowercase();
-        let sides = lower.split_once('x');
-        let sides = sides.and_then(|(width, height)| {
-            Some(Page { width: width.trim().parse().ok()?, height: height.trim().parse().ok()? })
-        });
         let range = OPTIONS.iter().find(|option| option.name == PAGE).and_then(|it| it.range());
         let range = range.map(|range| format!(" ({range})")).unwrap_or_default();
         let refused = || format!("A page is WIDTHxHEIGHT in mm, such as 200x150{range}.");
-        let page = sides.ok_or_else(refused)?;
+        let page = Page::parse(text).map_err(|_| refused())?;
         PlotOptions::default().set(PAGE, &page_value(page)).map_err(|_| refused())?;
         Ok(Some(page))
     }

@@ -254,7 +254,7 @@ impl Session {
         if now - self.last_query >= QUERY_EVERY {
             self.query();
         }
-        let waits = !matches!(self.phase, Phase::Ready | Phase::Watching | Phase::Alarm);
+        let waits = !matches!(self.phase, Phase::Ready | Phase::Alarm);
         if waits && now - self.last_heard > self.silence {
             let seconds = self.silence / 1000.0;
             self.fail(format!(

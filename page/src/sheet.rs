@@ -15,6 +15,7 @@ use penup::step::Pattern;
 use penup::view::Pose;
 use penup_job::Job;
 use penup_job::Settings;
+use penup_job::notes;
 use penup_job::protocol::{Reply, ReplyReader};
 use penup_job::room::Room;
 use penup_readers::lines::{JobLine, Lines};
@@ -33,6 +34,8 @@ pub struct Sheet {
     source: Source,
     /// Width and height of the page in mm.
     page: [f64; 2],
+    /// What the user should know, in sentences.
+    said: Vec<String>,
 }
 
 impl fmt::Debug for Sheet {
@@ -78,7 +81,7 @@ impl Sheet {
         let source = Source::default();
         let room = Room::for_job(&*source.lines);
         let (board, plotter) = started(room);
-        Self { board, plotter, room, source, page: [0.0; 2] }
+        Self { board, plotter, room, source, page: [0.0; 2], said: Vec::new() }
     }
 
     /// Reads the file `name` and keeps its model. If it `is_read`, the `bytes` are what
@@ -108,10 +111,6 @@ impl Sheet {
             let unit = (0.5f64).powi(model.fraction_bits() as i32);
             [low, high].map(|it| [it.x, it.y, it.z].map(|c| f64::from(c) * unit))
         });
-        let moved = self.source.bounds.and_then(|bounds| {
-            NamedValues::parse(options).ok()?.settings_for(&self.source).ok()?.moves_plan(bounds)
-        });
-        let notes = self.source.notes.iter().chain(&moved);
         Ok(text_of(&Scene {
             vertices: model.vertices().len(),
             faces: model.face_count(),
@@ -119,9 +118,14 @@ impl Sheet {
             curves: model.curve_count(),
             is_plan: model.is_plan(),
             bounds,
-            notes: notes.map(|note| format!("{}.", sentence(&for_page(note)))).collect(),
+            notes: self.said.clone(),
             room,
         }))
+    }
+
+    /// What the user should know about the file with these options, as JSON: sentences.
+    pub fn notes(&self) -> String {
+        text_of(&self.said)
     }
 
     /// Sets the options, given as a JSON array of pairs of name and value, and all others to their
@@ -200,6 +204,12 @@ impl Sheet {
     fn settings(&mut self, options: &str) -> Result<Settings, String> {
         let settings = NamedValues::parse(options)?.settings_for(&self.source)?;
         self.page = [settings.page.width, settings.page.height];
+        let plan = self.source.bounds.map(|bounds| notes::of_plan(&settings, bounds));
+        let idle = notes::idle_options(&settings, self.source.bounds.is_some());
+        let known = notes::followed(&settings);
+        let of_file = self.source.notes.iter().filter(|note| !known.contains(&note.as_str()));
+        let all = of_file.cloned().chain(plan.into_iter().flatten()).chain(idle);
+        self.said = all.map(|note| format!("{}.", sentence(&for_page(&note)))).collect();
         Ok(settings)
     }
 

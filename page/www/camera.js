@@ -63,6 +63,8 @@ export function command(file, pairs, isSwitch) {
       const settings = value.split(/[\s,;]+/).filter(Boolean);
       return settings.map((own) => `--set ${word(own)}`);
     }
+    // A value of this one stands behind an equals sign alone.
+    if (name === "landscape") return `--${name}=${word(value)}`;
     return value.startsWith("-") ? `--${name}=${word(value)}` : `--${name} ${word(value)}`;
   });
   // The program refuses this option if it writes no file that it concerns.

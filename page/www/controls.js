@@ -1,5 +1,8 @@
 // Makes the controls of the options from the table of the plotter's library.
 
+/** The value of the choice that shows a field for another value. */
+const OTHER = "\u2026";
+
 /** Whether a form of a value has a placeholder in capitals. */
 const isFree = (form) => /[A-Z]/.test(form);
 
@@ -43,22 +46,26 @@ export class Controls {
       const free = option.values.some(isFree);
       if (choices.length) {
         parts.choice = fields.appendChild(element("select", { id }));
+        // What is not chosen by default can be so again.
+        if (option.default === null)
+          parts.choice.append(element("option", { value: "", textContent: option.unset ?? "–" }));
         for (const [value, label, meaning] of choices) {
           const text = meaning
             ? `${label}: ${meaning.charAt(0).toLowerCase()}${meaning.slice(1)}`
             : label;
           parts.choice.append(element("option", { value, textContent: text }));
         }
-        if (free) parts.choice.append(element("option", { value: "", textContent: "other…" }));
+        if (free) parts.choice.append(element("option", { value: OTHER, textContent: "other…" }));
         parts.choice.addEventListener("change", () => {
           const value = parts.choice.value;
-          if (parts.text) parts.text.hidden = value !== "";
-          if (value === "") parts.text.focus();
-          else this.onchange(option.name, value === option.default ? null : value);
+          if (parts.text) parts.text.hidden = value !== OTHER;
+          if (value === OTHER) parts.text.focus();
+          else this.onchange(option.name, value === (option.default ?? "") ? null : value);
         });
       }
       if (free) {
-        const placeholder = option.default ?? option.values.filter(isFree).join(" or ");
+        const placeholder =
+          option.default ?? option.unset ?? option.values.filter(isFree).join(" or ");
         const type = [
           "text",
           { id: choices.length ? `${id}-text` : id, placeholder, spellcheck: false },
@@ -89,8 +96,8 @@ export class Controls {
       const value = values.get(name) ?? option.default ?? "";
       if (box) box.checked = value === "on";
       if (choice) {
-        const known = [...choice.options].some((own) => own.value === value && value !== "");
-        choice.value = known ? value : "";
+        const known = [...choice.options].some((own) => own.value === value);
+        choice.value = known ? value : OTHER;
         if (text) text.hidden = known;
       }
       if (text && document.activeElement !== text) text.value = values.get(name) ?? "";

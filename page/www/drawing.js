@@ -53,6 +53,7 @@ export class Drawing {
   outdated() {
     this.helper?.end();
     this.helper = null;
+    this.begun = null;
     this.stop();
     this.computed = null;
     $("check-state").textContent = "…";
@@ -62,8 +63,15 @@ export class Drawing {
   /** Computes the drawing, by a session with an emulated plotter that runs ahead of time. */
   async compute() {
     this.outdated();
-    const job = this.job();
-    if (!job) return;
+    const begun = (this.begun = {});
+    let job;
+    try {
+      job = await this.job();
+    } catch (text) {
+      if (this.begun === begun) this.problem(text);
+      return;
+    }
+    if (!job || this.begun !== begun) return;
     const state = $("check-state");
     const busy = () => (state.textContent = "Computing the drawing…");
     busy();

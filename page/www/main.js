@@ -21,6 +21,8 @@ const REST = 350;
 const SETTLE = 150;
 /** With more faces, a model is large: while it turns, only its outlines are drawn. */
 const LARGE = 10_000;
+/** How long nothing changes before the address is written, in ms. Browsers limit how often. */
+const ADDRESS_REST = 300;
 /** How many steps back are kept. */
 const MOST_UNDOS = 200;
 const EXAMPLES = ["notched", "lattice3", "interpen", "lblock", "gears", "isobars"];
@@ -37,18 +39,30 @@ const FIXED = /^(isometric|dimetric|trimetric|axonometric)/;
 let values = new Map();
 const undos = [],
   redos = [];
+/** What stands above the sheet about the file, and what was left out of its options. */
+let heading = $("file-name").textContent,
+  leftOutNotes = [];
 let file = null,
   scene = null,
   camera = null,
   table = [];
 let lines = new Float32Array(),
   drawsBusy = false,
-  drawsAgain = false,
+  /** What has changed while a picture was computed: the name of an option, or null. */
+  drawsAgain = undefined,
   reads = false,
   arranges = false,
   isTurning = false;
+/** How many files were opened or refused so far, and whether one is being opened. */
+let openings = 0,
+  isOpening = false;
+/** Why the drawing cannot be shown as the options say; empty if it is. */
+let refusal = "";
+/** Who waits until the drawing is read and shown with the newest options. */
+const waiting = [];
 let tab = "see",
   restTimer = 0,
+  addressTimer = 0,
   lastBegin = "";
 /**
  * Times of frames, of those with all lines of a large model that has turned, and of the longest
@@ -99,8 +113,13 @@ function pairs() {
     .filter(([, value]) => value !== undefined);
 }
 
-/** The drawing as a job: what a session needs. */
-function job() {
+/**
+ * The drawing as a job: what a session needs; null if no file is open. Waits until the file is read
+ * with the newest options. Fails with a sentence for the user if it cannot be.
+ */
+async function job() {
+  while (drawsBusy || isOpening) await new Promise((done) => waiting.push(done));
+  if (file && refusal) throw refusal;
   return (
     file && {
       name: file.name,
@@ -115,19 +134,19 @@ function job() {
 
 // The file.
 
-async function openFrom(address, name) {
+async function openFrom(address, name, keeps) {
   try {
     const answer = await fetch(address);
     if (!answer.ok) throw new Error(`the server answers ${answer.status}`);
     const size = Number(answer.headers.get("Content-Length"));
     if (size > LARGEST_FILE) return fail(tooLarge(name, size));
-    await open(name, new Uint8Array(await answer.arrayBuffer()));
+    await open(name, new Uint8Array(await answer.arrayBuffer()), keeps);
   } catch (error) {
     fail(`${name} cannot be loaded: ${error.message ?? error}.`);
   }
 }
 
-const openExample = (name) => openFrom(`scenes/${name}`, name);
+const openExample = (name, keeps) => openFrom(`scenes/${name}`, name, keeps);
 
 const tooLarge = (name, size) =>
   `${name} has ${Math.round(size / 1e6)} MB; the page opens files up to ` +
@@ -136,44 +155,74 @@ const tooLarge = (name, size) =>
 async function openFile(chosen) {
   if (chosen.size > LARGEST_FILE) return fail(tooLarge(chosen.name, chosen.size));
   try {
-    // The camera and the pens of another model do not fit this one.
-    const kept = new Map([...values].filter(([name]) => !CAMERA.includes(name)));
-    await open(chosen.name, new Uint8Array(await chosen.arrayBuffer()), kept);
+    await open(chosen.name, new Uint8Array(await chosen.arrayBuffer()), fitsAnother);
   } catch (error) {
     fail(`${chosen.name} cannot be read: ${error.message ?? error}.`);
   }
 }
 
-/** Reads a file with these options. Returns it, and what there is to see. */
-async function readFile(name, bytes, nextValues) {
+/** Whether an option fits another model: its camera does not. */
+const fitsAnother = (name) => !CAMERA.includes(name);
+
+/** What reading a file fails with once another one is being opened. */
+const OVERTAKEN = Symbol("overtaken");
+
+/** Reads a file with these options, in this `opening`. Returns it, and what there is to see. */
+async function readFile(name, bytes, nextValues, opening) {
   const options = JSON.stringify([...nextValues]);
-  const given = await handed(name, bytes, options);
-  const opened = await helper.ask("open", { name, ...given, options });
-  return { file: { name, bytes, handed: given }, ...opened };
+  try {
+    const given = await handed(name, bytes, options);
+    if (opening !== openings) throw OVERTAKEN;
+    const opened = await helper.ask("open", { name, ...given, options });
+    if (opening !== openings) throw OVERTAKEN;
+    return { file: { name, bytes, handed: given }, ...opened };
+  } catch (error) {
+    throw opening === openings ? error : OVERTAKEN;
+  }
 }
 
-async function open(name, bytes, nextValues = values) {
-  let opened;
-  let leftOut = [];
-  try {
-    opened = await readFile(name, bytes, nextValues).catch((text) => {
-      // An option that arranges plans may not fit another file.
-      const kept = new Map([...nextValues].filter(([own]) => !isOfPlans(own)));
-      if (kept.size === nextValues.size) throw text;
-      nextValues = kept;
-      leftOut = [`Without options for plans: ${text}`];
-      return readFile(name, bytes, kept);
-    });
-  } catch (text) {
-    // What was open stays open.
-    if (file)
-      await helper
-        .ask("open", { name: file.name, ...file.handed, options: JSON.stringify(pairs()) })
-        .catch(() => {});
-    return fail(text);
+/** Opens a file with those options whose names `keeps` wants. What was open stays if it fails. */
+async function open(name, bytes, keeps = () => true) {
+  const opening = ++openings;
+  isOpening = true;
+  $("file-name").textContent = `Reading ${name}…`;
+  // An option that arranges plans may not fit another file, and a link may hold a wrong value.
+  const attempts = [
+    ["", keeps],
+    ["Without options for plans: ", (own) => keeps(own) && !isOfPlans(own)],
+    ["Without any options: ", () => false],
+  ];
+  let opened, kept, tried, reason;
+  const leftOut = [];
+  for (const [what, isKept] of attempts) {
+    kept = isKept;
+    const next = pairs().filter(([own]) => isKept(own));
+    if (tried !== undefined && next.length === tried) continue;
+    tried = next.length;
+    try {
+      opened = await readFile(name, bytes, new Map(next), opening);
+      if (what) leftOut.push(what + reason);
+      break;
+    } catch (text) {
+      if (text === OVERTAKEN) return;
+      reason ??= text;
+    }
+  }
+  isOpening = false;
+  if (!opened) {
+    $("file-name").textContent = heading;
+    controls.show(values);
+    if (file) {
+      const before = { name: file.name, ...file.handed, options: JSON.stringify(pairs()) };
+      await helper.ask("open", before).catch(() => {});
+      // What has changed meanwhile is drawn before the reason is shown.
+      if (drawsAgain !== undefined) await draw(drawsAgain);
+    }
+    settle();
+    return fail(reason);
   }
   ({ file, scene, camera } = opened);
-  values = nextValues;
+  values = new Map(pairs().filter(([own]) => kept(own)));
   undos.length = redos.length = 0;
   const counts = [
     [scene.vertices, "vertices"],
@@ -185,11 +234,13 @@ async function open(name, bytes, nextValues = values) {
     .filter(([count]) => count)
     .map(([count, noun]) => `${count} ${noun}`)
     .join(", ");
-  $("file-name").textContent = `${name}: ${said}${scene.is_plan ? ", a flat drawing" : ""}`;
+  heading = `${name}: ${said}${scene.is_plan ? ", a flat drawing" : ""}`;
+  $("file-name").textContent = heading;
   $("sheet-help").textContent = turns()
     ? "Drag to turn. Shift and drag, or two fingers, to move. " +
       "Wheel to zoom, with Alt to step nearer."
     : "A flat drawing: drag to move, wheel to zoom.";
+  leftOutNotes = leftOut;
   note([...leftOut, ...scene.notes]);
   announce(`${name} is open: ${said}`);
   view.fit();
@@ -204,6 +255,8 @@ function change(name, value) {
   isTurning = false;
   if (value === null) values.delete(name);
   else values.set(name, value);
+  // A direction takes the place of the eye that a turn has chosen.
+  if (value !== null && DIRECTIONS.includes(name)) values.delete("eye");
   reads ||= name === "pens";
   // The options of the page decide where a plan is laid that is arranged, and how large it is.
   const lays = file?.handed.isRead && isUnder("Page", name);
@@ -242,8 +295,20 @@ function changed(name = null) {
   $("command").value = file
     ? command(file.name, pairs(), (own) => table.find((it) => it.name === own).is_switch)
     : "";
-  history.replaceState(null, "", link());
   draw(name);
+}
+
+/** Writes what is shown into the address, once it has not changed for a moment. */
+function writeAddress() {
+  clearTimeout(addressTimer);
+  addressTimer = setTimeout(() => {
+    try {
+      history.replaceState(null, "", link());
+    } catch {
+      // The browser wants more time between two changes.
+      addressTimer = setTimeout(writeAddress, 10 * ADDRESS_REST);
+    }
+  }, ADDRESS_REST);
 }
 
 function link() {
@@ -275,24 +340,30 @@ function outlines() {
 async function draw(name = null, isWhole = false) {
   drawing.outdated();
   clearTimeout(restTimer);
-  if (drawsBusy) {
-    drawsAgain = true;
+  if (drawsBusy || isOpening) {
+    drawsAgain = name;
     return;
   }
   drawsBusy = true;
+  drawsAgain = undefined;
   const began = performance.now();
-  const isQuick = isTurning && !isWhole && isLarge() && !reads && !arranges;
+  // What is asked for from now on is for the next picture.
+  const [opening, readsNow, arrangesNow] = [openings, reads, arranges];
+  reads = arranges = false;
+  const isQuick = isTurning && !isWhole && isLarge() && !readsNow && !arrangesNow;
   let problem = null;
   try {
-    if (arranges && file) {
-      ({ file, scene } = await readFile(file.name, file.bytes, new Map(pairs())));
-      note(scene.notes);
+    if (arrangesNow && file) {
+      const read = await readFile(file.name, file.bytes, new Map(pairs()), opening);
+      ({ file, scene } = read);
     }
     const options = JSON.stringify(isQuick ? outlines() : pairs());
-    const answer = await helper.ask("draw", { options, reads });
-    reads = arranges = false;
-    ({ lines, camera } = answer);
+    const answer = await helper.ask("draw", { options, reads: readsNow });
+    lines = answer.lines;
+    // A camera that was turned meanwhile is newer.
+    if (drawsAgain === undefined) camera = answer.camera;
     view.page = answer.page;
+    if (opening === openings && scene) note([...leftOutNotes, ...answer.notes]);
     view.draw();
     if (isTurning && !isQuick && isLarge()) frames.whole.push(performance.now() - began);
     else {
@@ -300,21 +371,30 @@ async function draw(name = null, isWhole = false) {
       frames.from.push(performance.now() - began);
     }
   } catch (text) {
+    reads ||= readsNow;
+    arranges ||= arrangesNow;
     problem = text;
+    if (problem === OVERTAKEN) drawsAgain ??= name;
   }
   drawsBusy = false;
-  if (drawsAgain) {
-    drawsAgain = false;
-    return draw(name);
-  }
+  if (isOpening) return;
+  if (drawsAgain !== undefined) return draw(drawsAgain);
+  refusal = problem ?? "";
   controls.problem(problem ? name : null, problem);
   if (problem) fail(problem);
   else {
     hush();
+    writeAddress();
     restTimer = isQuick
       ? setTimeout(() => draw(null, true), SETTLE)
       : setTimeout(() => drawing.compute(), REST);
   }
+  settle();
+}
+
+/** Tells those who wait that the drawing is shown, or why it cannot be. */
+function settle() {
+  for (const done of waiting.splice(0)) done();
 }
 
 /** Whether a drag turns the camera. A flat drawing is moved instead. */
@@ -384,8 +464,7 @@ function listenToPage() {
     const name = event.target.value;
     event.target.value = "";
     if (!name) return;
-    values = new Map([...values].filter(([own]) => !CAMERA.includes(own)));
-    openExample(name);
+    openExample(name, fitsAnother);
   });
   $("undo").addEventListener("click", () => step(undos, redos));
   $("redo").addEventListener("click", () => step(redos, undos));
@@ -395,7 +474,9 @@ function listenToPage() {
     reads = arranges = true;
     changed();
   });
-  $("copy-link").addEventListener("click", () => copy(location.href, "The link is copied."));
+  $("copy-link").addEventListener("click", () =>
+    copy(new URL(link(), location.href).href, "The link is copied."),
+  );
   $("copy-command").addEventListener("click", () =>
     copy($("command").value, "The command is copied."),
   );

@@ -21,6 +21,13 @@ const PHASES = {
   alarm: "Alarm.",
 };
 
+/** What is said while the machine moves by hand, by its state. */
+const MOVES = {
+  Home: "Looking for the switches…",
+  Jog: "Moving…",
+  Run: "Moving…",
+};
+
 /** What is said about each kind of plotter. */
 const HINTS = {
   emulated: "The plotter's own program, on pins of memory. Nothing needs to be plugged in.",
@@ -51,12 +58,18 @@ export class Plotting {
     this.passes = { job: null, all: 1, left: 0 };
     this.place = null;
     this.isHeld = false;
+    /** What the machine does by hand, in words; empty if nothing moves by hand. */
+    this.moves = "";
+    /** What is sent once the emulated plotter is ready, and the promise that it starts. */
+    this.waiting = this.starting = null;
     $("plotter").addEventListener("change", () => this.choose());
     $("connect").addEventListener("click", () => this.connect());
     $("disconnect").addEventListener("click", () => this.close?.());
     $("plot").addEventListener("click", () => this.plot());
     $("hold").addEventListener("click", () => this.tell("hold"));
-    $("resume").addEventListener("click", () => this.tell("resume"));
+    $("resume").addEventListener("click", () =>
+      $("pen-change").hidden ? this.tell("resume") : this.penIsIn(),
+    );
     $("give-up").addEventListener("click", () => this.tell("give_up"));
     $("slower").addEventListener("click", () => this.tell("override", { by: -1 }));
     $("faster").addEventListener("click", () => this.tell("override", { by: 1 }));
@@ -121,6 +134,7 @@ export class Plotting {
     this.session?.end();
     this.board?.end();
     this.session = this.board = this.close = this.order = null;
+    this.waiting = this.starting = null;
     this.passes.left = 0;
     this.enter("closed");
   }
@@ -131,20 +145,28 @@ export class Plotting {
     this.session.ask("session", { pipe, kind }, [pipe]).catch((text) => this.problem(text));
   }
 
-  /** Starts the emulated plotter. */
-  emulate() {
+  /** Starts the emulated plotter for a job. Fails with a sentence if there is no such plotter. */
+  emulate(job) {
+    this.starting ??= this.start(job).finally(() => (this.starting = null));
+    return this.starting;
+  }
+
+  async start(job) {
     const { port1, port2 } = new MessageChannel();
     this.board = new Helper((said) => {
       if (said.event === "path") this.draw(said.path);
       else this.hear(said);
     });
-    const { room, options } = this.job() ?? {};
+    const { room, options } = job ?? {};
     this.room = room;
     this.machine = machineOf(options);
     const pace = Number($("pace").value);
-    this.board
-      .ask("board", { pipe: port1, pace, room, options }, [port1])
-      .catch((text) => this.problem(text));
+    try {
+      await this.board.ask("board", { pipe: port1, pace, room, options }, [port1]);
+    } catch (text) {
+      this.end();
+      throw text;
+    }
     this.begin(port2, "emulated");
   }
 
@@ -176,22 +198,30 @@ export class Plotting {
   }
 
   async plot() {
-    const job = this.job();
+    this.problem("");
+    try {
+      await this.plotJob(await this.job());
+    } catch (error) {
+      this.problem(error?.message ?? error);
+    }
+  }
+
+  /** Has a job drawn. Fails with a sentence if nothing of it is sent. */
+  async plotJob(job) {
     if (!job) return this.problem("There is no drawing: open a file first.");
+    const all = passes(job.options);
     // An emulated plotter without room for a larger model, or of other settings, is replaced.
     const isSmall = (room) => Object.keys(room).some((own) => !(this.room?.[own] >= room[own]));
     const isOther = machineOf(job.options) !== this.machine;
     if (this.board && (isSmall(job.room) || isOther)) this.end();
     if (!this.session) {
       if (this.isFar) return this.problem("Connect the plotter first.");
-      this.emulate();
+      await this.emulate(job);
     }
-    this.problem("");
     this.order?.("begin");
     this.clear();
     this.planned = this.lines();
     await this.board?.ask("begin_again");
-    const all = passes(job.options);
     this.passes = { job, all, left: all - 1 };
     await this.tell("plot", job);
     this.view.draw();
@@ -212,12 +242,14 @@ export class Plotting {
       if (this.isFar) return this.problem("Connect the plotter first.");
       if (!["command", "testSquare"].includes(call)) return;
       // The first command by hand starts the emulated plotter, and is sent when that is ready.
-      this.emulate();
       this.waiting = [call, args];
-      return;
+      const job = await this.job().catch(() => null);
+      return this.emulate(job).catch((text) => this.problem(text));
     }
     try {
       await this.session.ask(call, args);
+      // What was wrong before this command may not be so any more.
+      if (call === "command") this.problem("");
     } catch (text) {
       this.problem(text);
     }
@@ -256,6 +288,11 @@ export class Plotting {
     switch (event.kind) {
       case "phase":
         this.enter(event.name);
+        // The session has given the plotter up: the line to it is closed, and can be opened again.
+        if (event.name === "closed") {
+          this.close?.();
+          if (this.session) this.end();
+        }
         if (event.name === "ready" && this.waiting) {
           const waiting = this.waiting;
           this.waiting = null;
@@ -311,6 +348,7 @@ export class Plotting {
   enter(phase) {
     this.phase = phase;
     this.isHeld = false;
+    this.moves = "";
     // How the last drawing ended stays until something else begins.
     if (phase !== "ready" || !this.hasEnded) $("plot-state").textContent = PHASES[phase];
     if (phase !== "ready") this.hasEnded = false;
@@ -326,6 +364,14 @@ export class Plotting {
     $("percent").textContent = `${percent} %`;
     this.offer(this.phase === "ready" ? stopped : null);
     const held = state === "Hold";
+    if (!held) $("pen-change").hidden = true;
+    const moves = (this.phase === "ready" && MOVES[state]) || "";
+    if (moves !== this.moves) {
+      this.moves = moves;
+      this.hasEnded = false;
+      this.say(moves || PHASES[this.phase]);
+      this.buttons();
+    }
     if (held !== this.isHeld) {
       this.isHeld = held;
       this.say(held ? "Held: the pen goes up." : PHASES[this.phase]);
@@ -380,9 +426,10 @@ export class Plotting {
     const joined = Boolean(this.session);
     $("plot").disabled =
       busy || this.phase === "alarm" || (this.isFar && this.phase !== "ready");
-    $("hold").disabled = this.phase !== "drawing" || this.isHeld;
+    const moves = Boolean(this.moves);
+    $("hold").disabled = !(this.phase === "drawing" || moves) || this.isHeld;
     $("resume").disabled = !this.isHeld;
-    $("give-up").disabled = !busy;
+    $("give-up").disabled = !(busy || moves);
     $("unlock").hidden = this.phase !== "alarm";
     $("connect").hidden = !this.isFar || joined;
     $("disconnect").hidden = !this.isFar || !joined;

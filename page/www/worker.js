@@ -33,8 +33,9 @@ const calls = {
     if (reads) sheet.set(options);
     else sheet.turn(options);
     const lines = sheet.draw();
-    const [page, camera] = [[...sheet.page()], JSON.parse(sheet.camera())];
-    const value = { lines, page, camera, ms: performance.now() - began };
+    const ms = performance.now() - began;
+    const [camera, notes] = [sheet.camera(), sheet.notes()].map((text) => JSON.parse(text));
+    const value = { lines, page: [...sheet.page()], camera, notes, ms };
     return [value, [lines.buffer]];
   },
 

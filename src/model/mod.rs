@@ -406,6 +406,11 @@ impl<'m, I: Index> Model<'m, I> {
         }))
     }
 
+    /// Whether a curve has begun that has not ended. It is not among [`Model::curves`].
+    pub fn has_unfinished_curve(&self) -> bool {
+        self.curves.is_unfinished()
+    }
+
     /// Whether this is a plan: it has only bars and curves, and all vertices are at one height.
     pub fn is_plan(&self) -> bool {
         self.faces == 0

@@ -132,6 +132,11 @@ impl<I: Index> Inner<'_, I> {
                 }
             }
             Command::Options => self.task = Some(Task::List(Listing::Options, 0)),
+            // A model in flash is completed, and no step is made while flash is written.
+            #[cfg(feature = "tiles")]
+            Command::Model if self.is_uploading() && !self.machine.is_stopped() => {
+                return Err(CommandError::Busy);
+            }
             Command::Model => self.report_model(board),
             Command::Edit(edit) => self.edit(edit, board)?,
             Command::List(part, numbers) => self.begin_list(part, numbers)?,
@@ -159,6 +164,8 @@ impl<I: Index> Inner<'_, I> {
             Command::Home => self.home()?,
             Command::Check => {
                 let is_over = self.machine.state() == State::Check;
+                // From now on the program follows its own position.
+                self.program = self.program.at(&self.machine, is_over);
                 self.machine.check(!is_over).map_err(|_| CommandError::Busy)?;
                 if is_over {
                     self.program = self.program.with_z(self.z_before_check);

@@ -295,6 +295,10 @@ impl<I: Index> Inner<'_, I> {
         self.job = job;
         Self::make_room(listener, records::flash_bytes(&self.job))?;
         let is_kept = self.save(listener.board);
+        if is_kept {
+            // It has taken the place of a job that has stopped.
+            self.resumption.forget();
+        }
         let measured = self.machine.begin_measuring();
         {
             let strokes = self.job.strokes(self.words, &mut self.cursor, None);

@@ -335,6 +335,10 @@ impl<I: Index> Inner<'_, I> {
         board: &mut B,
     ) -> Result<bool, CommandError> {
         self.check_idle()?;
+        // Steps that are planned may still be due, and none is made while flash is written.
+        if !self.machine.is_stopped() {
+            return Err(CommandError::Busy);
+        }
         if settings {
             self.machine.restore(Settings::default())?;
         }

@@ -287,6 +287,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         if machine.state() != State::Idle || !machine.is_stopped() || machine.pause().is_err() {
             return Outcome::Waits;
         }
+        machine.reset_ink_budget();
         self.hpgl.session.note_asked();
         Reply(board).line(message);
         Outcome::More

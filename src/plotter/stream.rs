@@ -323,6 +323,15 @@ impl<I: Index> Inner<'_, I> {
         };
         let (program, action, flow) =
             self.program.at(&self.machine, checking).after(line, &self.context())?;
+        // A task would wait for the end of a job, which needs the next lines.
+        let waits_for_rest = flow.is_some()
+            || matches!(
+                action,
+                MachineAction::Arc(_) | MachineAction::Dwell(_) | MachineAction::Set(..)
+            );
+        if waits_for_rest && self.draws_job() {
+            return Err(CommandError::Busy);
+        }
         let machine = &mut self.machine;
         let waits = !checking;
         match action {
@@ -382,6 +391,12 @@ impl<I: Index> Inner<'_, I> {
         self.machine.jog(point, jogged.feed())?;
         self.program = jogged;
         Ok(())
+    }
+
+    /// Whether the machine draws a job, or holds within one: not G-code that is sent line by line.
+    fn draws_job(&self) -> bool {
+        matches!(self.machine.state(), State::Run | State::Hold { .. })
+            && !self.machine.is_streaming()
     }
 
     /// Whether the next line must wait, because a line is being carried out or there is no room for

@@ -102,8 +102,17 @@ impl LineReader {
         let is_text = core::str::from_utf8(&self.bytes).is_ok();
         if !is_text || self.bytes.first().is_some_and(|byte| !byte.is_ascii()) {
             let letters = self.bytes.iter().take_while(|byte| !byte.is_ascii()).count();
-            if is_code(self.bytes.get(letters..).unwrap_or_default()) {
-                self.bytes.retain(u8::is_ascii);
+            let rest = self.bytes.get(letters..).unwrap_or_default();
+            if is_code(rest) {
+                // What came before a command is noise. A damaged byte within it may have been a
+                // digit of a setting.
+                let is_command = rest.trim_ascii_start().first() == Some(&b'$');
+                let mut left = letters;
+                self.bytes.retain(|byte| {
+                    let is_noise = left > 0;
+                    left = left.saturating_sub(1);
+                    !is_noise && (is_command || byte.is_ascii())
+                });
             }
         }
         core::str::from_utf8(&self.bytes).map_err(|_| CommandError::NotText)

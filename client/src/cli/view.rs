@@ -28,7 +28,6 @@ const TITLE: &str = "title";
 /// The name of the option for the height of the title.
 const TITLE_SIZE: &str = "title-size";
 /// The units in which the size of a page may be written, and their lengths in mm.
-const UNITS: [(&str, f64); 3] = [("mm", 1.0), ("cm", 10.0), ("in", 25.4)];
 /// The name of the option for the margin of the page. A file that sets its own page needs no
 /// margin.
 const MARGIN: &str = "margin";
@@ -279,35 +278,11 @@ fn within(option: &PlotOption, reason: &str) -> String {
 
 /// Parses the size of a page: its name, or its width and height with a unit.
 pub(super) fn page(text: &str) -> Result<Page, String> {
-    let text = text.trim();
-    if let Some((_, page)) = NAMED_PAGES.iter().find(|(name, _)| name.eq_ignore_ascii_case(text)) {
-        return Ok(*page);
-    }
-    let names: Vec<&str> = NAMED_PAGES.iter().map(|(name, _)| *name).collect();
-    let names = names.join(", ");
-    let text = text.to_ascii_lowercase();
-    let (width, height) = text.split_once('x').ok_or_else(|| {
-        format!("it is none of {names}, or width x height such as 300x200, 30cmx20cm or 11x17in")
-    })?;
-    // A unit behind the height is that of both.
-    let (height, unit) = length(height, 1.0)?;
-    let (width, _) = length(width, unit)?;
-    let page = Page { width, height };
+    let page = Page::parse(text)?;
     if let Some(option) = OPTIONS.iter().find(|option| option.name == PAGE) {
         understood(option, &page_value(page))?;
     }
     Ok(page)
-}
-
-/// Parses a length with or without its unit. Returns it in mm, and the length of the unit, which is
-/// `unit` where none is written.
-fn length(text: &str, unit: f64) -> Result<(f64, f64), String> {
-    let text = text.trim();
-    let named = UNITS.iter().find_map(|(name, unit)| Some((text.strip_suffix(name)?, *unit)));
-    let (value, unit) = named.unwrap_or((text, unit));
-    let value = number(value).map_err(|_| CommandError::NotANumber.to_string())?;
-    // What single steps cannot show is rounded away.
-    Ok(((value * unit * 1000.0).round() / 1000.0, unit))
 }
 
 #[cfg(test)]

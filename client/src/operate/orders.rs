@@ -8,8 +8,10 @@ use crate::cli::{
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::outcome::Outcome;
+use crate::plot::KNOWS_PLACE;
 use crate::progress::{Bar, Progress};
 use crate::sender::{Sender, Timeouts};
+use penup::protocol::CommandError;
 use penup_job::protocol::{HOME, PEN_DOWN, PEN_UP, Status, UNLOCK};
 use std::io::{self, Write as _};
 use std::sync::atomic::AtomicBool;
@@ -67,7 +69,14 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
                       same options, in `penup plot FILE --port DEVICE --resume`";
         return Err(Error::NotResumed { reason: reason.to_owned() });
     }
-    let drawn = sender.go_on(args.at_origin, progress.as_mut()).and_then(|()| sender.status());
+    let mut drawn = sender.go_on(args.at_origin, progress.as_mut());
+    let knows = CommandError::PositionKnown.number();
+    if matches!(drawn, Err(Error::Refused { number, .. }) if number == knows && args.at_origin) {
+        // The same command has gone on before, and was interrupted.
+        let _ = writeln!(io::stderr(), "penup: note: {KNOWS_PLACE}");
+        drawn = sender.go_on(false, progress.as_mut());
+    }
+    let drawn = drawn.and_then(|()| sender.status());
     sender.end();
     Ok(done("the rest of the job is drawn", &drawn?))
 }

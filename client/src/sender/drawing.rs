@@ -86,7 +86,8 @@ impl Sender<'_> {
         self.begin_plot(&lines, progress)?;
         let base = self.done - 1;
         self.follow_drawing(Some(&lines), progress)?;
-        self.confirm(&lines, base)
+        self.confirm(&lines, base)?;
+        self.fail_if_stopped().map(drop)
     }
 
     /// Draws the last job again, which the plotter has kept, and waits until the machine is idle.

@@ -127,6 +127,16 @@ impl<'a> Sender<'a> {
             Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
                 Form::Strokes
             }
+            // What another drawing depended on that has stopped is no matter here.
+            Err(Error::Refused { number, .. })
+                if ![
+                    CommandError::UnknownSystemCommand.number(),
+                    CommandError::UnknownCommand.number(),
+                ]
+                .contains(&number) =>
+            {
+                Form::Strokes
+            }
             Err(Error::Refused { .. }) => Form::GCode,
             other => other.map(|_| Form::Strokes)?,
         };

@@ -47,6 +47,10 @@ fn main() -> Result<()> {
         fs::copy(root.join("scenes").join(&file), examples.join(&file))?;
     }
     let files = files_below(folder)?;
+    for script in files.iter().filter(|file| file.ends_with(".js") || file.ends_with(".css")) {
+        let script = folder.join(script);
+        fs::write(&script, without_comments(&fs::read_to_string(&script)?))?;
+    }
     // The list of what the page keeps, so that it also works without a network.
     let list: Vec<String> = files.iter().map(|file| format!("\"{file}\"")).collect();
     let worker = folder.join("offline.js");
@@ -74,6 +78,22 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
         }
     }
     Ok(())
+}
+
+/// A script or a style sheet without the lines that are comments, which a browser need not load.
+fn without_comments(text: &str) -> String {
+    let mut kept = String::with_capacity(text.len());
+    let mut is_comment = false;
+    for line in text.split_inclusive('\n') {
+        let words = line.trim();
+        is_comment |= words.starts_with("/*");
+        let ends = is_comment && words.ends_with("*/");
+        if !is_comment && !words.starts_with("//") {
+            kept.push_str(line);
+        }
+        is_comment &= !ends;
+    }
+    kept
 }
 
 /// The paths of all files below `folder`, sorted, with `/` between their parts.

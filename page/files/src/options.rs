@@ -15,10 +15,7 @@ pub fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> 
         let option = options.iter().rfind(|(own, _)| own == name);
         option.map(|(_, value)| value.trim())
     };
-    let page = given("page").and_then(|page| {
-        let (width, height) = page.split_once(['x', 'X'])?;
-        Some(Page { width: width.parse().ok()?, height: height.parse().ok()? })
-    });
+    let page = given("page").and_then(|page| Page::parse(page).ok());
     let turn = match given("landscape") {
         None => Turn::AsItIs,
         Some("auto") => Turn::Automatic,
@@ -33,6 +30,12 @@ pub fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> 
     }
     for option in PLAN_OPTIONS {
         if let Some(value) = given(option.name) {
+            if option.changes_size && given("fit").is_some() {
+                return Err(format!(
+                    "--fit chooses the size and the place: leave out --{}, or --fit",
+                    option.name
+                ));
+            }
             let refused = |reason| format!("--{}: {reason}", option.name);
             arrangement.set(option.name, value).map_err(refused)?;
         }

@@ -152,7 +152,7 @@ impl Settings {
     }
 
     /// The value of a setting, rounded down to a whole number of its unit.
-    pub(super) fn whole(&self, setting: Setting) -> u32 {
+    pub(crate) fn whole(&self, setting: Setting) -> u32 {
         (self.get(setting).to_bits().max(0) >> Value::FRAC_NBITS).unsigned_abs()
     }
 

@@ -10,7 +10,7 @@ use super::{Job, Observer};
 use crate::drawing::Stored;
 use crate::drawing::{StepsPerMillimetre, build_graph};
 use crate::index::Index;
-use crate::model::Model;
+use crate::model::{Model, ModelError};
 #[cfg(feature = "early-ink")]
 use crate::order::FirstStrokes;
 #[cfg(not(feature = "early-ink"))]
@@ -145,6 +145,9 @@ impl<I: Index> Pipeline<'_, I> {
         let is_empty = self.model.elements().corners().is_empty() && self.model.curves().is_empty();
         if is_empty && self.options.see != VisibilityMode::Vertices {
             return Err(CommandError::NothingToPlot);
+        }
+        if self.model.has_unfinished_curve() {
+            return Err(CommandError::Model(ModelError::CurveUnfinished));
         }
         title::check(self.options, self.steps)
     }

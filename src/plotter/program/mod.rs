@@ -223,6 +223,7 @@ impl Program {
         let rule = PenRule::of(settings);
         self.begin_line();
         let was_down_at_rest = self.is_down_at_rest(rule);
+        let ([from_x, from_y, _], drew) = (self.at, self.draws);
         self.set_feed(&block)?;
         self.set_modes(&block, settings)?;
         let mut action = self.action(&block, context)?;
@@ -236,6 +237,12 @@ impl Program {
             // G0 or G1 alone only sets the mode.
         } else if is_motion {
             action = self.motion(&block, context, rule)?;
+            let is_dot = self.draws && !drew && !was_down_at_rest;
+            let here = steps_at([from_x, from_y], settings.page_steps());
+            if is_dot && matches!(action, MachineAction::Line(point) if point == here) {
+                // The pen goes down for a move that leads nowhere.
+                action = MachineAction::Lower;
+            }
         } else if block.axis_use == AxisUse::Motion && block.has_any(b"XYZ") {
             // Beside a dwell or a report of the position.
             return Err(BlockError::AxisConflict.into());

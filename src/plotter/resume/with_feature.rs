@@ -19,9 +19,12 @@ use crate::stage::Cancel;
 use crate::storage::LogProgress;
 
 /// The settings that decide where ink falls, so that they must be the same in all parts of a
-/// drawing.
-const PLACING: [Setting; 16] = [
+/// drawing. Of the travel that is [`placed`].
+const PLACING: [Setting; 19] = [
     Setting::InvertDirections,
+    Setting::HomingDirection,
+    Setting::TravelX,
+    Setting::TravelY,
     Setting::HomingPullOff,
     Setting::StepsPerMmX,
     Setting::StepsPerMmY,
@@ -40,13 +43,13 @@ const PLACING: [Setting; 16] = [
 ];
 
 /// A mark at the beginning of the notes; those with another layout have another mark.
-const LAYOUT: u32 = u32::from_le_bytes(*b"run2");
+const LAYOUT: u32 = u32::from_le_bytes(*b"run3");
 /// The mark of the notes of a job that is sent while it is drawn.
-const STREAMED: u32 = u32::from_le_bytes(*b"str1");
+const STREAMED: u32 = u32::from_le_bytes(*b"str2");
 /// The mark of the notes of a drawing that is computed and drawn part by part. Its number of
 /// strokes is not known when it begins.
 #[cfg(feature = "tiles")]
-const PARTS: u32 = u32::from_le_bytes(*b"prt1");
+const PARTS: u32 = u32::from_le_bytes(*b"prt2");
 /// So many first strokes of a drawing in parts are noted one by one.
 #[cfg(feature = "tiles")]
 const ONE_BY_ONE: u32 = 1 << 14;
@@ -75,6 +78,25 @@ const _: () = assert!(WORDS * size_of::<u32>() <= crate::storage::NOTE_BYTES);
 /// The notes that are kept with the progress of a job.
 type Notes = [[u8; 4]; WORDS];
 
+/// Set in the word that tells whether the model is known, if the number of strokes is an estimate
+/// as long as the order is not kept.
+const IS_ESTIMATE: u32 = 2;
+
+/// The value of a setting as far as it decides where ink falls. The travel does so only where it is
+/// the position of a limit switch, at the high end of an axis.
+fn placed(settings: &Settings, setting: Setting) -> Value {
+    let low_end = match setting {
+        Setting::TravelX => 1,
+        Setting::TravelY => 2,
+        _ => 0,
+    };
+    let homes_low = settings.whole(Setting::HomingDirection) & low_end != 0;
+    if low_end != 0 && (homes_low || !settings.is_on(Setting::Homing)) {
+        return Value::ZERO;
+    }
+    settings.get(setting)
+}
+
 /// A number that differs between versions of the firmware.
 fn version() -> u32 {
     let mut digest = Crc32::new();
@@ -101,7 +123,7 @@ fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -
     let [first, second, third] = more;
     let head = [layout, version(), strokes, first, second, third];
     let settings = PLACING.into_iter().flat_map(|setting| {
-        [setting.info().number().into(), settings.get(setting).to_bits().cast_unsigned()]
+        [setting.info().number().into(), placed(settings, setting).to_bits().cast_unsigned()]
     });
     let mut notes: Notes = [[0; 4]; WORDS];
     for (slot, word) in notes.iter_mut().zip(head.into_iter().chain(settings)) {
@@ -141,6 +163,12 @@ impl Resumption {
     pub(in crate::plotter) fn stopped(&self, state: State) -> Option<[u32; 2]> {
         let is_over = !matches!(state, State::Run | State::Hold { .. } | State::Abort);
         self.progress.filter(|[done, all]| is_over && done < all)
+    }
+
+    /// Another job has taken the place of the one that has stopped.
+    #[cfg(feature = "early-ink")]
+    pub(in crate::plotter) fn forget(&mut self) {
+        self.progress = None;
     }
 
     /// Whether the board keeps how far the job comes.
@@ -205,7 +233,7 @@ impl<I: Index> Inner<'_, I> {
     pub(in crate::plotter) fn find_stopped<B: Board>(&mut self, board: &mut B) {
         let found = read(board);
         self.resumption.progress =
-            found.map(|(notes, noted)| [done(&notes, noted), all_strokes(&notes, board)]);
+            found.map(|(notes, noted)| [done(&notes, noted), all_strokes(&notes, noted, board)]);
         self.resumption.is_lost = true;
     }
 
@@ -226,7 +254,11 @@ impl<I: Index> Inner<'_, I> {
             return;
         }
         let strokes = self.machine.status().job.strokes;
-        let more = words_of(contents);
+        let mut more = words_of(contents);
+        #[cfg(feature = "early-ink")]
+        if self.job.unordered().is_some() {
+            more[0] |= IS_ESTIMATE;
+        }
         let notes = begin_notes(self.machine.settings(), LAYOUT, strokes, more);
         if board.begin_progress(notes.as_flattened(), strokes).is_err() {
             return refuse(board);
@@ -270,8 +302,15 @@ impl<I: Index> Inner<'_, I> {
             return refuse(board);
         }
         self.machine.stroke_noted();
-        if let Some([done, _]) = &mut self.resumption.progress {
+        #[cfg(feature = "early-ink")]
+        let is_estimate = self.pending.is_some();
+        #[cfg(not(feature = "early-ink"))]
+        let is_estimate = false;
+        if let Some([done, all]) = &mut self.resumption.progress {
             *done = strokes;
+            if is_estimate {
+                *all = (*all).max(strokes.saturating_add(1));
+            }
         }
     }
 
@@ -288,7 +327,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Loads the job that has stopped, and returns how much of it is drawn. With `at_origin`
-    /// the user has put the pen at the origin.
+    /// the user has put the pen at the origin, because nobody knows where it is.
     ///
     /// # Errors
     /// [`CommandError::NothingToResume`] if no job has stopped, or the reason why it cannot go
@@ -300,7 +339,7 @@ impl<I: Index> Inner<'_, I> {
         board: &mut B,
     ) -> Result<StoppedJob, CommandError> {
         let (notes, noted) = read(board).ok_or(CommandError::NothingToResume)?;
-        let all = all_strokes(&notes, board);
+        let all = all_strokes(&notes, noted, board);
         if done(&notes, noted) >= all {
             return Err(CommandError::NothingToResume);
         }
@@ -312,12 +351,18 @@ impl<I: Index> Inner<'_, I> {
             if !at_origin {
                 return Err(CommandError::NothingToResume);
             }
+            if !self.resumption.is_lost {
+                return Err(CommandError::PositionKnown);
+            }
             self.machine.declare_origin()?;
             self.resumption.is_lost = false;
             return Ok(StoppedJob::Sent);
         }
         if self.resumption.is_lost && !at_origin {
             return Err(CommandError::PositionUnknown);
+        }
+        if at_origin && !self.resumption.is_lost {
+            return Err(CommandError::PositionKnown);
         }
         #[cfg(feature = "tiles")]
         if is_in_parts(&notes) {
@@ -451,7 +496,7 @@ impl<I: Index> Inner<'_, I> {
             let setting = u16::try_from(number).ok().and_then(Setting::numbered);
             let before = Value::from_bits(bits.cast_signed());
             match setting {
-                Some(setting) if self.machine.settings().get(setting) == before => {}
+                Some(setting) if placed(self.machine.settings(), setting) == before => {}
                 Some(setting) => return Err(CommandError::OtherSetting { setting, before }),
                 None => return Err(CommandError::OtherVersion),
             }
@@ -627,14 +672,17 @@ fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
 
 /// The number of strokes of the kept job. Of a job that began before its order was known, the
 /// notes have an estimate, and the order the number.
-fn all_strokes<B: Board>(notes: &Notes, board: &mut B) -> u32 {
+fn all_strokes<B: Board>(notes: &Notes, noted: LogProgress, board: &mut B) -> u32 {
     #[cfg(feature = "early-ink")]
-    if word(notes, 0) == LAYOUT
-        && let Some(strokes) = records::strokes_of_added_order(board)
-    {
-        return strokes;
+    if word(notes, 0) == LAYOUT {
+        if let Some(strokes) = records::strokes_of_added_order(board) {
+            return strokes;
+        }
+        if word(notes, 3) & IS_ESTIMATE != 0 {
+            return strokes(notes).max(done(notes, noted).saturating_add(1));
+        }
     }
-    let _ = board;
+    let _ = (board, noted);
     strokes(notes)
 }
 

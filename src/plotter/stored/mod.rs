@@ -196,6 +196,11 @@ impl<I: Index> Inner<'_, I> {
         Ok(model)
     }
 
+    /// Whether a model is coming that is not complete in flash.
+    pub(super) fn is_uploading(&self) -> bool {
+        matches!(self.large, FlashModel::Upload(_))
+    }
+
     /// Writes the part of the reply to `$model` that tells of a model in flash, or of the room
     /// there. A model that is still coming is completed. Returns the checksum of the model.
     #[inline(never)] // Keeps its frame off the stack while the stages run.

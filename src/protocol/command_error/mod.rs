@@ -143,6 +143,8 @@ pub enum CommandError {
     NothingToResume,
     /// The position of the pen is not known, so a job cannot go on.
     PositionUnknown,
+    /// The position of the pen is known, so it cannot be said to be the origin.
+    PositionKnown,
     /// The job that has stopped was begun by another version of the firmware.
     OtherVersion,
     /// A setting has changed that decides where ink falls, so the job that has stopped cannot go
@@ -443,9 +445,21 @@ impl CommandError {
                      by $plot; a drawing of a model in flash needs that model: send it again"
                 ),
             ),
+            #[cfg(feature = "resume")]
+            Self::PositionKnown => row(
+                error(168, "the plotter knows where the pen is").client(
+                    "the plotter knows where the pen is: leave out --at-origin; if the pen was \
+                     moved by hand, switch the plotter off and on first",
+                ),
+                format_args!(
+                    "$resume goes on from where the pen is; if it was moved by hand, send $SLP and \
+                     ctrl-X first"
+                ),
+            ),
             #[cfg(not(feature = "resume"))]
             Self::NothingToResume
             | Self::PositionUnknown
+            | Self::PositionKnown
             | Self::OtherVersion
             | Self::OtherSetting { .. }
             | Self::OtherModel => Self::NoJobKept.explain(row),

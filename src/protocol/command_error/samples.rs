@@ -93,6 +93,7 @@ pub fn error_samples() -> Vec<CommandError> {
         BeyondBounds,
         NothingToResume,
         PositionUnknown,
+        PositionKnown,
         OtherVersion,
         OtherSetting { setting: Setting::DotLength, before: one },
         OtherModel,

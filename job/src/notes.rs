@@ -1,11 +1,61 @@
-//! Options that change nothing in a drawing, of which the user is told.
+//! What the user is told about a file with the options for it: what is drawn otherwise than the
+//! file says, and which options change nothing.
 //!
 //! Each row of `RULES` says when some options change nothing, and why. Whether an option changes
 //! something in this very model is not asked, only whether it could. Options that contradict each
 //! other, or that need another one, are refused by the command line.
 
+use crate::Settings;
 use penup::plotter::{OPTIONS, PlotOption, PlotOptions, VisibilityMode};
-use penup_job::Settings;
+use penup_readers::page::Page;
+use penup_readers::words::{MOSTLY_FLAT, PROBABLY_Y_UP};
+
+/// The length in mm below which nothing is drawn: about a step of the usual motors.
+const SMALLEST: f64 = 0.0125;
+
+/// What is told of a plan with these `bounds`, its least and greatest coordinates in mm.
+pub fn of_plan(settings: &Settings, bounds: [[f64; 2]; 2]) -> Vec<String> {
+    let told =
+        [settings.moves_plan(bounds), settings.fits_turned(bounds), too_small(settings, bounds)];
+    told.into_iter().flatten().collect()
+}
+
+/// The notes of readers that say nothing new, because the user has done what they advise.
+pub fn followed(settings: &Settings) -> Vec<&'static str> {
+    let (_, names) = changed(settings);
+    let advice = [(MOSTLY_FLAT, &["crease"][..]), (PROBABLY_Y_UP, &["up", "angles"])];
+    let is_done = |options: &[&str]| options.iter().any(|it| names.iter().any(|name| name == it));
+    advice.into_iter().filter(|(_, options)| is_done(options)).map(|(note, _)| note).collect()
+}
+
+/// Says that a plan with these least and greatest coordinates is so small that nothing, or hardly
+/// anything, is drawn of it at true size.
+fn too_small(settings: &Settings, [low, high]: [[f64; 2]; 2]) -> Option<String> {
+    let [width, height] = [0, 1].map(|axis: usize| high[axis] - low[axis]);
+    let is_small = width.max(height) < SMALLEST && settings.value("fit") == Some("off");
+    // What coordinates of many decimals add is left out.
+    let digits = |length: f64| (length * 1e9).round() / 1e9;
+    is_small.then(|| {
+        format!(
+            "the drawing is {} x {} mm at true size, which is less than a step of the motors: \
+             --fit scales it to the page",
+            digits(width),
+            digits(height)
+        )
+    })
+}
+
+/// Says which page a plan is scaled to, if it is the file's `own`, and not the `sheet` of a user.
+pub fn fits_own_page(settings: &Settings, own: Option<Page>, sheet: Page) -> Option<String> {
+    let Page { width, height } = own?;
+    let is_own = [sheet.width, sheet.height] == [width, height];
+    (is_own && settings.value("fit") == Some("on")).then(|| {
+        format!(
+            "--fit scales to the page of the file, which is {width} x {height} mm: --page A4 is \
+             another one"
+        )
+    })
+}
 
 /// What decides whether an option can change anything.
 struct Choices<'s> {
@@ -73,7 +123,7 @@ fn is_of_camera(name: &str) -> bool {
 }
 
 /// The options of the plotter with these settings, and the names of those that are not as usual.
-pub fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
+fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
     let mut options = PlotOptions::default();
     let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
     for (name, value) in &settings.values {
@@ -114,7 +164,7 @@ pub fn idle_options(settings: &Settings, is_plan: bool) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::idle_options;
-    use penup_job::Settings;
+    use crate::Settings;
     use penup_readers::page::A4;
 
     #[test]
