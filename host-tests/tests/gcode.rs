@@ -59,6 +59,27 @@ fn a_program_is_drawn_and_ends_with_the_pen_up() {
     assert!((inked(&bench) - 80.0).abs() < 0.1, "{}", inked(&bench));
 }
 
+/// Stippling programs lower the pen by a line that has the place of the one before.
+#[test]
+fn a_line_that_leads_nowhere_draws_a_dot_unless_a_stroke_goes_on() {
+    for (program, strokes) in [
+        ("G0 X20 Y20 Z5\nG1 X20 Y20 Z-1\nG0 X20 Y20 Z5\nG0 X30\nG1 X30 Z-1\nG0 Z5\n", 2),
+        ("M5\nG0 X20 Y20\nM3\nG1 X20 Y20\nM5\nG0 X30\nM3\nG1 X30 Y20\nM5\n", 2),
+        ("G0 X20 Z5\nG1 X20 Z-1\nG1 X30\nG1 X30\nG1 X40\nG0 Z5\n", 1),
+        ("G0 X20 Z5\nG0 X20 Y0\nG0 Z6\n", 0),
+    ] {
+        let mut bench = bench();
+        bench.say("F2000\n");
+        let answer = bench.say(program);
+        bench.finish();
+        assert_eq!(
+            field(&mut bench, "Strokes"),
+            format!("Strokes:{strokes}/{strokes}"),
+            "{answer}"
+        );
+    }
+}
+
 #[test]
 fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     let mut bench = bench();

@@ -1,8 +1,9 @@
 //! Tests of the protocol by transcripts: the lines that are sent to the plotter, and its answers.
 
 use penup::machine::Path;
+use penup::model::ModelError;
 use penup::plotter::{EMPTY_LOOKAHEAD, Memory, Unobserved};
-use penup::protocol::error_entries;
+use penup::protocol::{CommandError, error_entries};
 use penup::stage::NeverCancel;
 use penup_host_tests::whole_jobs::Bench;
 
@@ -36,6 +37,16 @@ fn a_new_plotter_greets_and_is_idle() {
     );
     assert_eq!(bench.say("\n"), "ok\n");
     assert_eq!(bench.say("$model\n").lines().last(), Some("ok"));
+}
+
+#[test]
+fn a_curve_that_has_not_ended_is_not_left_out() {
+    let mut bench = with_cube();
+    bench.say("deg 1\ncurv 0 1 1 2\nparm u 0 0 1 1\n");
+    let answer = bench.say("$plot\n");
+    let expected = CommandError::Model(ModelError::CurveUnfinished).number();
+    assert_eq!(refusal(&answer), Some(expected), "{answer}");
+    assert!(bench.say("end\n$plot\n").ends_with("ok\n"));
 }
 
 #[test]

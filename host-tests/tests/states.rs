@@ -440,3 +440,76 @@ fn z_is_after_a_check_what_it_was_before() {
     send(&mut bench, &[0x18]);
     assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,3.000");
 }
+
+/// Such a line would wait for the end of the job, and all lines behind it with it.
+#[test]
+fn what_needs_rest_is_refused_while_a_job_is_drawn() {
+    let mut bench = Bench::new();
+    bench.heard();
+    bench.say("v 10 10 0\nv 60 10 0\nl 1 2\n$plot\n");
+    bench.work(200);
+    for hold in ["", "!"] {
+        send(&mut bench, hold.as_bytes());
+        for line in ["M0", "M6", "M2", "G4 P1", "G10 L20 P1 X0", "G28.1", "G91 G2 X1 Y1 R5"] {
+            let answer = send(&mut bench, format!("{line}\n").as_bytes());
+            assert!(answer.ends_with("error:8\n"), "{hold}{line}: {answer}");
+        }
+    }
+    // A line that is refused sets no mode.
+    assert!(send(&mut bench, b"$G\n").contains(" G90 "));
+    send(&mut bench, b"~");
+    bench.finish();
+    assert_eq!(status(&mut bench).split('|').next(), Some("<Idle"));
+    let answer = bench.say("G4 P0.1\n");
+    bench.finish();
+    let answer = answer + &bench.heard();
+    assert!(answer.ends_with("ok\n"), "{answer}");
+}
+
+#[test]
+fn nothing_is_kept_while_steps_are_due() {
+    for line in ["$RST=#", "$RST=$", "$RST=*", "$I=a", "$N0=G21"] {
+        let mut bench = Bench::new();
+        bench.heard();
+        bench.board.receive(b"G0 X1\n");
+        while !bench.board.has_read_all() || bench.plotter.machine().state() != State::Idle {
+            bench.work(1);
+        }
+        assert!(!bench.plotter.machine().is_stopped(), "the steps are made already");
+        bench.heard();
+        bench.board.receive(format!("{line}\n").as_bytes());
+        while !bench.board.has_read_all() {
+            bench.plotter.poll(&mut bench.board);
+        }
+        let answer = bench.heard();
+        assert!(answer.ends_with("error:8\n"), "{line}: {answer}");
+    }
+}
+
+#[test]
+fn a_program_that_is_checked_begins_where_the_pen_is() {
+    let mut bench = Bench::new();
+    bench.heard();
+    bench.say("G0 X50 Y20\n");
+    bench.finish();
+    send(&mut bench, b"\x18");
+    bench.say("$C\nG10 L20 P1 X0 Y0\n$C\n");
+    let kept = bench.say("$#\n");
+    assert!(kept.contains("[G54:50.000,20.000,0.000]"), "{kept}");
+}
+
+/// The bit may have been one of a digit.
+#[test]
+fn a_command_with_a_damaged_byte_is_refused() {
+    let mut bench = Bench::new();
+    bench.heard();
+    let before = bench.say("$$\n");
+    for line in [&b"$100=8\xB0\n"[..], b"$13\xB0=42\n", b"$eye=1,\xB2,3\n"] {
+        let answer = send(&mut bench, line);
+        assert!(answer.ends_with("error:100\n"), "{line:?}: {answer}");
+    }
+    // Noise before it is no part of it.
+    let answer = send(&mut bench, b"\xB0\xB0$100=80\n");
+    assert!(answer.ends_with("ok\n"), "{answer}");
+    assert_eq!(bench.say("$$\n"), before);
+}

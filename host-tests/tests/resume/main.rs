@@ -249,14 +249,21 @@ fn what_the_job_depends_on_must_be_as_it_was() {
     let (flash, changes) = switch_on(flash, |plotter| {
         plotter.heard();
         // A setting that decides where ink falls.
-        let deviant = [("$3=1", "$3=0"), ("$101=81", "$101=80"), ("$220=2", "$220=1")];
-        for (other, same) in deviant {
-            assert!(plotter.say(other).ends_with("ok\n"));
+        let settings = plotter.say("$$");
+        for number in [3, 23, 27, 100, 101, 219, 220, 221, 222, 223] {
+            let row = settings.lines().find_map(|row| row.strip_prefix(&format!("${number}=")));
+            let value = row.and_then(|row| row.split(' ').next()).expect("a setting");
+            let value: f64 = value.parse().expect("a number");
+            let other = if value == 3.0 { 2.0 } else { value + 1.0 };
+            let answer = plotter.say(&format!("${number}={other}"));
+            assert!(answer.ends_with("ok\n"), "{number}: {answer}");
             let answer = plotter.say("$resume=origin");
-            assert!(answer.contains(&format!("set {same}.000")), "{answer}");
+            assert!(answer.contains(&format!("set ${number}={value:.3}")), "{answer}");
             assert!(answer.ends_with("error:166\n"), "{answer}");
-            assert_eq!(plotter.say(same), "ok\n");
+            assert!(plotter.say(&format!("${number}={value}")).ends_with("ok\n"));
         }
+        // The travel does not, because nothing is homed.
+        assert!(plotter.say("$130=300").ends_with("ok\n"));
         // Speeds do not.
         assert_eq!(plotter.say("$201=2000"), "ok\n");
         // Another model, and then the same one.
@@ -279,6 +286,40 @@ fn what_the_job_depends_on_must_be_as_it_was() {
         let greeting = plotter.heard();
         assert!(!greeting.contains("stopped"), "{greeting}");
         assert!(plotter.say("$resume").ends_with("error:163\n"));
+    });
+}
+
+/// A switch at the high end of an axis lies where the travel ends.
+#[test]
+fn the_travel_must_be_as_it_was_where_its_end_is_homed() {
+    let lines: Vec<String> = ["$22=1", "$23=0", "$X"]
+        .map(str::to_owned)
+        .into_iter()
+        .chain(lattice("$hidden=erased"))
+        .collect();
+    let (flash, _) = cut_after_five_strokes(&lines);
+    switch_on(flash, |plotter| {
+        plotter.say("$X");
+        let settings = plotter.say("$$");
+        for number in ["$130", "$131"] {
+            let row = settings.lines().find_map(|row| row.strip_prefix(&format!("{number}=")));
+            let same = row.and_then(|row| row.split(' ').next()).expect("a setting");
+            assert!(plotter.say(&format!("{number}=300")).ends_with("ok\n"));
+            let answer = plotter.say("$resume=origin");
+            assert!(answer.contains(&format!("set {number}={same}")), "{answer}");
+            assert!(plotter.say(&format!("{number}={same}")).ends_with("ok\n"));
+        }
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        // Whoever interrupts that knows where the pen is, and must not say that it is elsewhere.
+        plotter.run(3000);
+        plotter.board.receive(&[0x18]);
+        plotter.finish();
+        plotter.heard();
+        plotter.say("$X");
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.ends_with("error:168\n"), "{answer}");
+        assert_eq!(plotter.say("$resume"), "ok\n");
+        plotter.finish();
     });
 }
 

@@ -674,16 +674,20 @@ fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
 /// notes have an estimate, and the order the number.
 fn all_strokes<B: Board>(notes: &Notes, noted: LogProgress, board: &mut B) -> u32 {
     #[cfg(feature = "early-ink")]
-    if word(notes, 0) == LAYOUT {
-        if let Some(strokes) = records::strokes_of_added_order(board) {
-            return strokes;
-        }
-        if word(notes, 3) & IS_ESTIMATE != 0 {
-            return strokes(notes).max(done(notes, noted).saturating_add(1));
-        }
+    if word(notes, 0) == LAYOUT
+        && let Some(strokes) = records::strokes_of_added_order(board)
+    {
+        return strokes;
     }
-    let _ = (board, noted);
-    strokes(notes)
+    let _ = board;
+    strokes_without_order(notes, done(notes, noted))
+}
+
+/// The number of strokes of a job whose order was not added to it. If it is an estimate, it is more
+/// than those that are `done`, because the job is not complete.
+fn strokes_without_order(notes: &Notes, done: u32) -> u32 {
+    let is_estimate = word(notes, 0) == LAYOUT && word(notes, 3) & IS_ESTIMATE != 0;
+    strokes(notes).max(if is_estimate { done.saturating_add(1) } else { 0 })
 }
 
 /// The number of strokes of a job, as its notes have it.
@@ -719,5 +723,23 @@ mod tests {
             // The whole room of the log says that the drawing is complete.
             assert!(noted_in_parts(drawn) < 23_040, "{drawn}");
         }
+    }
+
+    #[test]
+    fn no_number_of_strokes_is_all_of_them_while_that_is_an_estimate() {
+        let settings = Settings::default();
+        for (known, done, all) in [
+            (1, 9, 10),
+            (1, 10, 10),
+            (1 | IS_ESTIMATE, 9, 10),
+            (1 | IS_ESTIMATE, 10, 11),
+            (IS_ESTIMATE, 25, 26),
+        ] {
+            let notes = begin_notes(&settings, LAYOUT, 10, [known, 7, 8]);
+            assert_eq!(strokes_without_order(&notes, done), all, "{known}: {done}");
+        }
+        // In other notes the word is something else.
+        let notes = begin_notes(&settings, STREAMED, 10, [3, 7, 8]);
+        assert_eq!(strokes_without_order(&notes, 10), 10);
     }
 }
