@@ -4,7 +4,8 @@
 //! A [`Job`] joins the lines of a file and the [`Settings`] into the lines to send. [`protocol`]
 //! has the words of the serial line, and reads the replies. [`user_choices`] turns the choices of
 //! the user and the properties of a file into settings, and [`view`] says from where a model is
-//! seen. [`notes`] tells what is drawn otherwise than the file says, and which options do nothing. [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
+//! seen. [`notes`] tells what is drawn otherwise than the file says, and which options do nothing.
+//! [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
 //! [`machine_settings`] makes the machine that a computer simulates. [`streamed`] makes lines of
 //! what this computer has computed, and [`relooped`] lets their closed strokes begin elsewhere.
 //! [`pins`] and [`watch`] follow the pen to its [`path`], whose steps [`straight`] makes lines of,

@@ -1,9 +1,9 @@
 //! Finds out whether lines of OBJ are a plan, and where it lies.
 //!
 //! A plan has only lines and curves, and all of its vertices are at one height: see
-//! [`penup::model::Model::is_plan`]. Its bounds are those of what is drawn: vertices without a line do not count,
-//! and a curve is followed, because it does not reach its control points. In a browser
-//! those count, because the page has no room for more.
+//! [`penup::model::Model::is_plan`]. Its bounds are those of what is drawn: vertices without a line
+//! do not count, and a curve is followed, because it does not reach its control points. In a
+//! browser those count, because the page has no room for more.
 
 use crate::lines::Lines;
 #[cfg(not(target_arch = "wasm32"))]
