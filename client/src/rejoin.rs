@@ -4,8 +4,12 @@
 //! While the plotter is gone, its clock stands still for the program, so that no time runs out;
 //! what is sent is lost, as on a bad cable, and sent again by the rules for damaged lines. The port
 //! is opened again as soon as it is there, and the plotter is asked until it answers.
+//!
+//! A plotter at a USB port greets whoever opens the port, as it does after a start. So a greeting is
+//! left out if the first report of the plotter's state tells that its job goes on.
 
-use std::io::{self, Write as _};
+use std::collections::VecDeque;
+use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
 
 /// The time without a byte after which a plotter that was asked is gone.
@@ -13,6 +17,10 @@ const SILENCE: Duration = Duration::from_secs(3);
 
 /// The time between two attempts to reach the plotter.
 const PAUSE: Duration = Duration::from_millis(250);
+
+/// How long the first report is waited for behind an opened port, and the most bytes before it.
+const INTRODUCTION: Duration = Duration::from_secs(2);
+const LONGEST_INTRODUCTION: usize = 1 << 12;
 
 /// If a wait takes this much longer than it should, the computer was asleep.
 const SLEEP: Duration = Duration::from_secs(2);
@@ -65,6 +73,11 @@ pub struct Rejoining<W> {
     heard: Option<Instant>,
     /// Whether the plotter was asked for something since then.
     is_asked: bool,
+    /// What came since the port was opened again, and when that was; `None` once the first report
+    /// has come.
+    introduction: Option<(Vec<u8>, Instant)>,
+    /// What was received and is still to be passed on.
+    received: VecDeque<u8>,
 }
 
 impl<W: Wire> Rejoining<W> {
@@ -80,6 +93,8 @@ impl<W: Wire> Rejoining<W> {
             lost: Duration::ZERO,
             heard: None,
             is_asked: false,
+            introduction: None,
+            received: VecDeque::new(),
         }
     }
 
@@ -140,6 +155,9 @@ impl<W: Wire> Rejoining<W> {
     /// # Errors
     /// The port is gone, and is not waited for any longer.
     pub fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        if !self.received.is_empty() {
+            return self.received.read(buffer);
+        }
         let begin = Instant::now();
         if self.gone.is_some() {
             self.look_for(timeout)?;
@@ -150,12 +168,12 @@ impl<W: Wire> Rejoining<W> {
         match self.read(buffer, timeout) {
             Ok(0) => {
                 self.note_silence(begin, timeout);
-                Ok(0)
+                self.introduce(buffer, 0)
             }
             Ok(count) => {
                 self.join();
                 (self.heard, self.is_asked) = (Some(Instant::now()), false);
-                Ok(count)
+                self.introduce(buffer, count)
             }
             Err(_) if self.may_wait() => {
                 self.leave(Why::Port);
@@ -163,6 +181,20 @@ impl<W: Wire> Rejoining<W> {
             }
             Err(error) => Err(error),
         }
+    }
+
+    /// Passes `count` bytes of the buffer on. Behind an opened port they are kept back until the
+    /// first report has come, or too long for it to come.
+    fn introduce(&mut self, buffer: &mut [u8], count: usize) -> io::Result<usize> {
+        let Some((kept, since)) = &mut self.introduction else { return Ok(count) };
+        kept.extend_from_slice(buffer.get(..count).unwrap_or_default());
+        let is_over = since.elapsed() > INTRODUCTION || kept.len() > LONGEST_INTRODUCTION;
+        if !is_over && first_report(kept).is_none() {
+            return Ok(0);
+        }
+        self.received = without_greeting(kept).collect();
+        self.introduction = None;
+        self.received.read(buffer)
     }
 
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
@@ -246,6 +278,7 @@ impl<W: Wire> Rejoining<W> {
         let question: &[u8] = if self.wire.is_none() { b"\n?" } else { b"?" };
         if self.wire.is_none() {
             self.wire = (self.open)();
+            self.introduction = self.wire.is_some().then(|| (Vec::new(), Instant::now()));
         }
         if self.wire.is_some() && self.write(question).is_err() {
             self.leave(Why::Port);
@@ -262,9 +295,47 @@ impl<W: Wire> Rejoining<W> {
     }
 }
 
+/// The first whole line that reports a state.
+fn first_report(bytes: &[u8]) -> Option<&[u8]> {
+    let whole = bytes.split_inclusive(|byte| *byte == b'\n').filter(|line| line.ends_with(b"\n"));
+    whole.map(<[u8]>::trim_ascii).find(|line| line.starts_with(b"<"))
+}
+
+/// The bytes, without a greeting if the first report tells that a job goes on.
+fn without_greeting(bytes: &[u8]) -> impl Iterator<Item = u8> {
+    let goes_on = first_report(bytes)
+        .is_some_and(|report| report.starts_with(b"<Run") || report.starts_with(b"<Hold"));
+    let lines = bytes.split_inclusive(|byte| *byte == b'\n');
+    let kept = lines.filter(move |line| !(goes_on && line.trim_ascii().starts_with(b"Grbl ")));
+    kept.flatten().copied()
+}
+
 fn gone_for_good() -> io::Error {
     io::Error::new(
         io::ErrorKind::BrokenPipe,
         "the port of the plotter is gone; once it is back, `penup watch` follows the job",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::without_greeting;
+
+    #[test]
+    fn a_greeting_is_left_out_where_a_job_goes_on() {
+        let greeting = "\r\nGrbl 1.1h [penup 0.1.0 '$' for help]\r\n";
+        let passed = |bytes: &str| {
+            String::from_utf8(without_greeting(bytes.as_bytes()).collect()).expect("text")
+        };
+        for (report, goes_on) in [
+            ("<Run|MPos:1,2,3>\r\n", true),
+            ("ok\r\n<Hold:0|MPos:1,2,3>\r\n", true),
+            ("<Idle|MPos:1,2,3>\r\n<Run|MPos:1,2,3>\r\n", false),
+            ("<Run|MPos", false),
+            ("", false),
+        ] {
+            let expected = format!("{}{report}", if goes_on { "\r\n" } else { greeting });
+            assert_eq!(passed(&format!("{greeting}{report}")), expected, "{report}");
+        }
+    }
 }

@@ -293,8 +293,16 @@ impl Frame {
             [x1, x2, y1, y2] if x1 != x2 && y1 != y2 => Some([x1, x2, y1, y2]),
             // HP-GL/2 knows two more kinds of scaling: units of the same length on both axes, and a
             // given number of plotter units for each user unit.
-            [x1, x2, y1, y2, kind, ..] if kind == UNIT && x1 != x2 && y1 != y2 => {
-                isotropic([x1, x2, y1, y2], width, height)
+            [x1, x2, y1, y2, kind, ref rest @ ..] if kind == UNIT && x1 != x2 && y1 != y2 => {
+                let free = match *rest {
+                    [] => [50 * UNIT; 2],
+                    [left, bottom] => [left, bottom],
+                    _ => return false,
+                };
+                if free.iter().any(|share| !(0..=100 * UNIT).contains(share)) {
+                    return false;
+                }
+                isotropic([x1, x2, y1, y2], [width, height], free)
             }
             [x1, x_unit, y1, y_unit, kind] if kind == 2 * UNIT && x_unit != 0 && y_unit != 0 => {
                 let ends = ratio(width, UNIT, x_unit).zip(ratio(height, UNIT, y_unit));
@@ -321,18 +329,26 @@ impl Frame {
     }
 }
 
-/// The user units at P1 and P2 if both axes have the same unit, and those of `scale` lie in the
-/// middle of P1 and P2.
-fn isotropic([x1, x2, y1, y2]: [i64; 4], width: i64, height: i64) -> Option<[i64; 4]> {
+/// The user units at P1 and P2 if both axes have the same unit. Of the room that is left over in
+/// one direction, `free` percent (in units of the interpreter) lie to the left of the given range,
+/// or below it.
+fn isotropic(
+    [x1, x2, y1, y2]: [i64; 4],
+    [width, height]: [i64; 2],
+    free: [i64; 2],
+) -> Option<[i64; 4]> {
     let (wide, high) = ((x2 - x1).abs(), (y2 - y1).abs());
     // The unit is width / wide or height / high, whichever is less.
     let x_is_less = product(width.abs(), high) <= product(height.abs(), wide);
     let (unit, of) = if x_is_less { (width.abs(), wide) } else { (height.abs(), high) };
-    let widened = |from: i64, to: i64, length: i64| {
-        let extra = (ratio(length.abs(), of, unit)? - (to - from).abs()) / 2 * (to - from).signum();
-        Some([from - extra, to + extra])
+    let widened = |from: i64, to: i64, length: i64, share: i64| {
+        let extra = ratio(length.abs(), of, unit)? - (to - from).abs();
+        let before = ratio(extra, share, 100 * UNIT)?;
+        let sign = (to - from).signum();
+        Some([from - before * sign, to + (extra - before) * sign])
     };
-    let ([x1, x2], [y1, y2]) = (widened(x1, x2, width)?, widened(y1, y2, height)?);
+    let [left, bottom] = free;
+    let ([x1, x2], [y1, y2]) = (widened(x1, x2, width, left)?, widened(y1, y2, height, bottom)?);
     (x1 != x2 && y1 != y2).then_some([x1, x2, y1, y2])
 }
 

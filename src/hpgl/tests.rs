@@ -122,6 +122,11 @@ fn scales_and_turns() {
     assert_eq!(actions(b"IP0,0,1000,500;SC0,10,0,10;PU5,5;PD10,0;"), "go 500,250 500,250>1000,0");
     assert_eq!(actions(b"IP0,0,1000,500;SC10,0,0,10;PU1,1;"), "go 900,50");
     assert_eq!(actions(b"IP0,0,1000,500;SC0,10,0,10,1;PU5,5;PD10,0;"), "go 500,250 500,250>750,0");
+    // The room that is left over is divided as the last two numbers say, in percent.
+    let left = b"IP0,0,1000,500;SC0,10,0,10,1,0,0;PU5,5;PD10,0;";
+    assert_eq!(actions(left), "go 250,250 250,250>500,0");
+    let right = b"IP0,0,1000,500;SC0,10,0,10,1,100,50;PU5,5;PD10,0;";
+    assert_eq!(actions(right), "go 750,250 750,250>1000,0");
     assert_eq!(actions(b"IP0,0,1000,500;SC1,2,1,2,2;PU11,1;"), "go 20,0");
     assert_eq!(actions(b"RO90;PU100,200;PR10,0;"), "go 15800,100 go 15800,110");
     assert_eq!(actions(b"RO180;PU100,200;"), "go 15900,11800");

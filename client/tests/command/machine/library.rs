@@ -104,6 +104,11 @@ impl Library {
                         std::thread::sleep(Duration::from_millis(1));
                     }
                     std::os::unix::fs::symlink(device, name).expect("linked");
+                    // As at the USB port of a Pico, which greets whoever opens the port.
+                    if draws.load(Ordering::Relaxed) {
+                        unread.clear();
+                        unread.extend(b"\r\nGrbl 1.1h [penup 0.1.0 '$' for help]\r\n");
+                    }
                     is_replugged.store(false, Ordering::Relaxed);
                 }
                 // An error says that the program does not hold its end.
