@@ -5,8 +5,8 @@
 //! what is sent is lost, as on a bad cable, and sent again by the rules for damaged lines. The port
 //! is opened again as soon as it is there, and the plotter is asked until it answers.
 //!
-//! A plotter at a USB port greets whoever opens the port, as it does after a start. So a greeting is
-//! left out if the first report of the plotter's state tells that its job goes on.
+//! A plotter at a USB port greets whoever opens the port, as it does after a start. So a greeting
+//! is left out if the first report of the plotter's state tells that its job goes on.
 
 use std::collections::VecDeque;
 use std::io::{self, Read as _, Write as _};
