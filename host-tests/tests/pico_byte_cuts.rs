@@ -187,7 +187,7 @@ fn share_of(portion: Portion, seed: u64, board: u32, boards: u32) -> Result<Tall
 
 /// Prints how many cuts there were of each kind. Each core of the computer emulates a board.
 #[test]
-#[ignore = "`cargo xtask power-soak --bytes` runs it for more than an hour"]
+#[ignore = "`cargo xtask power-soak --bytes` runs it for half an hour or more"]
 fn before_every_byte() -> TestResult {
     let seed = wish("PENUP_SEED", 1);
     let only = std::env::var("PENUP_PORTION").ok();

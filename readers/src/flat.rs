@@ -141,7 +141,8 @@ impl Flat {
         let scale = unit * 100.0;
         let on_page = |[x, y, _]: [i64; 3]| Some([x, y].map(|c| (c as f64 * scale) as i64));
         let mut reach = |[x, y, _]: Point, _| {
-            extend(bounds, [x, y].map(|c| f64::from(c) * unit));
+            // What lies between the file's own numbers is told in thousandths of a millimetre.
+            extend(bounds, [x, y].map(|c| (f64::from(c) * unit * 1000.0).round() / 1000.0));
             Ok(())
         };
         model.curves().flatten(&control, &on_page, 32, &mut NeverCancel, &mut reach).ok()

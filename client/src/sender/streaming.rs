@@ -123,21 +123,15 @@ impl<'a> Sender<'a> {
     /// It takes only G-code in which a program cannot say when the pen is down, or as
     /// [`Sender::stream`].
     pub fn form(&mut self, settings: &Settings) -> Result<Form, Error> {
+        let unknown = [CommandError::UnknownSystemCommand, CommandError::UnknownCommand];
         let form = match self.ask(STREAM) {
-            Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
-                Form::Strokes
-            }
-            // What another drawing depended on that has stopped is no matter here.
             Err(Error::Refused { number, .. })
-                if ![
-                    CommandError::UnknownSystemCommand.number(),
-                    CommandError::UnknownCommand.number(),
-                ]
-                .contains(&number) =>
+                if unknown.iter().any(|error| error.number() == number) =>
             {
-                Form::Strokes
+                Form::GCode
             }
-            Err(Error::Refused { .. }) => Form::GCode,
+            // No strokes are expected now, or another drawing has stopped that cannot go on.
+            Err(Error::Refused { .. }) => Form::Strokes,
             other => other.map(|_| Form::Strokes)?,
         };
         let shows_pen = settings.get(Setting::PenMode) == 0 && !settings.is_on(Setting::Laser);
