@@ -2,7 +2,7 @@
 //! bounce: the state and the report must be right, and no step may follow the stop.
 #![cfg(feature = "emulator")]
 
-use penup_client::emulator::{EmulatedBoard, Machine, Pico, image_path};
+use penup_client::emulator::{EmulatedBoard, Machine, Pico, PinChange, image_path};
 use penup_host_tests::emulated_jobs::Line;
 use penup_host_tests::whole_jobs::job_lines;
 use std::error::Error;
@@ -25,19 +25,41 @@ fn start(settings: &[&str]) -> Result<Line<Pico>, Box<dyn Error>> {
     Ok(line)
 }
 
-/// Waits until the pins have moved.
-fn wait_for_steps(line: &mut Line<Pico>) -> TestResult {
-    let mut seen = 0;
+/// Lets a machine move as the pins say.
+fn follow(machine: &mut Machine, changes: Vec<PinChange>) {
+    for change in changes {
+        machine.change(change);
+    }
+}
+
+/// Follows the pins until they have moved.
+fn wait_for_steps(line: &mut Line<Pico>) -> Result<Machine, Box<dyn Error>> {
+    let (mut machine, mut seen) = (Machine::default(), 0);
     while seen < 1000 {
-        seen += line.emulator.pin_changes()?.iter().filter(|change| change.is_step()).count();
+        let changes = line.emulator.pin_changes()?;
+        seen += changes.iter().filter(|change| change.is_step()).count();
+        follow(&mut machine, changes);
         sleep(Duration::from_millis(5));
     }
+    Ok(machine)
+}
+
+/// Checks that the status tells where the pins have moved the `machine`, at 80 steps per mm.
+fn is_where_told(line: &mut Line<Pico>, machine: &Machine) -> TestResult {
+    let (x, y) = machine.position();
+    let status = line.status()?;
+    let told = status.split(['|', '>']).find_map(|part| part.strip_prefix("MPos:"));
+    let told = told.ok_or("no position")?.split(',').map(str::parse::<f64>);
+    let told: Vec<f64> = told.collect::<Result<_, _>>()?;
+    let is_same = |(told, pins): (&f64, i32)| (told * 80.0 - f64::from(pins)).abs() < 0.1;
+    assert!(told.iter().zip([x, y]).all(is_same), "{x} {y}: {status}");
     Ok(())
 }
 
 /// Checks that the alarm is reported once, that the state is that of an alarm and that the report
-/// contains its number. After the report, there must be no step.
-fn is_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
+/// contains its number. After the report, there must be no step, and the position that is told is
+/// that of the pins, which have moved the `machine` up to now.
+fn is_in_alarm(line: &mut Line<Pico>, number: u8, mut machine: Machine) -> TestResult {
     assert_eq!(line.hear()?, format!("ALARM:{number}"));
     let told_at = line.emulator.clock()?;
     // A line that is being processed is refused.
@@ -52,10 +74,11 @@ fn is_in_alarm(line: &mut Line<Pico>, number: u8) -> TestResult {
     let changes = line.emulator.pin_changes()?;
     let last_step = changes.iter().filter(|change| change.is_step()).map(|change| change.at).max();
     assert!(last_step.is_none_or(|last| last <= told_at), "{last_step:?} {told_at:?}");
+    follow(&mut machine, changes);
     sleep(Duration::from_millis(100));
     assert!(line.status()?.starts_with("<Alarm"));
     assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
-    Ok(())
+    is_where_told(line, &machine)
 }
 
 /// Closes a contact in the middle of a job.
@@ -64,9 +87,9 @@ fn stops_a_job(pin: u8, number: u8, settings: &[&str]) -> TestResult {
     for text in job_lines("lattice2.obj", &["$page=60x80", "$margin=5"]) {
         assert_eq!(line.ask(&text)?, "ok", "{text}");
     }
-    wait_for_steps(&mut line)?;
+    let machine = wait_for_steps(&mut line)?;
     line.emulator.bounce(pin, false, BOUNCE)?;
-    is_in_alarm(&mut line, number)
+    is_in_alarm(&mut line, number, machine)
 }
 
 #[test]
@@ -78,9 +101,9 @@ fn a_limit_switch_stops_a_job() -> TestResult {
 fn the_emergency_stop_stops_a_job_and_is_reported_until_it_is_released() -> TestResult {
     let mut line = start(&[])?;
     assert_eq!(line.ask("$J=X400F6000")?, "ok");
-    wait_for_steps(&mut line)?;
+    let machine = wait_for_steps(&mut line)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    is_in_alarm(&mut line, 10)?;
+    is_in_alarm(&mut line, 10, machine)?;
     assert!(line.status()?.contains("|Pn:E|"));
     // The board cannot be unlocked while the contact is pressed.
     assert!(line.ask("$X")?.starts_with("[MSG:"));
@@ -114,6 +137,7 @@ fn a_switch_within_the_way_of_a_move_by_hand_stops_it_there() -> TestResult {
         // closed. The stop is therefore at most 7 ms after the switch began to close, which is 28
         // steps at 4000 per second.
         assert!((-828..=-800).contains(&(x + y)), "{x} {y}");
+        is_where_told(&mut line, &machine)?;
         sleep(Duration::from_millis(100));
         assert!(!line.emulator.pin_changes()?.iter().any(|change| change.is_step()));
     }
@@ -159,24 +183,24 @@ fn a_switch_that_is_stuck_or_never_found_fails_the_homing() -> TestResult {
     line.emulator.bounce(LIMIT_X, false, BOUNCE)?;
     while !line.status()?.contains("|Pn:X|") {}
     line.emulator.send(b"$H\n")?;
-    is_in_alarm(&mut line, 9)?;
+    is_in_alarm(&mut line, 9, Machine::default())?;
     // The switch is never found: the search covers one and a half travels.
     let mut line = start(&HOMING)?;
     line.emulator.send(b"$H\n")?;
-    is_in_alarm(&mut line, 9)
+    is_in_alarm(&mut line, 9, Machine::default())
 }
 
 #[test]
 fn the_emergency_stop_before_homing_and_during_it() -> TestResult {
     let mut line = start(&HOMING)?;
     line.emulator.send(b"$H\n")?;
-    wait_for_steps(&mut line)?;
+    let machine = wait_for_steps(&mut line)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    is_in_alarm(&mut line, 10)?;
+    is_in_alarm(&mut line, 10, machine)?;
     // The line is refused, and so is another attempt.
     let mut line = start(&HOMING)?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    is_in_alarm(&mut line, 10)?;
+    is_in_alarm(&mut line, 10, Machine::default())?;
     let refused = line.ask("$H")?;
     assert!(refused.starts_with("[MSG:"), "{refused}");
     assert!(line.hear()?.starts_with("error:"));
@@ -236,5 +260,5 @@ fn a_clock_that_is_late_still_sees_the_stop() -> TestResult {
     }
     line.status()?;
     line.emulator.bounce(STOP, false, BOUNCE)?;
-    is_in_alarm(&mut line, 10)
+    is_in_alarm(&mut line, 10, Machine::default())
 }

@@ -54,6 +54,7 @@ import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
 import { attachFlashChip } from './pico/flash_chip.mjs';
 import { FlashRecord } from './pico/flash_record.mjs';
 import { InterruptTimes } from './pico/interrupt_times.mjs';
+import { clearCountAtAbort } from './pico/aborted_dma.mjs';
 import { joinQueues } from './pico/joined_queue.mjs';
 import { delayAlarm } from './pico/late_alarm.mjs';
 import { mendCore, refuseMisaligned } from './pico/mended_core.mjs';
@@ -345,6 +346,7 @@ function start(flash, kind) {
     if (byte === QUESTION) asked ??= now();
   });
   machines = chip.pio.flatMap((pio) => pio.machines);
+  clearCountAtAbort(chip.dma.channels);
   chip.pio.forEach(joinQueues);
   machines.forEach(followQueue);
   chip.pio.forEach(followPio);

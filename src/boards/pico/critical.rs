@@ -1,10 +1,12 @@
 //! The priorities of the interrupts, and a critical section that does not delay the steps.
 //!
 //! A Cortex-M0+ can mask all interrupts at once or each one separately. Critical sections mask all
-//! interrupts separately except the one for the next block of steps, because some sections, those
-//! of the USB driver, last longer than the queue of the state machine. Code that shares data with
-//! that interrupt masks it too, by [`with_steps_masked`], and only briefly: the queue holds 8
-//! words, which last 8 µs at the greatest rate.
+//! interrupts separately except two. That for the next block of steps must come, because some
+//! sections, those of the USB driver, last longer than the queue of the state machine; so must that
+//! for the pen's height, because a step of its motor would be lost if the next one came meanwhile.
+//! Code that shares data with the first masks it too, by [`with_steps_masked`], and only briefly:
+//! the queue holds 8 words, which last 8 µs at the greatest rate. Code that shares data with the
+//! other masks it by [`with_pen_masked`].
 //!
 //! The code runs from flash behind a cache, and each 8 bytes that are not in the cache cost 50
 //! cycles. 20 of these misses take 8 µs. So the handler of the steps, everything that it calls or
@@ -50,8 +52,8 @@ pub fn with_steps_masked<T>(work: impl FnOnce() -> T) -> T {
     cortex_m::interrupt::free(|_| work())
 }
 
-/// Runs `work` with the interrupt of the pen's heights masked. It must not be called in a critical
-/// section, because it would unmask the interrupt there.
+/// Runs `work` with the interrupt of the pen's heights masked. It must not be called within itself,
+/// because the inner call would unmask the interrupt.
 pub fn with_pen_masked<T>(work: impl FnOnce() -> T) -> T {
     NVIC::mask(Interrupt::PIO0_IRQ_0);
     // These barriers ensure that the interrupt does not come any more.
@@ -92,20 +94,19 @@ pub fn move_vectors_to_ram() {
     cortex_m::asm::dsb();
 }
 
-/// The mask of every interrupt except the one for the next block of steps.
-const OTHERS: u32 = !(1 << Interrupt::DMA_IRQ_0 as u32);
+/// The mask of every interrupt except those for the next block of steps and for the pen's height.
+const OTHERS: u32 = !(1 << Interrupt::DMA_IRQ_0 as u32 | 1 << Interrupt::PIO0_IRQ_0 as u32);
 
 /// The interrupts that the outermost critical section has masked.
 static MASKED: AtomicU32 = AtomicU32::new(0);
 
-/// The critical section of this board. It masks every interrupt except that of the next block of
-/// steps.
+/// The critical section of this board. It masks every interrupt except those that move something.
 struct MaskAllButSteps;
 critical_section::set_impl!(MaskAllButSteps);
 
-// SAFETY: one core runs, and `acquire` masks each of its interrupts but one until the outermost
-// `release`. The handler of that one takes no critical section, logs nothing, and shares only
-// atomics.
+// SAFETY: one core runs, and `acquire` masks each of its interrupts but two until the outermost
+// `release`. The handlers of these take no critical section, log nothing, and share only atomics
+// that they load and store.
 unsafe impl critical_section::Impl for MaskAllButSteps {
     unsafe fn acquire() -> critical_section::RawRestoreState {
         // A handler that runs in between leaves the set as it was.

@@ -204,16 +204,21 @@ pub fn restart_fresh() -> ! {
 /// Raises the pen, switches the drivers off and hands the board over to the boot ROM, which shows
 /// the drive for a new image. It takes half a second, in which nothing else runs.
 pub fn show_drive() -> ! {
-    /// The time in which the servo raises the pen, in microseconds. Afterwards nothing controls the
-    /// servo.
-    const RAISING: u32 = 400_000;
     fault::make_safe();
-    feed();
-    let began = clock::microseconds();
-    while clock::microseconds().wrapping_sub(began) < RAISING {}
+    wait_until_raised();
     // The boot ROM restarts itself by the watchdog. The arguments mean that it shows no activity at
     // a pin and disables no interface.
     rom_data::reset_to_usb_boot(0, 0)
+}
+
+/// Waits as long as the servo takes to raise the pen. A restart ends its pulses, and the first one
+/// with the height that was set last begins up to 20 ms after that.
+fn wait_until_raised() {
+    /// The time in which the servo raises the pen, in microseconds.
+    const RAISING: u32 = 400_000;
+    feed();
+    let began = clock::microseconds();
+    while clock::microseconds().wrapping_sub(began) < RAISING {}
 }
 
 impl Fault for Pico {
@@ -229,13 +234,17 @@ impl Fault for Pico {
         info
     }
 
-    /// Keeps the cause and restarts the board, unless the program faults before it can even report.
+    /// Keeps the cause, and restarts the board when the pen is up, unless the program faults before
+    /// it can even report.
     fn report(cause: fmt::Arguments) {
         let mut line = OneLine(Cause::new());
         let _ = line.write_fmt(cause); // This never fails.
         let faults = Stored::load().map_or(0, |stored| stored.faults).saturating_add(1);
         if faults < LAST_FAULT {
             Stored::new(faults, &line.0).store();
+            if pen::is_driven() {
+                wait_until_raised();
+            }
             restart(FAULT)
         }
         fault::say(cause);

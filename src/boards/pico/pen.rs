@@ -1,7 +1,7 @@
 //! The servo of the pen, whose pulses a PWM slice repeats.
 
 use super::ROW;
-use super::registers::{self, PWM, Put, reset};
+use super::registers::{self, Get, PWM, Put, reset};
 use penup::machine::servo;
 
 /// The slice whose output B is the pin of the pen.
@@ -26,6 +26,11 @@ pub fn set_up() {
 pub fn begin(height: u8) {
     set_height(height);
     PWM.ch(SLICE).csr().put(ENABLE);
+}
+
+/// Whether the servo gets pulses.
+pub fn is_driven() -> bool {
+    PWM.ch(SLICE).csr().get() & ENABLE != 0
 }
 
 /// Moves the pen to `height`, from 0 to 127, with the next pulse.

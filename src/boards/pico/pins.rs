@@ -29,6 +29,8 @@ enum Function {
     Sio = 5,
     /// The state machine that makes the steps.
     Pio0 = 6,
+    /// Nothing drives the pin.
+    None = 31,
 }
 
 /// Hands the pins over to their peripherals, which must already hold the initial levels. The pins
@@ -56,6 +58,11 @@ pub fn hand_over() {
         SIO.gpio_oe_clr().put(1 << number);
         give(number, Function::Sio);
     }
+}
+
+/// Leaves the enable pin of the drivers to the resistor at it.
+pub fn release_enable() {
+    give(PINS.enable, Function::None);
 }
 
 /// Inverts the step pins of the motors in the mask `steps`, and the enable pin if `enable`.

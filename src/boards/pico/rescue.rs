@@ -1,21 +1,27 @@
 //! The rescue mode, which runs instead of the plotter when the program faults again and again as
 //! soon as it starts.
 //!
-//! Nothing moves, the drivers are off, and the pen stays where the fault has raised it: its servo
-//! gets no pulses, because no settings are read that say at what height it is raised. Both ports
-//! answer: each line with the cause of the fault and `error:9`, `?` with a status, and ctrl-X with
-//! another attempt to start. `$UF2` and the 1200-baud touch open the drive for a new image.
+//! Nothing moves, and the pen stays where the fault has raised it: its servo gets no pulses,
+//! because no settings are read that say at what height it is raised. They would say, too, which
+//! level switches the drivers off: the resistor at their enable pin does so, and nothing drives that
+//! pin.
+//!
+//! Both ports answer: each line with the cause of the fault and `error:9`, `?` with a status, and
+//! ctrl-X with another attempt to start. `$UF2` and the 1200-baud touch open the drive for a new
+//! image.
 
 use core::fmt::Write;
 
 use penup::protocol::{CommandError, RealTime};
 
 use super::emergency::{self, Cause};
+use super::pins;
 use super::ports::Ports;
 use super::usb;
 
 /// Answers both ports forever, without moving anything.
 pub fn run(mut ports: Ports, cause: &Cause) -> ! {
+    pins::release_enable();
     tell(&mut ports, cause);
     let mut line = heapless::String::<8>::new();
     loop {

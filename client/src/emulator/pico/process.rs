@@ -39,6 +39,7 @@ const LOADER: &str = "
 const SCRIPT: &str = include_str!("../pico.mjs");
 /// The modules that the script imports: the name in the import, and the text.
 const MODULES: &[(&str, &str)] = &[
+    ("./pico/aborted_dma.mjs", include_str!("aborted_dma.mjs")),
     ("./pico/core_cycles.mjs", include_str!("core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
     ("./pico/flash_record.mjs", include_str!("flash_record.mjs")),

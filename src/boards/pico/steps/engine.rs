@@ -40,6 +40,8 @@ const RESTART: u32 = 1 << 4;
 pub const STALLED: u32 = 1 << 24;
 /// The bits of the register `FLEVEL` that count the words in the queue of the state machine.
 pub const LEVEL: u32 = 0xF;
+/// The number of words that this queue holds: both of its halves serve the output.
+pub const QUEUE_WORDS: u32 = 8;
 /// The flag by which the state machine causes an interrupt: its bit in the registers of flags and
 /// of interrupts.
 pub const FLAG: u32 = 1;

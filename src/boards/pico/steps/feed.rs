@@ -9,7 +9,7 @@ use core::sync::atomic::{AtomicBool, AtomicU32, Ordering, fence};
 use penup::motion::{Brake, StepEvent, TICKS_PER_SECOND};
 use rp2040_hal::pac::interrupt;
 
-use super::engine::{BUSY, CHANNEL, LEVEL, PULSE_TICKS, TARGETS, WAIT_TICKS, target};
+use super::engine::{BUSY, CHANNEL, LEVEL, PULSE_TICKS, QUEUE_WORDS, TARGETS, WAIT_TICKS, target};
 use super::word_ring::{GROUP, lengths, ring_address, slot, sum, unpack};
 use super::{BRAKED_TICKS, STATE};
 use crate::boards::handler::Owned;
@@ -80,20 +80,33 @@ pub fn start() {
     });
 }
 
-/// Stops the state machine and the channel at once. The channel's interrupt does not come again
-/// until [`let_interrupt_come`].
+/// Stops the state machine and the channel at once, and returns the number of words that have been
+/// [`taken`]. The channel's interrupt does not come again until [`let_interrupt_come`].
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]
-pub fn stop() {
+pub fn stop() -> u32 {
+    /// More often than the channel needs to fill the queue.
+    const OFTEN: u32 = 1000;
     // SAFETY: the channel ends.
     let dma = unsafe { DMA.registers() };
+    let is_busy = || dma.ch(0).ch_al1_ctrl().get() & BUSY != 0;
     critical::with_steps_masked(|| {
         PIO0.ctrl().put(0);
+        // Aborting clears the channel's count (data sheet, 2.5.5.3). So it is read before, as soon
+        // as the channel rests because the queue is full or the block has ended.
+        let is_moving = || is_busy() && PIO0.flevel().get() & LEVEL != QUEUE_WORDS;
+        for _ in 0..OFTEN {
+            if !is_moving() {
+                break;
+            }
+        }
+        let taken = taken();
         dma.inte0().put(0);
         dma.chan_abort().put(CHANNEL);
-        while dma.ch(0).ch_al1_ctrl().get() & BUSY != 0 {}
+        while is_busy() {}
         dma.ints0().put(CHANNEL);
-    });
+        taken
+    })
 }
 
 /// Lets the channel's interrupt come again, which [`stop`] prevents.

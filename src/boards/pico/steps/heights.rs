@@ -30,8 +30,8 @@ pub static HEIGHT_QUEUE: StaticCell<ByteQueue<HEIGHTS>> = StaticCell::new();
 pub static HEIGHTS_DUE: Owned<Consumer<'static>> = Owned::empty();
 
 /// Processes the entries that are left in the queue. If two heights come faster than the interrupt,
-/// one is left over, and the last one counts. Steps of the pen's motor are left over only where
-/// everything was discarded.
+/// one is left over, and the last one counts. Steps of the pen's motor, between which the interrupt
+/// comes whatever else runs, are left over only where everything was discarded.
 pub fn drain_heights() {
     critical::with_pen_masked(|| {
         // SAFETY: the handler that owns it is masked.

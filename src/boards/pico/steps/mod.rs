@@ -275,8 +275,7 @@ impl Steps {
         if self.drained && self.written == self.taken {
             return;
         }
-        feed::stop();
-        let taken = taken();
+        let taken = feed::stop();
         self.count_to(taken);
         set_pins(self.levels_now() & !PULSES);
         while PIO0.flevel().get() & LEVEL != 0 {
