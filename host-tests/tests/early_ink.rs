@@ -5,10 +5,11 @@
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
 use penup::board_table::PICO;
-use penup::boards::host::{CutFlash, Stamped};
+use penup::boards::host::{CutFlash, LAYOUT, Stamped};
 use penup::machine::{Contacts, JobSize, State};
 use penup::plotter::{Board as _, Unobserved};
 use penup::stage::NeverCancel;
+use penup::storage::NOTE_BYTES;
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_early,
 };
@@ -457,6 +458,33 @@ fn after_a_cut_before_and_while_the_order_is_kept_the_drawing_is_whole() {
         let borders = (bytes - strokes - 6 * 256..bytes - strokes + 16 * 256).step_by(256);
         let around = borders.flat_map(|at| [at, at + 1, at + 255]);
         cut_before_bytes(&lines, work_ticks, around.skip(part).step_by(7));
+    }
+}
+
+/// Another firmware may compute another order, so a stroke with the same number may be another one.
+#[test]
+fn a_job_without_an_order_does_not_go_on_with_other_sources() {
+    let lines = lattice();
+    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
+    for (pages_left, is_refused) in [(whole.len() + 2, true), (20, false)] {
+        let budget = bytes - 256 * pages_left;
+        let flash = CutFlash { budget, ..empty_flash() };
+        let (flash, _) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
+            plotter.order(&lines);
+            plotter.finish();
+        });
+        let mut flash = flash.powered();
+        let (slot, sum) = LAYOUT.job.identify(&mut flash).expect("a job");
+        let (log, mut notes) = (LAYOUT.logs[slot], [0; NOTE_BYTES]);
+        let (length, noted) = log.read(&mut flash, sum, &mut notes).expect("a log");
+        notes[24] ^= 1;
+        log.begin(&mut flash, sum, &notes[..length]).expect("it is taken");
+        log.note(&mut flash, 0, noted.parts).expect("it is taken");
+        switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
+            let answer = plotter.say("$resume=origin");
+            let expected = if is_refused { "error:165\n" } else { "ok\n" };
+            assert!(answer.ends_with(expected), "{pages_left}: {answer}");
+        });
     }
 }
 

@@ -129,7 +129,7 @@ fn points_are_counted_beside_the_parts() {
     for (parts, points) in [(0, 1), (5, 9), (5, 2048), (2050, 2049), (most, 3000), (most, limit)] {
         LOG.note(&mut flash, noted.parts, parts).expect("it is taken");
         LOG.note_points(&mut flash, noted.points, points).expect("it is taken");
-        noted = LogProgress { parts, points, is_full: parts == most };
+        noted = LogProgress { parts, points, is_closed: parts == most };
         assert_eq!(read(&mut flash), noted);
     }
     LOG.note(&mut flash, most, most + 9).expect("what is beyond is left out");

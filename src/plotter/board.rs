@@ -146,9 +146,9 @@ pub trait Board {
         let _ = (notes, strokes);
         Err(NotStored)
     }
-    /// Keeps that this many strokes of the job have been drawn. The call may block for a few
-    /// milliseconds, so it is only made while the machine is at rest with the pen raised and no
-    /// step waits.
+    /// Keeps that this many strokes of the job have been drawn; `u32::MAX` are all of them, however
+    /// many there are. The call may block for a few milliseconds, so it is only made while the
+    /// machine is at rest with the pen raised and no step waits.
     ///
     /// # Errors
     /// [`NotStored`] if the flash does not take it.

@@ -222,6 +222,9 @@ impl<F: MultiwriteNorFlash> FlashRecords<F> {
     /// [`NotStored`] if no log is open or the flash does not take it.
     pub fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
         let open = self.open.as_mut().ok_or(NotStored)?;
+        if strokes == u32::MAX {
+            return open.log.close(&mut self.flash).map_err(|_| NotStored);
+        }
         open.log.note(&mut self.flash, open.noted.parts, strokes).map_err(|_| NotStored)?;
         open.noted.parts = open.noted.parts.max(strokes);
         Ok(())

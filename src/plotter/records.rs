@@ -219,7 +219,7 @@ pub(super) fn save_streamed<B: Board>(id: u32, board: &mut B) -> Result<(), NotS
 #[cfg(feature = "tiles")]
 const PARTS_LAYOUT: u32 = u32::from_le_bytes(*b"jobq");
 /// A number that differs between builds from other sources, which may compute other strokes.
-#[cfg(feature = "tiles")]
+#[cfg(feature = "resume")]
 pub(super) const SOURCES: u32 = match u32::from_str_radix(env!("PENUP_SOURCES"), 16) {
     Ok(sources) => sources,
     Err(_) => 0,

@@ -30,8 +30,9 @@ pub struct LogProgress {
     pub parts: u32,
     /// The number of points within its parts that are passed, counted over the whole work.
     pub points: u32,
-    /// Whether all parts are done that the log has room for.
-    pub is_full: bool,
+    /// Whether the last part is done that the log has room for, by which [`Log::close`] tells that
+    /// all are.
+    pub is_closed: bool,
 }
 
 /// Where a log lies in flash.
@@ -130,7 +131,7 @@ impl Log {
         read_surely(flash, self.start + HEADER_BYTES as u32, notes).ok()?;
         (sum == checksum(of, notes)).then(|| {
             let (parts, points) = (self.count(flash), self.count_points(flash));
-            (notes.len(), LogProgress { parts, points, is_full: parts >= self.limit() })
+            (notes.len(), LogProgress { parts, points, is_closed: self.is_closed(flash) })
         })
     }
 
@@ -153,6 +154,13 @@ impl Log {
             }
         }
         count
+    }
+
+    /// Returns whether the bit of the last part is clear. It is not if the flash fails.
+    fn is_closed<F: ReadNorFlash>(self, flash: &mut F) -> bool {
+        let (last, mut byte) = (self.limit() - 1, [0xFF]);
+        let at = self.start + PAGE_BYTES as u32 + last / 8;
+        read_surely(flash, at, &mut byte).is_ok() && byte[0] & (1 << (last % 8)) == 0
     }
 
     /// Returns the number of bits that are clear, from the last one back. A flash that fails ends
@@ -205,6 +213,15 @@ impl Log {
         self.clear(flash, from, to.min(self.limit()))
     }
 
+    /// Notes that all parts are done, however many there are, by clearing the bit of the last one
+    /// that there is room for. A loss of power leaves it as it was, or clear.
+    ///
+    /// # Errors
+    /// The error of the flash.
+    pub fn close<F: MultiwriteNorFlash>(self, flash: &mut F) -> Result<(), F::Error> {
+        self.clear(flash, self.limit() - 1, self.limit())
+    }
+
     /// Clears the bits from number `from` up to number `to`, which is excluded.
     fn clear<F: MultiwriteNorFlash>(
         self,
@@ -255,6 +272,22 @@ mod tests {
     }
 
     #[test]
+    fn a_log_is_closed_by_one_byte_and_keeps_its_count() {
+        let mut flash = CutFlash::new(3 * 4096);
+        LOG.begin(&mut flash, 7, b"notes").unwrap();
+        LOG.note(&mut flash, 0, 9).unwrap();
+        LOG.note_points(&mut flash, 0, 7_680).unwrap();
+        let before = flash.bytes.clone();
+        let read = |flash: &mut CutFlash| LOG.read(flash, 7, &mut [0; NOTE_BYTES]).unwrap().1;
+        let open = LogProgress { parts: 9, points: 7_680, is_closed: false };
+        assert_eq!(read(&mut flash), open);
+        LOG.close(&mut flash).unwrap();
+        assert_eq!(read(&mut flash), LogProgress { is_closed: true, ..open });
+        let changed = before.iter().zip(&flash.bytes).filter(|(before, now)| before != now);
+        assert_eq!(changed.count(), 1);
+    }
+
+    #[test]
     fn what_is_noted_is_read_up_to_the_limits() {
         let mut flash = CutFlash::new(3 * 4096);
         LOG.begin(&mut flash, 7, b"notes").unwrap();
@@ -271,12 +304,12 @@ mod tests {
             LOG.note(&mut flash, parts, next).unwrap();
             LOG.note_points(&mut flash, points, next_points).unwrap();
             (parts, points) = (next, next_points);
-            let is_full = parts == LOG.limit();
-            assert_eq!(read(&mut flash), LogProgress { parts, points, is_full });
+            let is_closed = parts == LOG.limit();
+            assert_eq!(read(&mut flash), LogProgress { parts, points, is_closed });
         }
         // Notes of a page less its head are too long by a byte, and leave the log as it was.
         assert!(LOG.begin(&mut flash, 7, &[0; 241]).is_err());
-        assert_eq!(read(&mut flash), LogProgress { parts, points, is_full: true });
+        assert_eq!(read(&mut flash), LogProgress { parts, points, is_closed: true });
         // Another state has another log, and a page with another mark is none.
         assert!(LOG.read(&mut flash, 8, &mut [0; NOTE_BYTES]).is_none());
         flash.bytes[4096] ^= 1;

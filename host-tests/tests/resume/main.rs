@@ -5,7 +5,7 @@
 mod refused;
 mod within_strokes;
 
-use penup::boards::host::{CutFlash, LAYOUT};
+use penup::boards::host::{CutFlash, LAYOUT, Stamped};
 use penup::machine::Contacts;
 use penup::plotter::Board as _;
 use penup::storage::{LogProgress, NOTE_BYTES};
@@ -321,6 +321,40 @@ fn the_travel_must_be_as_it_was_where_its_end_is_homed() {
         assert_eq!(plotter.say("$resume"), "ok\n");
         plotter.finish();
     });
+}
+
+/// What has been noted stays in a flash that takes no more.
+#[test]
+fn whoever_has_a_worn_flash_is_told_where_the_job_will_go_on() {
+    let lines = lattice("$hidden=erased");
+    let (whole, ..) = undisturbed(&lines);
+    let mut stroke = String::new();
+    let (flash, changes) = switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.run(4000);
+        plotter.board.flash().expect("flash").budget = 0;
+        plotter.run(4000);
+        let flash = plotter.board.flash().expect("flash");
+        assert!(flash.is_cut);
+        (flash.budget, flash.is_cut) = (usize::MAX, false);
+        plotter.finish();
+        let said = plotter.heard();
+        let told = "a loss of power $resume draws it again from stroke ";
+        let (_, behind) = said.split_once(told).expect("it is told");
+        stroke = behind.split(' ').next().expect("a number").to_owned();
+        assert!(!plotter.status().contains("Stopped"));
+    });
+    let strokes = |changes: &[Stamped]| strokes_of(changes.iter().map(PinChange::from));
+    assert_eq!(ink(&strokes(&changes)), ink(&whole), "the job itself is drawn");
+    let from = stroke.parse::<usize>().expect("a number") - 1;
+    assert!((1..whole.len() - 2).contains(&from), "{from}");
+    let (_, changes) = switch_on(flash, |plotter| {
+        let greeting = plotter.heard();
+        assert!(greeting.contains(&format!("a job stopped at stroke {stroke} of ")), "{greeting}");
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        plotter.finish();
+    });
+    assert_eq!(ink(&strokes(&changes)), ink(&whole[from..]));
 }
 
 #[test]

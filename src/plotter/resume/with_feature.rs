@@ -43,21 +43,21 @@ const PLACING: [Setting; 19] = [
 ];
 
 /// A mark at the beginning of the notes; those with another layout have another mark.
-const LAYOUT: u32 = u32::from_le_bytes(*b"run3");
+const LAYOUT: u32 = u32::from_le_bytes(*b"run4");
 /// The mark of the notes of a job that is sent while it is drawn.
-const STREAMED: u32 = u32::from_le_bytes(*b"str2");
+const STREAMED: u32 = u32::from_le_bytes(*b"str3");
 /// The mark of the notes of a drawing that is computed and drawn part by part. Its number of
 /// strokes is not known when it begins.
 #[cfg(feature = "tiles")]
-const PARTS: u32 = u32::from_le_bytes(*b"prt2");
+const PARTS: u32 = u32::from_le_bytes(*b"prt3");
 /// So many first strokes of a drawing in parts are noted one by one.
 #[cfg(feature = "tiles")]
 const ONE_BY_ONE: u32 = 1 << 14;
 /// So many of the others are noted at once.
 #[cfg(feature = "tiles")]
 const LATER_AT_ONCE: u32 = 32;
-/// The most bits of the log by which strokes of a drawing in parts are noted. One more says that
-/// the drawing is complete.
+/// The most bits of the log by which strokes of a drawing in parts are noted. The last one says
+/// that the drawing is complete.
 #[cfg(feature = "tiles")]
 const MOST_NOTED: u32 = {
     let [log, _] = Layout::from(0, 0).logs;
@@ -66,11 +66,11 @@ const MOST_NOTED: u32 = {
 /// The most strokes that are noted at once.
 #[cfg(feature = "stream")]
 const MOST_AT_ONCE: u32 = 1 << 12;
-/// Number of words before the settings: layout, version, strokes, whether the model is known,
-/// and the checksums of model and options. For a job that is sent the last three are how many
-/// strokes are noted at once, the number by which its sender knows it, and 0. For a drawing in
-/// parts, whose record has all that, they are 0.
-const HEAD: usize = 6;
+/// Number of words before the settings: layout, version, strokes, whether the model is known, the
+/// checksums of model and options, and that of the firmware's sources. For a job that is sent the
+/// three before the last are how many strokes are noted at once, the number by which its sender
+/// knows it, and 0. For a drawing in parts, whose record has all that, they are 0.
+const HEAD: usize = 7;
 /// Size of the notes in words: each setting takes two.
 const WORDS: usize = HEAD + 2 * PLACING.len();
 const _: () = assert!(WORDS * size_of::<u32>() <= crate::storage::NOTE_BYTES);
@@ -121,7 +121,7 @@ fn word(notes: &Notes, index: usize) -> u32 {
 #[inline(never)] // It is called in several places, and its loop is unrolled.
 fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
     let [first, second, third] = more;
-    let head = [layout, version(), strokes, first, second, third];
+    let head = [layout, version(), strokes, first, second, third, records::SOURCES];
     let settings = PLACING.into_iter().flat_map(|setting| {
         [setting.info().number().into(), placed(settings, setting).to_bits().cast_unsigned()]
     });
@@ -219,9 +219,7 @@ impl<I: Index> Inner<'_, I> {
         board: &mut B,
     ) {
         if kept.is_err() {
-            self.machine.end_log();
-            self.resumption.progress = None;
-            return refuse(board);
+            return self.end_notes(board);
         }
         if let Some([_, all]) = &mut self.resumption.progress {
             *all = strokes;
@@ -292,14 +290,11 @@ impl<I: Index> Inner<'_, I> {
         #[cfg(feature = "tiles")]
         let parts = match self.resumption.in_parts {
             false => parts,
-            // The log's whole room says that the drawing is complete.
             true if is_end => u32::MAX,
             true => noted_in_parts(strokes),
         };
         if board.note_progress(parts).is_err() {
-            self.machine.end_log();
-            self.resumption.progress = None;
-            return refuse(board);
+            return self.end_notes(board);
         }
         self.machine.stroke_noted();
         #[cfg(feature = "early-ink")]
@@ -320,10 +315,21 @@ impl<I: Index> Inner<'_, I> {
         let kept = board.note_point(points);
         self.machine.point_noted();
         if kept.is_err() {
-            self.machine.end_log();
-            self.resumption.progress = None;
-            refuse(board);
+            self.end_notes(board);
         }
+    }
+
+    /// The flash takes no more of how far the job comes: says what `$resume` will do after a loss
+    /// of power, because what has been noted before stays there.
+    #[inline(never)] // It is called in several places.
+    fn end_notes<B: Board>(&mut self, board: &mut B) {
+        self.machine.end_log();
+        let Some([done, _]) = self.resumption.progress.take() else { return };
+        Reply(board).line(format_args!(
+            "[MSG:the flash takes no more notes of this job: after a loss of power $resume draws \
+             it again from stroke {} on]",
+            done.saturating_add(1)
+        ));
     }
 
     /// Loads the job that has stopped, and returns how much of it is drawn. With `at_origin`
@@ -377,6 +383,11 @@ impl<I: Index> Inner<'_, I> {
             self.resumption.is_lost = false;
             let drawn = Some(done(&notes, noted));
             return Ok(StoppedJob::InParts(KeptParts { drawn, ..kept }));
+        }
+        // Other sources may compute another order, in which others of the strokes come first.
+        #[cfg(feature = "early-ink")]
+        if is_without_order(&notes, board) && word(&notes, 6) != records::SOURCES {
+            return Err(CommandError::OtherVersion);
         }
         self.copy_words = 0;
         self.job = Default::default();
@@ -654,7 +665,7 @@ fn done(notes: &Notes, noted: LogProgress) -> u32 {
     let (strokes, at_once) = (word(notes, 2), word(notes, 3));
     #[cfg(feature = "tiles")]
     if is_in_parts(notes) {
-        return if noted.is_full { u32::MAX } else { drawn_in_parts(noted.parts) };
+        return if noted.is_closed { u32::MAX } else { drawn_in_parts(noted.parts) };
     }
     if is_streamed(notes) { noted.parts.saturating_mul(at_once).min(strokes) } else { noted.parts }
 }
@@ -683,6 +694,14 @@ fn all_strokes<B: Board>(notes: &Notes, noted: LogProgress, board: &mut B) -> u3
     strokes_without_order(notes, done(notes, noted))
 }
 
+/// Whether the order of the job with these notes has to be computed again.
+#[cfg(feature = "early-ink")]
+fn is_without_order<B: Board>(notes: &Notes, board: &mut B) -> bool {
+    word(notes, 0) == LAYOUT
+        && word(notes, 3) & IS_ESTIMATE != 0
+        && records::strokes_of_added_order(board).is_none()
+}
+
 /// The number of strokes of a job whose order was not added to it. If it is an estimate, it is more
 /// than those that are `done`, because the job is not complete.
 fn strokes_without_order(notes: &Notes, done: u32) -> u32 {
@@ -695,7 +714,7 @@ fn strokes(notes: &Notes) -> u32 {
     word(notes, 2)
 }
 
-/// Tells the user that a job cannot go on after a loss of power.
+/// Tells the user that a job that begins cannot go on after a loss of power.
 fn refuse<B: Board>(board: &mut B) {
     Reply(board).line(format_args!(
         "[MSG:$resume will not go on with this: the flash does not take how far it comes]"
@@ -720,7 +739,7 @@ mod tests {
             (u32::MAX - 1, 229_344),
         ] {
             assert_eq!(drawn_in_parts(noted_in_parts(drawn)), noted, "{drawn}");
-            // The whole room of the log says that the drawing is complete.
+            // The log's last bit says that the drawing is complete.
             assert!(noted_in_parts(drawn) < 23_040, "{drawn}");
         }
     }
