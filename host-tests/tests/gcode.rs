@@ -7,9 +7,10 @@ use penup::machine::Settings;
 use penup::machine::{Contacts, State};
 use penup::plotter::Board;
 use penup::plotter::{EMPTY_LOOKAHEAD, Memory};
-use penup_host_tests::event_checker::{self, Drawn};
+use penup_host_tests::event_checker::{self, Backlash, Drawn};
 use penup_host_tests::ink;
 use penup_host_tests::whole_jobs::Bench;
+use penup_job::pins::Machine;
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -103,6 +104,76 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     assert!(answer.contains("beyond") && answer.ends_with("error:15\n"), "{answer}");
     bench.finish();
     assert_eq!(position_of(&mut bench), "5.000,5.000");
+}
+
+/// Programs that fit arcs to points make some that are shorter than a step.
+#[test]
+fn an_arc_that_is_shorter_than_a_step_is_no_whole_circle() {
+    let circle = 20.0 * std::f64::consts::PI;
+    for (arc, length) in [
+        ("G2 X60.004 Y50 I0 J-10", 0.0),
+        ("G2 X60.004 Y50 R10", 0.0),
+        ("G3 X60.004 Y50 I0 J10", 0.0),
+        ("G3 X60.004 Y50 I0 J-10", circle),
+        ("G2 X59.996 Y50 I0 J-10", circle),
+        ("G2 X59.996 Y50 R-10", circle),
+        ("G2 X60 Y50 I0 J-10", circle),
+    ] {
+        let mut bench = bench();
+        let program = format!("G0 X50 Y50\nM3\nG1 X60 F2000\n{arc}\nG1 X70\nM5\n");
+        bench.board.receive(program.as_bytes());
+        bench.finish();
+        let drawn = inked(&bench) - 20.0;
+        // Steps along a circle are up to a third longer than the circle.
+        assert!((length - 0.1..1.3 * length + 0.1).contains(&drawn), "{arc}: {drawn}");
+    }
+}
+
+/// Programs go up to where the machine says, or to a stored position.
+#[test]
+fn z_in_machine_coordinates_and_stored_positions_lift_the_pen() {
+    for lift in
+        ["G53 G0 Z0", "G53 G0 Z-5", "G91 G28 Z0\nG90", "G91 G30 Z0\nG90", "G28 X50 Z5", "G28"]
+    {
+        let mut bench = bench();
+        let program =
+            format!("G0 Z5\nG0 X10 Y10\nG1 Z-1 F2000\nG1 X50\n{lift}\nG0 X10 Y20\nZ5\nM2\n");
+        bench.board.receive(program.as_bytes());
+        bench.finish();
+        let answers = bench.heard();
+        assert!(!answers.contains("error"), "{lift}: {answers}");
+        assert!((inked(&bench) - 40.0).abs() < 1.0, "{lift}: {}", inked(&bench));
+    }
+}
+
+/// The drivers are off between the copies of a figure, and the motors stand on the side of their
+/// backlash that they have reached.
+#[test]
+fn copies_do_not_creep_where_the_drivers_are_off_between_them() {
+    let mut bench = bench();
+    bench.say("$1=100\n$235=0.1\n");
+    let (mut seen, mut machine) = (0, Machine::default());
+    let (mut pen, mut backlash) = ((0, 0), Backlash::in_the_middle(8));
+    let mut ends = Vec::new();
+    for _ in 0..6 {
+        bench.say("M3\nG1 X10 F3000\n");
+        for line in ["", "G1 X0\n"] {
+            bench.say(line);
+            bench.finish();
+            bench.work(300);
+            let changes = bench.board.trace().changes();
+            for change in &changes[seen..] {
+                let before = machine.position();
+                machine.change(change.into());
+                pen.0 += backlash.turn(machine.position().0 - before.0);
+            }
+            seen = changes.len();
+            ends.push(pen.0);
+        }
+    }
+    // The first move may be off by the backlash, because nobody knows its side.
+    assert!(ends[3..].chunks_exact(2).all(|pair| pair == &ends[1..3]), "{ends:?}");
+    assert_eq!(ends[1] + 800, ends[2], "{ends:?}");
 }
 
 /// A thousandth of an inch is no whole number of 2^-16 inches: rounded to these, each line would be

@@ -18,16 +18,15 @@ impl Machine<'_> {
         (milliseconds < ALWAYS && has_moved && is_at_rest).then_some(milliseconds)
     }
 
-    /// Switches the drivers off. The position is kept, but the motors may be turned by hand.
+    /// Switches the drivers off. The position is kept, and with it the side of its backlash on
+    /// which each motor is; a pen that a motor lifts may sink.
     pub fn release_drivers(&mut self, queue: &mut dyn EventQueue) {
         if self.runner.release_drivers(queue).is_err() {
             return self.alarm(Alarm::Queue);
         }
         self.released_at = self.runner.ticks();
         if self.settings.is_on(Setting::Tool) {
-            self.forget_what_needs_current();
-        } else {
-            self.forget_backlash();
+            self.runner.forget_lift();
         }
     }
 }

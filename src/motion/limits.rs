@@ -50,7 +50,7 @@ pub enum LimitsError {
     Jerk,
     /// Junction deviation below 0 or above 1 mm.
     JunctionDeviation,
-    /// The page reaches up to the anchors of the belts.
+    /// The page reaches up to the anchors of the belts, or these are more than 2^21 steps away.
     Anchors,
     /// Pulses of 1 ms or longer.
     Pulse,

@@ -124,8 +124,11 @@ fn by_level(
 ) -> Option<Vec<bool>> {
     let levels: Vec<Option<f64>> = moves.iter().map(|it| level(it.signals)).collect();
     let first = levels.iter().copied().flatten().next()?;
-    let has_rapid = moves.iter().zip(&levels).any(|(it, level)| it.is_rapid && level.is_some());
-    let division = match has_rapid {
+    let has = |is_rapid: bool| {
+        moves.iter().zip(&levels).any(|(it, level)| it.is_rapid == is_rapid && level.is_some())
+    };
+    // A program may draw by G0, and need no other word.
+    let division = match has(true) && has(false) {
         true => by_rapids(moves, &levels)?,
         false => {
             let middle = between_most_visited(&levels)?;
@@ -160,9 +163,9 @@ fn by_rapids(moves: &Moves, levels: &[Option<f64>]) -> Option<Division> {
         if gap < SAME {
             continue;
         }
-        // If G0 moves as far at both levels, the pen is up at the higher one.
-        let high_is_up = high[0] >= low[0];
-        let agreed = if high_is_up { high[0] + low[1] } else { low[0] + high[1] };
+        // If both ways agree as much, the pen is up at the higher level.
+        let [as_up, as_down] = [high[0] + low[1], low[0] + high[1]];
+        let (high_is_up, agreed) = (as_up >= as_down, as_up.max(as_down));
         let is_better = best.as_ref().is_none_or(|(most, widest, _)| {
             agreed > most + SAME || agreed > most - SAME && gap > *widest
         });

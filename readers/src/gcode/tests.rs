@@ -132,6 +132,20 @@ fn files_of_many_programs_draw_their_figure() {
     assert_eq!(tried, 14);
 }
 
+/// What the longer way by G0 would show is wrong of a program that draws by G0.
+#[test]
+fn a_program_that_draws_by_g0_is_not_inverted() {
+    let square = "G0 X50 Y10\nX50 Y50\nX10 Y50\nX10 Y10\n";
+    let points = [[10.0, 10.0], [50.0, 10.0], [50.0, 50.0], [10.0, 50.0], [10.0, 10.0]];
+    for (up, down) in [("G0 Z5", "G0 Z-1"), ("M280 P0 S30", "M280 P0 S90")] {
+        let program = format!("{up}\nG0 X10 Y10\n{down}\n{square}{up}\nG0 X0 Y0\n");
+        assert_eq!(strokes(&program), vec![points.to_vec()], "{program}");
+    }
+    // Of one that draws by both, both count.
+    let mixed = "G0 Z5\nG0 X10 Y0\nG1 Z-1\nG1 X50\nG1 Y40\nG0 X90 Y80\nG0 Z5\nG0 X85\n";
+    assert_eq!(strokes(mixed), [[[10.0, 0.0], [50.0, 0.0], [50.0, 40.0], [90.0, 80.0]]]);
+}
+
 #[test]
 fn a_program_may_travel_at_several_heights_and_draw_at_several() {
     let line = vec![vec![[10.0, 10.0], [20.0, 10.0], [20.0, 20.0]], vec![[30.0, 5.0], [40.0, 5.0]]];

@@ -300,6 +300,21 @@ mod tests {
     }
 
     #[test]
+    fn belts_whose_steps_cannot_be_counted_are_refused() {
+        let mut settings = Settings::default();
+        for (setting, value) in [(Setting::Kinematics, 2), (Setting::StepsPerMmX, 1600)] {
+            settings.set(setting, Value::from_num(value)).expect("valid");
+        }
+        // 2^21 steps are 1310.72 mm.
+        for (value, is_taken) in [(1310, true), (1311, false)] {
+            let answer = settings.set(Setting::AnchorWidth, Value::from_num(value));
+            assert_eq!(answer.is_ok(), is_taken, "{value}: {answer:?}");
+        }
+        let answer = settings.set(Setting::AnchorHeight, Value::from_num(1311));
+        assert_eq!(answer, Err(SettingError::Conflict(LimitsError::Anchors)));
+    }
+
+    #[test]
     fn ticks() {
         let settings = Settings::default();
         assert_eq!(settings.microseconds_as_ticks(Setting::StepPulse), 50);

@@ -9,7 +9,8 @@ use crate::protocol::{BlockError, CommandError};
 use crate::step::{Arc, Turn};
 
 impl Program {
-    /// The arc from one position of the machine to another that the words of the block give.
+    /// The arc from one position of the machine to another that the words of the block give; `None`
+    /// if it is shorter than a step.
     ///
     /// # Errors
     /// [`CommandError::Block`] if words are missing, [`CommandError::Arc`] if there is no such arc.
@@ -19,7 +20,7 @@ impl Program {
         [from, to]: [[Millimetres; 2]; 2],
         turn: Turn,
         steps: StepsPerMillimetre,
-    ) -> Result<Arc, CommandError> {
+    ) -> Result<Option<Arc>, CommandError> {
         let axes: [&[u8]; 3] = [b"XY", b"ZX", b"YZ"];
         let offsets: [&[u8]; 3] = [b"IJ", b"KI", b"JK"];
         let plane = usize::from(self.plane.0);
@@ -55,9 +56,26 @@ impl Program {
                 center
             }
         };
+        let ends = [from, to];
+        let is_short = from != to && is_short(center, ends, turn);
         let [center, from, to] = [center, from, to].map_each(|point| steps_at(point, steps));
-        Arc::scaled(steps, center, from, to, turn).map_err(CommandError::Arc)
+        // Ends that only the steps make the same are not those of a whole circle.
+        if from == to && is_short {
+            return Ok(None);
+        }
+        Arc::scaled(steps, center, from, to, turn).map(Some).map_err(CommandError::Arc)
     }
+}
+
+/// Whether an arc whose ends lie close together is the short one of the two between them, and not
+/// the one nearly all around `center`.
+fn is_short(center: [Millimetres; 2], [from, to]: [[Millimetres; 2]; 2], turn: Turn) -> bool {
+    let between = |from: [Millimetres; 2], to: [Millimetres; 2]| {
+        [0, 1].map_each(|axis| i64::from(to[axis].to_bits()) - i64::from(from[axis].to_bits()))
+    };
+    let ([x, y], [dx, dy]) = (between(center, from), between(from, to));
+    let across = x.saturating_mul(dy).saturating_sub(y.saturating_mul(dx));
+    if turn == Turn::Counterclockwise { across > 0 } else { across < 0 }
 }
 
 /// The centre of the arc from `from` to `to` that turns less than half a turn, or more if `radius`

@@ -199,19 +199,13 @@ impl Block {
         let (whole, part) = (hundredths / 100, hundredths % 100);
         let mut has_part = false;
         let group = match whole {
-            4 => {
-                self.action = Action::Dwell;
-                group::ACTION
-            }
-            53 => {
-                self.action = Action::Machine;
-                group::ACTION
-            }
+            4 => self.act(Action::Dwell, group::ACTION)?,
+            53 => self.act(Action::Machine, group::ACTION)?,
             10 | 28 | 30 | 92 => {
                 if part == 0 {
                     self.use_axes(AxisUse::Action)?;
                 }
-                self.action = match (whole, part) {
+                let action = match (whole, part) {
                     (10, _) => Action::SetSystem,
                     (28, 0) => Action::GoToStored(StoredPosition::Park),
                     (28, 10) => Action::StorePosition(StoredPosition::Park),
@@ -222,7 +216,7 @@ impl Block {
                     _ => return unknown,
                 };
                 has_part = whole != 10;
-                group::ACTION
+                self.act(action, group::ACTION)?
             }
             0..=3 => {
                 self.use_axes(AxisUse::Motion)?;
@@ -257,13 +251,13 @@ impl Block {
             40 => group::CUTTER,
             43 | 49 => {
                 self.use_axes(AxisUse::ToolLength)?;
-                self.action = match (whole, part) {
+                let action = match (whole, part) {
                     (49, _) => Action::EndToolLength,
                     (_, 10) => Action::ToolLength,
                     _ => return unknown,
                 };
                 has_part = true;
-                group::TOOL_LENGTH
+                self.act(action, group::TOOL_LENGTH)?
             }
             54..=58 => {
                 self.system = Some((whole - 54) as u8);
@@ -291,23 +285,14 @@ impl Block {
         }
         let whole = hundredths / 100;
         let group = match whole {
-            0 => {
-                self.flow = Some(Flow::Pause);
-                group::FLOW
-            }
+            0 => self.interrupt(Flow::Pause, group::FLOW)?,
             1 => group::FLOW,
-            2 | 30 => {
-                self.flow = Some(Flow::End);
-                group::FLOW
-            }
+            2 | 30 => self.interrupt(Flow::End, group::FLOW)?,
             3..=5 => {
                 self.spindle = Some(whole as u8);
                 group::SPINDLE
             }
-            6 => {
-                self.flow = Some(Flow::ChangePen);
-                group::OTHER
-            }
+            6 => self.interrupt(Flow::ChangePen, group::OTHER)?,
             7..=9 => {
                 self.coolant = Some(whole as u8);
                 group::COOLANT
@@ -318,14 +303,10 @@ impl Block {
                 self.takes_all = true;
                 group::OTHER
             }
-            114 => {
-                self.action = Action::Position;
-                group::OTHER
-            }
+            114 => self.act(Action::Position, group::OTHER)?,
             280 | 300 => {
-                self.action = Action::Servo;
                 self.takes_all = true;
-                group::OTHER
+                self.act(Action::Servo, group::OTHER)?
             }
             _ => return unknown,
         };
@@ -373,6 +354,25 @@ impl Block {
         }
         self.axis_use = axis_use;
         Ok(())
+    }
+
+    /// Takes the action of a word of this group, and returns the group. A line has one action; a
+    /// second one of the same group is refused with the group.
+    fn act(&mut self, action: Action, group: u16) -> Result<u16, CommandError> {
+        if self.action != Action::None && self.groups & group == 0 {
+            return Err(BlockError::AxisConflict.into());
+        }
+        self.action = action;
+        Ok(group)
+    }
+
+    /// Does the same with what ends the program or interrupts it.
+    fn interrupt(&mut self, flow: Flow, group: u16) -> Result<u16, CommandError> {
+        if self.flow.is_some() && self.groups & group == 0 {
+            return Err(BlockError::AxisConflict.into());
+        }
+        self.flow = Some(flow);
+        Ok(group)
     }
 
     fn add_group(&mut self, group: u16) -> Result<(), CommandError> {

@@ -61,6 +61,9 @@ impl Program {
                 }
                 self.at = end;
                 self.draws = false;
+                if block.has(b'Z') || !block.has_any(b"XY") {
+                    self.leave_height();
+                }
                 let steps = context.settings.page_steps();
                 MachineAction::Go([via, end].map_each(|[x, y, _]| steps_at([x, y], steps)))
             }

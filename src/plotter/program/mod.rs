@@ -341,13 +341,16 @@ impl Program {
 
     /// Notes what Z says of the pen.
     fn take_z(&mut self, block: &Block, settings: &Settings) -> Result<(), CommandError> {
-        let moves = matches!(block.axis_use, AxisUse::Motion);
-        if moves && block.has(b'Z') {
-            let z = self.coordinate(block, b'Z')?;
-            let relative = self.relative && block.action != Action::Machine;
-            if let Some(is_down) = pen::is_down_at(z, relative, settings) {
-                self.take_height(is_down);
-            }
+        if block.axis_use != AxisUse::Motion || !block.has(b'Z') {
+            return Ok(());
+        }
+        let is_down = match block.action {
+            // Whatever height the machine's own coordinates name, programs go there to lift.
+            Action::Machine => Some(false),
+            _ => pen::is_down_at(self.coordinate(block, b'Z')?, self.relative, settings),
+        };
+        if let Some(is_down) = is_down {
+            self.take_height(is_down);
         }
         Ok(())
     }
@@ -370,7 +373,8 @@ impl Program {
             }
             self.at = [x, y, z];
             self.draws = self.begin_move(rule);
-            return Ok(MachineAction::Arc(arc));
+            let end = steps_at([x, y], steps);
+            return Ok(arc.map_or(MachineAction::Line(end), MachineAction::Arc));
         }
         self.check_used_in_motion(block)?;
         if self.inverse_time && self.motion == Motion::Line {

@@ -122,6 +122,13 @@ impl Program {
         self.pen.waits = false;
     }
 
+    /// Notes that Z goes to a stored position, which is never on the paper.
+    pub(super) fn leave_height(&mut self) {
+        if self.pen.z_is_down.is_some() {
+            self.take_height(false);
+        }
+    }
+
     /// Brings the pen up to date with M3 and S at the end of the words.
     pub(super) fn settle_speed(&mut self, has_word: bool, settings: &Settings) {
         if has_word && self.is_on() && self.pen.has_speed {

@@ -280,6 +280,12 @@ pub(super) fn explain_setting(refusal: &SettingError, row: Row<'_>) {
                 "a motor raises the pen upward: set $210 below $211, and 4 in $3 turns it"
             ),
         ),
+        SettingError::Conflict(LimitsError::Anchors) => row(
+            error(151, "setting conflicts with another"),
+            format_args!(
+                "anchors are above the page ($233 > $131), and at most 2097152 steps away"
+            ),
+        ),
         #[cfg(feature = "pen-overlap")]
         SettingError::Conflict(LimitsError::PenByMotor) => row(
             error(151, "setting conflicts with another"),

@@ -35,6 +35,9 @@ const LEAST_BITS: u32 = 8;
 /// change the result.
 const MOST_BITS: u32 = 14;
 
+/// The most steps from an anchor to the other one, and to the page's origin along each axis.
+const FARTHEST: i32 = 2 * PAGE_LIMIT;
+
 /// Where the belts of a polargraph leave their motors. Both anchors are at the same height, above
 /// the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -46,7 +49,7 @@ pub struct Anchors {
     pub width: i32,
 }
 
-/// Checks whether the page lies below the anchors.
+/// Checks whether the page lies below the anchors, and the anchors within the range of steps.
 ///
 /// # Errors
 /// [`LimitsError::Anchors`] if it reaches up to them.
@@ -55,19 +58,18 @@ pub(super) fn check(settings: &Settings) -> Result<(), LimitsError> {
     if settings.is_on(Setting::BacklashDistance) {
         return Err(LimitsError::BacklashOfBelts);
     }
-    if settings.get(Setting::AnchorHeight) > settings.get(Setting::TravelY) {
-        Ok(())
-    } else {
-        Err(LimitsError::Anchors)
-    }
+    let anchors = [Setting::AnchorWidth, Setting::AnchorLeft, Setting::AnchorHeight];
+    let is_near =
+        |setting| settings.millimetres_as_steps(setting, Setting::StepsPerMmX).abs() <= FARTHEST;
+    let is_above = settings.get(Setting::AnchorHeight) > settings.get(Setting::TravelY);
+    if is_above && anchors.into_iter().all(is_near) { Ok(()) } else { Err(LimitsError::Anchors) }
 }
 
 impl Anchors {
     /// Returns the anchors that the settings describe, in steps.
     pub(super) fn of(settings: &Settings) -> Self {
-        let steps = |setting| {
-            settings.millimetres_as_steps(setting, Setting::StepsPerMmX).min(2 * PAGE_LIMIT)
-        };
+        let steps =
+            |setting| settings.millimetres_as_steps(setting, Setting::StepsPerMmX).min(FARTHEST);
         Self {
             left: PagePoint { x: -steps(Setting::AnchorLeft), y: steps(Setting::AnchorHeight) },
             width: steps(Setting::AnchorWidth),
