@@ -67,6 +67,8 @@ struct Reader {
     unknown: BTreeMap<String, usize>,
     /// The byte where the label begins that the file does not end.
     endless: Option<usize>,
+    /// The byte where the comment begins that the file does not end.
+    endless_comment: Option<usize>,
     /// The byte where the polygon begins that is not complete.
     polygon: Option<usize>,
 }
@@ -86,6 +88,7 @@ impl Reader {
             sheets: 1,
             unknown: BTreeMap::new(),
             endless: None,
+            endless_comment: None,
             polygon: None,
         }
     }
@@ -259,6 +262,9 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
             reader.judge(error, &name).map_err(refused)?;
         }
     }
+    if reader.endless.is_none() && dialect.is_in_text() {
+        reader.endless_comment = Some(instruction.begin);
+    }
     reader.end_stroke();
     Ok(reader)
 }
@@ -329,6 +335,13 @@ impl Format for HpGl {
             notes.push(format!(
                 "the label that begins in line {} has no end (the byte 3): all that follows it is \
                  drawn as text",
+                line_of(begin)
+            ));
+        }
+        if let Some(begin) = reader.endless_comment {
+            notes.push(format!(
+                "the comment that begins in line {} has no end (another \"): all that follows it \
+                 is left out",
                 line_of(begin)
             ));
         }

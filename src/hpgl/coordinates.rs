@@ -61,12 +61,18 @@ impl Point {
     }
 
     /// Times a sine and a cosine, in units of 2^-30: turned by that angle.
-    pub(super) fn rotated(self, [sine, cosine]: [i64; 2]) -> Self {
-        let sum = |a: i64, b: i64, c: i64, d: i64| {
+    pub(super) fn rotated(self, angle: [i64; 2]) -> Self {
+        self.towards(Self { x: -self.y, y: self.x }, angle)
+    }
+
+    /// Times a cosine, plus `across` times a sine, in units of 2^-30: turned by that angle on the
+    /// ellipse on which `across` is a quarter of a turn ahead.
+    pub(super) fn towards(self, across: Self, [sine, cosine]: [i64; 2]) -> Self {
+        let sum = |a: i64, b: i64| {
             // Each product is below 2^72.
-            ((product(a, b) + product(c, d) + (1 << 29)) >> 30) as i64
+            ((product(a, cosine) + product(b, sine) + (1 << 29)) >> 30) as i64
         };
-        Self { x: sum(self.x, cosine, -self.y, sine), y: sum(self.x, sine, self.y, cosine) }
+        Self { x: sum(self.x, across.x), y: sum(self.y, across.y) }
     }
 }
 
@@ -140,6 +146,8 @@ pub(super) struct Frame {
     pub(super) corners: [Point; 2],
     /// The user units at P1 and P2: x and x, y and y.
     scale: Option<[i64; 4]>,
+    /// The numbers of `SC` and how many there are, because some scales follow P1 and P2.
+    asked: ([i64; 7], usize),
     /// How many quarters of a turn the page is turned.
     pub(super) quarters: u8,
     /// The hard clip limits on the page.
@@ -153,6 +161,7 @@ impl Frame {
     pub(super) const ZERO: Self = Self {
         corners: [Point::ZERO; 2],
         scale: None,
+        asked: ([0; 7], 0),
         quarters: 0,
         limits: Rectangle { least: Point::ZERO, most: Point::ZERO },
         window: None,
@@ -185,6 +194,30 @@ impl Frame {
         let x = ratio(distance.x, p2.x - p1.x, x2 - x1)?;
         let y = ratio(distance.y, p2.y - p1.y, y2 - y1)?;
         Some(Point { x, y })
+    }
+
+    /// A radius on the page turned by a quarter in the current units, counterclockwise as their
+    /// axes are. `None` beyond the range.
+    pub(super) fn across(&self, radius: Point) -> Option<Point> {
+        let Point { x, y } = radius.turned(4 - self.quarters);
+        let [wide, high] = match self.scale {
+            None => [1; 2],
+            Some([x1, x2, y1, y2]) => {
+                let [p1, p2] = self.corners;
+                [product(p2.x - p1.x, y2 - y1), product(p2.y - p1.y, x2 - x1)]
+            }
+        };
+        // A length is below 2^41, and the products are below 2^82.
+        let scaled = |length: i64, numerator: i128, denominator: i128| {
+            if denominator == 0 {
+                return None;
+            }
+            let numerator = i128::from(length) * numerator * denominator.signum();
+            let result = divide_rounding(numerator, denominator.abs());
+            i64::try_from(result).ok().filter(|result| result.abs() <= FARTHEST)
+        };
+        let across = Point { x: scaled(-y, wide, high)?, y: scaled(x, high, wide)? };
+        Some(across.turned(self.quarters))
     }
 
     /// Converts a distance from plotter units to the page.
@@ -281,26 +314,46 @@ impl Frame {
             [x1, y1, x2, y2] => [Point { x: x1, y: y1 }, Point { x: x2, y: y2 }],
             _ => return false,
         };
+        let (asked, count) = self.asked;
+        // A scale that is impossible with these corners stays as it was.
+        if self.scale.is_some()
+            && let Some(numbers) = asked.get(..count)
+            && let Some(scale) = self.scale_by(numbers)
+        {
+            self.scale = Some(scale);
+        }
         true
     }
 
     /// `SC`: sets the user units. Returns `false` for units of no length.
     pub(super) fn set_scale(&mut self, numbers: &[i64]) -> bool {
+        self.scale = self.scale_by(numbers);
+        for (slot, number) in self.asked.0.iter_mut().zip(numbers) {
+            *slot = *number;
+        }
+        self.asked.1 = numbers.len();
+        self.scale.is_some() || numbers.is_empty()
+    }
+
+    /// The user units at P1 and P2 that these numbers of `SC` mean; `None` for plotter units and
+    /// for numbers that mean nothing.
+    fn scale_by(&self, numbers: &[i64]) -> Option<[i64; 4]> {
         let [p1, p2] = self.corners;
         let (width, height) = (p2.x - p1.x, p2.y - p1.y);
-        self.scale = match *numbers {
-            [] => None,
-            [x1, x2, y1, y2] if x1 != x2 && y1 != y2 => Some([x1, x2, y1, y2]),
+        match *numbers {
+            [x1, x2, y1, y2] | [x1, x2, y1, y2, 0] if x1 != x2 && y1 != y2 => {
+                Some([x1, x2, y1, y2])
+            }
             // HP-GL/2 knows two more kinds of scaling: units of the same length on both axes, and a
             // given number of plotter units for each user unit.
             [x1, x2, y1, y2, kind, ref rest @ ..] if kind == UNIT && x1 != x2 && y1 != y2 => {
                 let free = match *rest {
                     [] => [50 * UNIT; 2],
                     [left, bottom] => [left, bottom],
-                    _ => return false,
+                    _ => return None,
                 };
                 if free.iter().any(|share| !(0..=100 * UNIT).contains(share)) {
-                    return false;
+                    return None;
                 }
                 isotropic([x1, x2, y1, y2], [width, height], free)
             }
@@ -309,9 +362,8 @@ impl Frame {
                 ends.map(|(wide, high)| [x1, x1 + wide, y1, y1 + high])
                     .filter(|[x1, x2, y1, y2]| x1 != x2 && y1 != y2)
             }
-            _ => return false,
-        };
-        self.scale.is_some() || numbers.is_empty()
+            _ => None,
+        }
     }
 
     /// `IW`: sets the window; `None` removes it.
@@ -323,9 +375,13 @@ impl Frame {
         Some(())
     }
 
-    /// `RO`: turns the page.
+    /// `RO`: turns the page, and the window with it.
     pub(super) fn rotate(&mut self, quarters: u8) {
+        let window = self.window.map(|Rectangle { least, most }| {
+            [least, most].map_each(|corner| self.plotter_units(corner))
+        });
         self.quarters = quarters & 3;
+        self.window = window.map(|[a, b]| Rectangle::between(self.on_page(a), self.on_page(b)));
     }
 }
 

@@ -85,8 +85,37 @@ enum State {
     Terminator,
     /// The new symbol, after `SM`.
     Symbol,
-    /// Data up to a semicolon, after `PE` and `CO`.
+    /// Data up to a semicolon, after `PE`.
     Data,
+    /// A comment, after `CO`.
+    Comment(Comment),
+}
+
+/// The progress of a comment. It ends with the second of two quotation marks if it begins with one,
+/// and otherwise with a semicolon.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Comment {
+    /// The byte that ends it, once it is known.
+    end: Option<u8>,
+}
+
+impl Comment {
+    /// Before its first byte.
+    pub(super) const BEGUN: Self = Self { end: None };
+
+    /// Takes the next byte. Returns whether it ends the comment.
+    pub(super) fn ends_with(&mut self, byte: u8) -> bool {
+        match self.end {
+            None if byte.is_ascii_whitespace() => return false,
+            None if byte == b'"' => {
+                self.end = Some(byte);
+                return false;
+            }
+            None => self.end = Some(b';'),
+            Some(_) => {}
+        }
+        self.end == Some(byte)
+    }
 }
 
 /// The progress of an instruction to the interface.
@@ -115,19 +144,23 @@ impl Dialect {
     pub fn is_in_force(&self) -> bool {
         matches!(
             self.state,
-            State::Code | State::Text | State::Terminator | State::Symbol | State::Data
+            State::Code
+                | State::Text
+                | State::Terminator
+                | State::Symbol
+                | State::Data
+                | State::Comment(_)
         )
     }
 
     /// Whether the next byte is text or data, so that `?`, `!` and `~` are no commands.
     pub fn is_in_text(&self) -> bool {
-        self.control != Control::None
-            || matches!(self.state, State::Text | State::Terminator | State::Symbol | State::Data)
+        self.control != Control::None || (self.is_in_force() && self.state != State::Code)
     }
 
     /// Whether the next byte is data in which any byte from 0x80 up may stand, too.
     pub fn is_in_data(&self) -> bool {
-        self.control == Control::None && self.state == State::Data
+        self.control == Control::None && matches!(self.state, State::Data | State::Comment(_))
     }
 
     /// Takes the next byte and says what it belongs to.
@@ -153,6 +186,11 @@ impl Dialect {
             }
             State::Symbol => {
                 self.state = State::Code;
+                Token::Text
+            }
+            State::Comment(mut comment) => {
+                let is_over = comment.ends_with(byte);
+                self.state = if is_over { State::Code } else { State::Comment(comment) };
                 Token::Text
             }
             State::Data => {
@@ -249,7 +287,8 @@ impl Dialect {
                 b"LB" | b"BL" | b"WD" => self.state = State::Text,
                 b"DT" => self.state = State::Terminator,
                 b"SM" => self.state = State::Symbol,
-                b"PE" | b"CO" => self.state = State::Data,
+                b"PE" => self.state = State::Data,
+                b"CO" => self.state = State::Comment(Comment::BEGUN),
                 b"IN" | b"DF" => self.terminator = LABEL_END,
                 _ => {}
             }

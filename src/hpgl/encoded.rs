@@ -65,14 +65,14 @@ impl<B: PolygonBuffer> Interpreter<B> {
             if line.x.is_some() || line.bits > 0 || line.meaning != Meaning::Coordinate {
                 self.fail(ErrorNumber::WrongCount);
             }
-            self.is_down = false;
             return true;
         }
         if byte.is_ascii_whitespace() {
             return false;
         }
         if line.bits == 0 && line.meaning == Meaning::Coordinate {
-            match byte {
+            // Flags may have their eighth bit set. No digit is one of them then.
+            match if byte & 0x7F < 63 { byte & 0x7F } else { byte } {
                 b'<' => line.is_up = true,
                 b'=' => line.is_absolute = true,
                 b'7' => line.in_base_32 = true,
@@ -90,8 +90,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
     fn push_digit(&mut self, byte: u8) {
         let line = &mut self.polyline;
         let (byte, last) = if line.in_base_32 { (byte & 0x7F, 95) } else { (byte, 191) };
+        let most = if line.in_base_32 { 31 } else { 63 };
         let digit = byte.checked_sub(if byte >= last { last } else { 63 });
-        let Some(digit) = digit.filter(|_| line.bits < 48) else {
+        let Some(digit) = digit.filter(|digit| *digit <= most && line.bits < 48) else {
             (line.value, line.bits) = (0, 0);
             return self.fail(ErrorNumber::BadParameter);
         };

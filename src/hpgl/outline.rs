@@ -8,12 +8,14 @@ use crate::fixed::sin_cos_degrees;
 /// A whole turn, in units of 2^-16 degrees.
 const TURN: i64 = 360 * UNIT;
 
-/// An arc as straight chords.
+/// An arc as straight chords. Where x and y have different scales, it is one of an ellipse.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ArcStep {
     center: Point,
     /// From the centre to the beginning.
     radius: Point,
+    /// From the centre to where a quarter of a turn ends.
+    across: Point,
     /// The angle by which the arc turns counterclockwise, in units of 2^-16 degrees.
     sweep: i64,
     /// The number of chords, at least 1.
@@ -23,7 +25,7 @@ pub(super) struct ArcStep {
 impl ArcStep {
     /// The arc with this beginning. Without the angle of a chord, chords are at most an eighth of
     /// a plotter unit off the arc.
-    pub(super) fn new(center: Point, radius: Point, sweep: i64, chord: Option<i64>) -> Self {
+    fn new(center: Point, [radius, across]: [Point; 2], sweep: i64, chord: Option<i64>) -> Self {
         // A second turn draws the same again.
         let sweep = if sweep.abs() > TURN { sweep % TURN + TURN * sweep.signum() } else { sweep };
         let chords = match chord {
@@ -31,11 +33,12 @@ impl ArcStep {
             // A chord of an angle a is r·a²/8 off the arc, so a is one divided by the root of r in
             // plotter units. A radian has 57.3 degrees.
             None => {
-                let root = (radius.length().unsigned_abs() >> 12).isqrt(); // in units of 2^-2
+                let longest = radius.length().max(across.length());
+                let root = (longest.unsigned_abs() >> 12).isqrt(); // in units of 2^-2
                 (sweep.unsigned_abs() * root).div_ceil((57 * 4) << 16)
             }
         };
-        Self { center, radius, sweep, chords: chords.clamp(1, 1 << 20) as u32 }
+        Self { center, radius, across, sweep, chords: chords.clamp(1, 1 << 20) as u32 }
     }
 
     /// The end of the chord with this index, from 0; `None` behind the last.
@@ -46,7 +49,7 @@ impl ArcStep {
         // The product is below 2^53, so the conversion is exact.
         let turned = self.sweep * i64::from(index + 1);
         let degrees = turned as f64 / (65536.0 * f64::from(self.chords));
-        self.radius.rotated(sine_and_cosine(degrees)).plus(self.center)
+        self.radius.towards(self.across, sine_and_cosine(degrees)).plus(self.center)
     }
 }
 
@@ -58,13 +61,27 @@ pub(super) fn sine_and_cosine(degrees: f64) -> [i64; 2] {
 }
 
 impl<B: PolygonBuffer> Interpreter<B> {
+    /// The arc about a centre that begins at the end of this radius, whatever the scales of x and y
+    /// are. `None` beyond the range of coordinates.
+    pub(super) fn arc_about(
+        &self,
+        center: Point,
+        radius: Point,
+        sweep: i64,
+        chord: Option<i64>,
+    ) -> Option<ArcStep> {
+        Some(ArcStep::new(center, [radius, self.frame.across(radius)?], sweep, chord))
+    }
+
     /// `AA` and `AR`: an arc about a centre.
     pub(super) fn arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
         let radius = self.at.minus(center);
         if radius == Point::default() {
             return;
         }
-        let arc = ArcStep::new(center, radius, sweep, chord);
+        let Some(arc) = self.arc_about(center, radius, sweep, chord) else {
+            return self.overflow();
+        };
         if self.is_down {
             self.add(Step::Arc(arc));
         } else if let Some(end) = arc.chord(arc.chords - 1) {
@@ -73,26 +90,25 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// `CI`: a circle about the pen, which then returns.
-    pub(super) fn circle(&mut self, radius: i64, chord: Option<i64>) {
-        let radius = self.frame.turned(Point { x: radius, y: 0 });
+    pub(super) fn circle(&mut self, radius: Point, chord: Option<i64>) {
         if radius == Point::default() {
             return;
         }
         let center = self.at;
-        let Some(begin) = center.plus(radius) else { return self.overflow() };
+        let arc = self.arc_about(center, radius, TURN, chord);
+        let (Some(begin), Some(arc)) = (center.plus(radius), arc) else { return self.overflow() };
         self.add(Step::Place(begin));
-        self.add(Step::Arc(ArcStep::new(center, radius, TURN, chord)));
+        self.add(Step::Arc(arc));
         self.add(Step::Place(center));
     }
 
     /// `EW`: the outline of a wedge about the pen.
-    pub(super) fn wedge(&mut self, radius: i64, start: i64, sweep: i64, chord: Option<i64>) {
+    pub(super) fn wedge(&mut self, radius: Point, sweep: i64, chord: Option<i64>) {
         let center = self.at;
-        let angle = sine_and_cosine(start as f64 / 65536.0);
-        let radius = self.frame.turned(Point { x: radius, y: 0 }.rotated(angle));
-        let Some(begin) = center.plus(radius) else { return self.overflow() };
+        let arc = self.arc_about(center, radius, sweep, chord);
+        let (Some(begin), Some(arc)) = (center.plus(radius), arc) else { return self.overflow() };
         self.add(Step::Line(begin));
-        self.add(Step::Arc(ArcStep::new(center, radius, sweep, chord)));
+        self.add(Step::Arc(arc));
         self.add(Step::Line(center));
     }
 

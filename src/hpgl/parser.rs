@@ -1,9 +1,11 @@
 //! Takes the bytes of instructions, and carries each instruction out at its end.
 
 use super::coordinates::{Point, UNIT};
+use super::dialect::Comment;
 use super::interpreter::{ErrorNumber, Interpreter, Step};
 use super::line_type::LineStyle;
 use super::number::Parsed;
+use super::outline::sine_and_cosine;
 use super::polygon::PolygonBuffer;
 use super::{DAMAGED, dialect};
 
@@ -16,8 +18,8 @@ pub(super) enum Mode {
     Label,
     /// A text that is not drawn.
     Skipped,
-    /// A comment up to a semicolon.
-    Comment,
+    /// A comment.
+    Comment(Comment),
     /// The byte that ends labels.
     Terminator,
     /// The byte that is drawn at each point.
@@ -43,8 +45,12 @@ impl<B: PolygonBuffer> Interpreter<B> {
             Mode::Code => self.push_code(byte),
             Mode::Label => self.push_text(byte),
             Mode::Skipped if byte == self.text.terminator => self.mode = Mode::Code,
-            Mode::Comment if byte == b';' => self.mode = Mode::Code,
-            Mode::Skipped | Mode::Comment => {}
+            Mode::Comment(ref mut comment) => {
+                if comment.ends_with(byte) {
+                    self.mode = Mode::Code;
+                }
+            }
+            Mode::Skipped => {}
             Mode::Terminator => {
                 self.text.terminator = dialect::terminator(byte);
                 // A number may follow.
@@ -108,7 +114,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 self.mode = Mode::Skipped;
                 self.fail(ErrorNumber::Unknown);
             }
-            b"CO" => self.mode = Mode::Comment,
+            b"CO" => self.mode = Mode::Comment(Comment::BEGUN),
             b"DT" => self.mode = Mode::Terminator,
             b"SM" => self.mode = Mode::Symbol,
             b"PE" => {
@@ -306,8 +312,8 @@ impl<B: PolygonBuffer> Interpreter<B> {
             b"CI" => {
                 let (radius, chord) = (number(0)?, chord(1)?);
                 at_most(2)?;
-                let radius = self.frame.length(Point { x: radius, y: 0 });
-                let radius = radius.ok_or(ErrorNumber::Overflow)?.x;
+                let radius = self.frame.distance(Point { x: radius, y: 0 });
+                let radius = radius.ok_or(ErrorNumber::Overflow)?;
                 if self.polygon.is_open {
                     self.add_circle(radius, chord);
                 } else {
@@ -338,12 +344,13 @@ impl<B: PolygonBuffer> Interpreter<B> {
             b"EW" | b"WG" => {
                 let (radius, start, sweep, chord) = (number(0)?, number(1)?, number(2)?, chord(3)?);
                 at_most(4)?;
-                let radius = self.frame.length(Point { x: radius, y: 0 });
-                let radius = radius.ok_or(ErrorNumber::Overflow)?.x;
+                let angle = sine_and_cosine(start as f64 / 65536.0);
+                let radius = self.frame.distance(Point { x: radius, y: 0 }.rotated(angle));
+                let radius = radius.ok_or(ErrorNumber::Overflow)?;
                 if &name == b"EW" {
-                    self.wedge(radius, start, sweep, chord);
+                    self.wedge(radius, sweep, chord);
                 } else {
-                    self.fill_wedge(radius, start, sweep, chord)?;
+                    self.fill_wedge(radius, sweep, chord)?;
                 }
             }
             b"PM" => self.polygon_mode(numbers)?,
@@ -352,7 +359,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 self.edge_polygon();
             }
             b"FP" => {
-                at_most(0)?;
+                at_most(1)?;
+                // Parts that lie in others are holes; HP-GL/2 knows another way, 1.
+                if numbers.first().is_some_and(|kind| *kind != 0) {
+                    return Err(bad);
+                }
                 self.fill_polygon()?;
             }
             b"FT" => self.choose_fill(numbers)?,
@@ -420,7 +431,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
         let percent = match rest {
             [] => self.line.percent,
             [percent] if *percent > 0 && *percent <= 127 * UNIT => *percent,
-            [_] => return Err(ErrorNumber::BadParameter),
+            // Patterns are measured in percent (HP-GL/2: the third number is 0), and not in mm.
+            [percent, 0] if *percent > 0 && *percent <= 127 * UNIT => *percent,
+            [_] | [_, _] => return Err(ErrorNumber::BadParameter),
             _ => return Err(ErrorNumber::WrongCount),
         };
         match u8::try_from(kind) {

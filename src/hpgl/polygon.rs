@@ -15,7 +15,6 @@ pub(super) use fill::{FillStyle, Hatch};
 
 use super::coordinates::{Point, UNIT};
 use super::interpreter::{ErrorNumber, Interpreter, Step};
-use super::outline::{ArcStep, sine_and_cosine};
 
 /// The most points of a polygon on a plotter, with those that close its parts. Each takes 8 bytes.
 pub const VERTICES: usize = 256;
@@ -108,14 +107,16 @@ pub(super) struct Polygon<B> {
     pub(super) is_open: bool,
     /// Whether points did not fit.
     is_full: bool,
-    /// Where the pen was when polygon mode began.
+    /// Where the pen was when polygon mode began, and whether it was down.
     began_at: Point,
+    began_down: bool,
 }
 
 impl<B: PolygonBuffer> Polygon<B> {
     /// Creates an empty polygon. It consists of zero bits if the buffer does.
     pub(super) const fn new(buffer: B) -> Self {
-        Self { buffer, count: 0, first: 0, is_open: false, is_full: false, began_at: Point::ZERO }
+        let (is_open, is_full, began_down) = (false, false, false);
+        Self { buffer, count: 0, first: 0, is_open, is_full, began_at: Point::ZERO, began_down }
     }
 
     /// Forgets the polygon, and ends polygon mode.
@@ -176,14 +177,14 @@ impl<B: PolygonBuffer> Interpreter<B> {
             0 => {
                 self.polygon.clear();
                 self.polygon.is_open = true;
-                self.polygon.began_at = self.at;
+                (self.polygon.began_at, self.polygon.began_down) = (self.at, self.is_down);
                 self.polygon.push(self.at, false);
             }
             1 | 2 if self.polygon.is_open => {
                 self.polygon.close();
                 if mode == 2 {
                     self.polygon.is_open = false;
-                    self.at = self.polygon.began_at;
+                    (self.at, self.is_down) = (self.polygon.began_at, self.polygon.began_down);
                 }
                 self.check_polygon()?;
             }
@@ -204,7 +205,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
     /// `AA` and `AR` in polygon mode: an arc about a centre.
     pub(super) fn add_arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
         let radius = self.at.minus(center);
-        let arc = ArcStep::new(center, radius, sweep, chord.or(Some(CHORD)));
+        let Some(arc) = self.arc_about(center, radius, sweep, chord.or(Some(CHORD))) else {
+            return self.overflow();
+        };
         for index in 0.. {
             let Some(to) = arc.chord(index).filter(|_| !self.polygon.is_full) else { return };
             self.add_vertex(to);
@@ -212,11 +215,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// `CI` in polygon mode: a subpolygon of its own. The pen then returns.
-    pub(super) fn add_circle(&mut self, radius: i64, chord: Option<i64>) {
+    pub(super) fn add_circle(&mut self, radius: Point, chord: Option<i64>) {
         let center = self.at;
-        let Some(begin) = center.plus(self.frame.turned(Point { x: radius, y: 0 })) else {
-            return self.overflow();
-        };
+        let Some(begin) = center.plus(radius) else { return self.overflow() };
         self.polygon.close();
         self.push_wedge(center, begin, 360 * UNIT, chord);
         self.polygon.close();
@@ -228,7 +229,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
 
     /// Adds the points of an arc that begins there.
     fn push_wedge(&mut self, center: Point, begin: Point, sweep: i64, chord: Option<i64>) {
-        let arc = ArcStep::new(center, begin.minus(center), sweep, chord.or(Some(CHORD)));
+        let radius = begin.minus(center);
+        let Some(arc) = self.arc_about(center, radius, sweep, chord.or(Some(CHORD))) else {
+            return self.overflow();
+        };
         let mut has_room = self.polygon.push(begin, true);
         for index in 0.. {
             let Some(to) = arc.chord(index).filter(|_| has_room) else { return };
@@ -250,14 +254,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
     /// `WG`: a filled wedge about the pen.
     pub(super) fn fill_wedge(
         &mut self,
-        radius: i64,
-        start: i64,
+        radius: Point,
         sweep: i64,
         chord: Option<i64>,
     ) -> Result<(), ErrorNumber> {
         let center = self.at;
-        let angle = sine_and_cosine(start as f64 / 65536.0);
-        let radius = self.frame.turned(Point { x: radius, y: 0 }.rotated(angle));
         let begin = center.plus(radius).ok_or(ErrorNumber::Overflow)?;
         self.polygon.clear();
         self.polygon.push(center, true);

@@ -216,6 +216,81 @@ fn outlines_and_ticks() {
 }
 
 #[test]
+fn arcs_are_those_of_the_scales() {
+    // Of the ellipse from 0 to 1000 by 500 around its centre, four points.
+    let scaled = "IP0,0,1000,500;SC0,10,0,10;PU5,5;";
+    let circle = format!("{scaled}CI5,90;");
+    assert_eq!(
+        actions(circle.as_bytes()),
+        "go 500,250 1000,250>500,500 500,500>0,250 0,250>500,0 500,0>1000,250"
+    );
+    let arc = format!("{scaled}PU10,5;PD;AA5,5,90,90;PU5,5;EW5,90,90,90;");
+    assert_eq!(
+        actions(arc.as_bytes()).replace(" dot 1000,250", ""),
+        "go 500,250 go 1000,250 1000,250>500,500 go 500,250 500,250>500,500 500,500>0,250 \
+         0,250>500,250"
+    );
+    // Where an axis is mirrored, its arcs turn the other way.
+    let mirrored = "IP0,0,1000,500;SC10,0,0,10;PU0,5;PD;AA5,5,90,90;";
+    assert_eq!(
+        actions(mirrored.as_bytes()).replace(" dot 1000,250", ""),
+        "go 1000,250 1000,250>500,0"
+    );
+    let turned = format!("RO90;{circle}");
+    assert!(actions(turned.as_bytes()).contains("15750,1000>15500,500"), "{turned}");
+    let polygon = format!("{scaled}PM0;CI5,90;PM2;EP;");
+    assert!(actions(polygon.as_bytes()).contains("1000,250>500,500"), "{polygon}");
+}
+
+#[test]
+fn scales_follow_the_corners() {
+    for kind in ["", ",0", ",1", ",2"] {
+        let scale = if kind == ",2" { "SC0,40,0,40" } else { "SC0,10,0,10" };
+        let before = format!("IP0,0,4000,4000;{scale}{kind};PU1,1;PD2,1;OE;");
+        let behind = format!("{scale}{kind};IP0,0,4000,4000;PU1,1;PD2,1;OE;");
+        assert_eq!(actions(before.as_bytes()), actions(behind.as_bytes()), "{kind}");
+        assert!(actions(before.as_bytes()).ends_with("'0'"), "{kind}");
+    }
+}
+
+#[test]
+fn the_window_turns_with_the_page() {
+    let drawn = "IW0,0,4000,2000;RO90;PU100,100;PD3000,100;";
+    assert_eq!(actions(drawn.as_bytes()), "go 15900,100 15900,100>15900,3000");
+    assert_eq!(actions(b"IW1,2,30,40;RO90;OW;"), "'1,2,30,40'");
+}
+
+#[test]
+fn a_polygon_leaves_the_pen_where_and_as_it_was() {
+    let polygon = "PM0;PD2000,1000,2000,2000;PM2;PA1500,900;";
+    assert_eq!(actions(format!("PU1000,1000;{polygon}").as_bytes()), "go 1000,1000 go 1500,900");
+    let down = actions(format!("PD1000,1000;{polygon}").as_bytes());
+    assert_eq!(down, "0,0>1000,1000 1000,1000>1500,900");
+}
+
+#[test]
+fn comments_end_with_their_quotation_mark_or_a_semicolon() {
+    for comment in
+        ["CO \"a;PD8000,8000\";", "CO\"scale 1; small parts\"", "CO a \"b;", "CO;", "CO \n;"]
+    {
+        let text = format!("{comment}PU10,20;PD30,20;OE;");
+        assert_eq!(actions(text.as_bytes()), "go 10,20 10,20>30,20 '0'", "{comment}");
+    }
+}
+
+#[test]
+fn numbers_that_say_what_is_so_anyway_are_taken() {
+    let triangle = "PM0;PA400,0,0,400;PM2;";
+    assert_eq!(
+        actions(format!("{triangle}FP0;OE;").as_bytes()),
+        actions(format!("{triangle}FP;OE;").as_bytes())
+    );
+    assert!(actions(format!("{triangle}FP1;OE;").as_bytes()).ends_with("'3'"));
+    assert_eq!(actions(b"LT2,4,0;PD300,0;OE;"), actions(b"LT2,4;PD300,0;OE;"));
+    assert!(actions(b"LT2,4,1;OE;").ends_with("'3'"));
+}
+
+#[test]
 fn labels() {
     // An I is one stroke in the middle of its width.
     let size = "SI0.5,0.525;";
@@ -276,8 +351,19 @@ fn encoded_polylines() {
         number(1),
         number(0),
     ];
-    let text = [&b"PU100,100;PE"[..], &bytes, b";PA0,0"].concat();
-    assert_eq!(actions(&text), "go 100,100 100,100>110,110 go 108,113 go 5,6 5,6>6,6");
+    let text = [&b"PU100,100;PE"[..], &bytes, b";PA0,0;"].concat();
+    // The pen stays as the last move left it.
+    assert_eq!(actions(&text), "go 100,100 100,100>110,110 go 108,113 go 5,6 5,6>6,6 6,6>0,0");
+    assert_eq!(
+        actions(b"PU10,10;PE;PA20,10;PD30,10;PE;PA40,10;"),
+        "go 10,10 go 20,10 20,10>30,10 30,10>40,10"
+    );
+    let raised = [&b"PD;PE<"[..], &[number(5), number(0)], b";PA9,0;"].concat();
+    assert_eq!(actions(&raised).replace("dot 0,0 ", ""), "go 5,0 go 9,0");
+    // A flag may have its eighth bit set, and a digit that is none is an error.
+    let flagged = [&b"PE"[..], &[b'=' | 0x80, number(5), number(6)], b";OE;"].concat();
+    assert_eq!(actions(&flagged), "0,0>5,6 '0'");
+    assert_eq!(actions(b"PE\x85;OE;"), "'3'");
 }
 
 #[test]

@@ -115,6 +115,10 @@ fn a_label_without_an_end_is_told() {
                 drawn as text";
     assert_eq!(notes("a.plt", b"IN;PU0,0;\nLBa;PU0,0;PD40,0;"), [told]);
     assert!(notes("a.plt", b"IN;PU0,0;LBa\x03;").is_empty());
+    let told = "the comment that begins in line 2 has no end (another \"): all that follows it is \
+                left out";
+    assert_eq!(notes("a.plt", b"IN;PU0,0;PD9,9;\nCO\"a;PU0,0;PD40,0;"), [told]);
+    assert!(notes("a.plt", b"IN;PU0,0;PD9,9;CO a").is_empty());
 }
 
 #[test]
