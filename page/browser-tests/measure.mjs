@@ -28,7 +28,7 @@ for (const [name, buffer] of scenes) {
   await page.setInputFiles("#file", { name: `${name}.obj`, mimeType: "text/plain", buffer });
   await page.waitForFunction(
     (want) => document.getElementById("file-name").textContent.startsWith(want),
-    name,
+    `${name}.obj: `,
     { timeout: 120_000 },
   );
   await page.waitForFunction(() => window.penup.frames.from.length > 0);

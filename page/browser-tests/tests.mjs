@@ -50,6 +50,13 @@ const text = (selector) => page.textContent(selector);
 const shown = (selector) => page.locator(selector).isVisible();
 const saved = (name) => PENUP_PICTURES && page.screenshot({ path: join(PENUP_PICTURES, name) });
 
+/** Waits until the page has read this file, and not only begun to. */
+const opened = (name) =>
+  page.waitForFunction(
+    (said) => document.getElementById("file-name").textContent.startsWith(said),
+    `${name}: `,
+  );
+
 /** Waits until the whole drawing is computed, and returns its figures. */
 async function computed() {
   await page.waitForFunction(() => window.penup.drawing.computed);
@@ -261,7 +268,7 @@ test("a large model turns as outlines, and has all its lines when it rests", asy
   await fresh();
   const file = { name: "ball.obj", mimeType: "text/plain", buffer: ball(101) };
   await page.setInputFiles("#file", file);
-  await page.waitForFunction(() => /^ball/.test(document.getElementById("file-name").textContent));
+  await opened("ball.obj");
   const count = () => page.evaluate(() => window.penup.lines().length / 5);
   await page.waitForFunction(() => window.penup.lines().length > 5 * 8000);
   const whole = await count();
@@ -308,9 +315,7 @@ test("errors are said on the page, and what was open stays", async () => {
   await page.waitForSelector("#option-crease-problem", { state: "hidden" });
   // A board that is too small says so.
   await page.setInputFiles("#file", scene("lattice6"));
-  await page.waitForFunction(() =>
-    /lattice6/.test(document.getElementById("file-name").textContent),
-  );
+  await opened("lattice6.obj");
   await page.click("#tab-check");
   await page.selectOption("#board", "lm3s6965");
   await page.waitForFunction(() =>
@@ -416,9 +421,7 @@ test("penup page draws the texts of an SVG in the fonts of the computer", async 
   const own = await program(svg);
   try {
     await fresh(own.hash, { address: own.folder });
-    await page.waitForFunction(() =>
-      /^letter/.test(document.getElementById("file-name").textContent),
-    );
+    await opened("letter.svg");
     const drawn = await computed();
     const expected = await preview(svg);
     assert.ok(drawn.strokes.length > 5, "the rectangle, and letters");
@@ -563,7 +566,7 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
     <circle cx="40" cy="38" r="6" fill="none" stroke="blue"/></svg>`,
   );
   await page.setInputFiles("#file", svg);
-  await page.waitForFunction(() => /house/.test(document.getElementById("file-name").textContent));
+  await opened("house.svg");
   const same = async (file) => {
     const drawn = await computed();
     const expected = await preview(file);
@@ -605,7 +608,7 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
   );
   await page.evaluate(() => (window.penup.drawing.computed = null));
   await page.setInputFiles("#file", ply);
-  await page.waitForFunction(() => /square/.test(document.getElementById("file-name").textContent));
+  await opened("square.ply");
   // The hatch is left out, and the user is told why.
   const left = await page.textContent("#notes");
   assert.match(left, /Without options for plans: .*hatch/);
@@ -622,7 +625,7 @@ test("SVG and PLY are read when they are opened, and plans are arranged", async 
   await page.waitForFunction(() => /nested/.test(document.querySelector("#error p").textContent));
   assert.match(await text("#file-name"), /square/);
   await page.setInputFiles("#file", svg);
-  await page.waitForFunction(() => /house/.test(document.getElementById("file-name").textContent));
+  await opened("house.svg");
 });
 
 test("a model is seen from a side, upright, and a drag turns it from there", async () => {
