@@ -95,26 +95,27 @@ enum State {
 /// and otherwise with a semicolon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Comment {
-    /// The byte that ends it, once it is known.
-    end: Option<u8>,
+    /// The byte that ends it, 0 as long as it is not known. The first mode of an interpreter must
+    /// consist of zero bits, which it would not beside an `Option`.
+    end: u8,
 }
 
 impl Comment {
     /// Before its first byte.
-    pub(super) const BEGUN: Self = Self { end: None };
+    pub(super) const BEGUN: Self = Self { end: 0 };
 
     /// Takes the next byte. Returns whether it ends the comment.
     pub(super) fn ends_with(&mut self, byte: u8) -> bool {
         match self.end {
-            None if byte.is_ascii_whitespace() => return false,
-            None if byte == b'"' => {
-                self.end = Some(byte);
+            0 if byte.is_ascii_whitespace() => return false,
+            0 if byte == b'"' => {
+                self.end = byte;
                 return false;
             }
-            None => self.end = Some(b';'),
-            Some(_) => {}
+            0 => self.end = b';',
+            _ => {}
         }
-        self.end == Some(byte)
+        self.end == byte
     }
 }
 

@@ -378,7 +378,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
                     }
                     None => None,
                 },
-                Step::Arc(arc) => match arc.chord(index) {
+                Step::Arc(arc) => match arc.chord(index, &self.frame) {
                     Some(to) => {
                         self.draw_to(to);
                         continue;

@@ -1,6 +1,6 @@
 //! Arcs, circles, rectangles, wedges and ticks.
 
-use super::coordinates::{Point, UNIT};
+use super::coordinates::{Frame, Point, UNIT};
 use super::interpreter::{Interpreter, Step};
 use super::polygon::PolygonBuffer;
 use crate::fixed::sin_cos_degrees;
@@ -8,14 +8,13 @@ use crate::fixed::sin_cos_degrees;
 /// A whole turn, in units of 2^-16 degrees.
 const TURN: i64 = 360 * UNIT;
 
-/// An arc as straight chords. Where x and y have different scales, it is one of an ellipse.
+/// An arc as straight chords. Where x and y have different scales, it is one of an ellipse. Many
+/// may wait in the queue, so what the frame tells is not kept in each.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ArcStep {
     center: Point,
     /// From the centre to the beginning.
     radius: Point,
-    /// From the centre to where a quarter of a turn ends.
-    across: Point,
     /// The angle by which the arc turns counterclockwise, in units of 2^-16 degrees.
     sweep: i64,
     /// The number of chords, at least 1.
@@ -38,18 +37,20 @@ impl ArcStep {
                 (sweep.unsigned_abs() * root).div_ceil((57 * 4) << 16)
             }
         };
-        Self { center, radius, across, sweep, chords: chords.clamp(1, 1 << 20) as u32 }
+        Self { center, radius, sweep, chords: chords.clamp(1, 1 << 20) as u32 }
     }
 
-    /// The end of the chord with this index, from 0; `None` behind the last.
-    pub(super) fn chord(&self, index: u32) -> Option<Point> {
+    /// The end of the chord with this index, from 0, in the frame in which the arc was made; `None`
+    /// behind the last.
+    pub(super) fn chord(&self, index: u32, frame: &Frame) -> Option<Point> {
         if index >= self.chords {
             return None;
         }
         // The product is below 2^53, so the conversion is exact.
         let turned = self.sweep * i64::from(index + 1);
         let degrees = turned as f64 / (65536.0 * f64::from(self.chords));
-        self.radius.towards(self.across, sine_and_cosine(degrees)).plus(self.center)
+        let across = frame.across(self.radius)?;
+        self.radius.towards(across, sine_and_cosine(degrees)).plus(self.center)
     }
 }
 
@@ -84,7 +85,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         };
         if self.is_down {
             self.add(Step::Arc(arc));
-        } else if let Some(end) = arc.chord(arc.chords - 1) {
+        } else if let Some(end) = arc.chord(arc.chords - 1, &self.frame) {
             self.add(Step::Travel(end));
         }
     }

@@ -209,7 +209,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
             return self.overflow();
         };
         for index in 0.. {
-            let Some(to) = arc.chord(index).filter(|_| !self.polygon.is_full) else { return };
+            let Some(to) = arc.chord(index, &self.frame).filter(|_| !self.polygon.is_full) else {
+                return;
+            };
             self.add_vertex(to);
         }
     }
@@ -235,7 +237,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         };
         let mut has_room = self.polygon.push(begin, true);
         for index in 0.. {
-            let Some(to) = arc.chord(index).filter(|_| has_room) else { return };
+            let Some(to) = arc.chord(index, &self.frame).filter(|_| has_room) else { return };
             has_room = self.polygon.push(to, true);
         }
     }

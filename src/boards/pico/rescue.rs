@@ -3,8 +3,8 @@
 //!
 //! Nothing moves, and the pen stays where the fault has raised it: its servo gets no pulses,
 //! because no settings are read that say at what height it is raised. They would say, too, which
-//! level switches the drivers off: the resistor at their enable pin does so, and nothing drives that
-//! pin.
+//! level switches the drivers off: the resistor at their enable pin does so, and nothing drives
+//! that pin.
 //!
 //! Both ports answer: each line with the cause of the fault and `error:9`, `?` with a status, and
 //! ctrl-X with another attempt to start. `$UF2` and the 1200-baud touch open the drive for a new
