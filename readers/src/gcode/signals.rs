@@ -163,9 +163,12 @@ fn by_rapids(moves: &Moves, levels: &[Option<f64>]) -> Option<Division> {
         if gap < SAME {
             continue;
         }
-        // If both ways agree as much, the pen is up at the higher level.
         let [as_up, as_down] = [high[0] + low[1], low[0] + high[1]];
-        let (high_is_up, agreed) = (as_up >= as_down, as_up.max(as_down));
+        // The pen is up where all of G0 is. Of a program that also draws by G0, all moves count. If
+        // nothing decides, it is up at the higher level.
+        let draws_by_both = high[0].min(low[0]) >= SAME;
+        let high_is_up = if draws_by_both { as_up >= as_down } else { high[0] >= low[0] };
+        let agreed = if high_is_up { as_up } else { as_down };
         let is_better = best.as_ref().is_none_or(|(most, widest, _)| {
             agreed > most + SAME || agreed > most - SAME && gap > *widest
         });
