@@ -266,9 +266,21 @@ fn moves_by_hand_are_cancelled_where_they_are() {
 
 #[test]
 fn homing_answers_when_it_is_done() {
+    for alarm in ["", "ALARM:10\n"] {
+        home_answers_when_it_is_done(alarm);
+    }
+}
+
+/// Homes a machine that is idle, or in this alarm, which the homing ends.
+fn home_answers_when_it_is_done(alarm: &str) {
     let mut bench = bench();
     assert_eq!(bench.say("$22=1\n$130=60\n$131=60\n$J=X30 Y20 F3000\n"), "ok\n".repeat(4));
     bench.finish();
+    if !alarm.is_empty() {
+        bench.board.receive(&[0xFD]);
+        bench.work(20);
+        assert_eq!(bench.heard(), alarm);
+    }
     bench.board.receive(b"$H\n$J=X1 F3000\n");
     let mut seen = Vec::new();
     for _ in 0..60_000 {

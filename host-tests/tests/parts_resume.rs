@@ -3,9 +3,10 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
-use penup::boards::host::{CutArea, CutFlash};
+use penup::boards::host::{CutArea, CutFlash, LAYOUT};
 use penup::machine::State;
 use penup::plotter::Board as _;
+use penup::storage::NOTE_BYTES;
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_small,
 };
@@ -244,8 +245,8 @@ fn a_cut_behind_the_last_stroke_leaves_nothing_to_draw() {
         finish(plotter);
         all = usize::MAX / 2 - plotter.board.flash().expect("flash").budget;
     });
-    let mut complete = 0;
-    for before_end in [0, 1, 40, 300, 900, 2000, 2700, 2900, 3000, 3100, 3400] {
+    // One page says that the drawing is complete, and each page before it that a stroke is drawn.
+    for before_end in [0, 1, 40, 150, 191, 192, 193, 200, 255, 256, 257, 300, 512] {
         let mut board = Off::new();
         let mut runs = vec![board.on(|plotter| {
             plotter.board.flash().expect("flash").budget = all - before_end;
@@ -255,14 +256,28 @@ fn a_cut_behind_the_last_stroke_leaves_nothing_to_draw() {
         runs.push(board.on(|plotter| {
             let greeting = plotter.heard();
             let answer = plotter.say("$resume=origin");
-            complete += usize::from(answer.contains("nothing is left to draw"));
             assert_eq!(greeting.contains("stopped"), answer.ends_with("ok\n"), "{answer}");
             finish(plotter);
             assert!(plotter.say("$resume=origin").ends_with("error:163\n"));
         }));
         assert_eq!(ink(runs.iter().flatten()), ink(&whole), "{before_end}");
     }
-    assert!(complete >= 2, "{complete}");
+    // All strokes are noted, and not that these are all.
+    let (slot, sum) = LAYOUT.job.identify(&mut board.flash).expect("a job");
+    let (log, mut notes) = (LAYOUT.logs[slot], [0; NOTE_BYTES]);
+    let (length, noted) = log.read(&mut board.flash, sum, &mut notes).expect("a log");
+    assert!(noted.is_closed);
+    let mut flash = board.flash.clone().powered();
+    log.begin(&mut flash, sum, &notes[..length]).expect("it is taken");
+    log.note(&mut flash, 0, whole.len() as u32).expect("it is taken");
+    board.flash = flash;
+    let nothing = board.on(|plotter| {
+        assert!(plotter.heard().contains("stopped"));
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.contains("nothing is left to draw"), "{answer}");
+        assert!(plotter.say("$resume=origin").ends_with("error:163\n"));
+    });
+    assert_eq!(nothing, Run::new());
 }
 
 #[test]

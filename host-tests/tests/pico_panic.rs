@@ -4,7 +4,7 @@
 
 use penup::board_table::PICO;
 use penup_client::emulator::{
-    EmulatedBoard as _, Machine, MachineEventKind, Pico, Pin, PinChange, image_path,
+    EmulatedBoard as _, Machine, MachineEvent, MachineEventKind, Pico, Pin, PinChange, image_path,
 };
 use penup_host_tests::cut_jobs::{assert_one_drawing, strokes_of};
 use penup_host_tests::emulated_jobs::{Line, bench_like};
@@ -82,8 +82,10 @@ fn a_panic_raises_the_pen_is_reported_at_both_ports_and_the_job_goes_on() -> Tes
     for (number, check) in [checks.len() / 3, 2 * checks.len() / 3].into_iter().enumerate() {
         let check = &checks[check];
         let mut changes = until_pen_is_down(&mut line, 5)?;
+        let faulted_at = line.emulator.clock()?;
         line.emulator.jump_to(check.address, false)?;
         line.hear_greeting()?;
+        let restarted_at = line.emulator.clock()?;
         // What was asked before the panic may be answered now.
         let expected = format!("[MSG:started again after a fault: panicked at {}: ", check.place);
         let message = line.hear()?;
@@ -103,6 +105,13 @@ fn a_panic_raises_the_pen_is_reported_at_both_ports_and_the_job_goes_on() -> Tes
         let events = changes.iter().filter_map(|change| machine.change(*change));
         let mut events: Vec<_> = events.collect();
         events.extend(machine.last());
+        // The servo has its time to raise the pen before the restart ends its pulses.
+        let is_lift = |event: &&MachineEvent| {
+            event.at > faulted_at && event.kind == MachineEventKind::Pen { down: false }
+        };
+        let lifted_at = events.iter().find(is_lift).ok_or("the pen stays down")?.at;
+        assert!(lifted_at < faulted_at + Duration::from_millis(60), "{lifted_at:?}");
+        assert!(restarted_at >= lifted_at + Duration::from_millis(350), "{restarted_at:?}");
         for event in events {
             if let MachineEventKind::Drivers { on } = event.kind {
                 drivers_on = on;

@@ -231,7 +231,8 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
     let mut instruction = Instruction::default();
     for (at, &byte) in bytes.iter().chain(b";").enumerate() {
         // The end of the file ends its last instruction, but is not a letter of a label.
-        if at == bytes.len() && dialect.is_in_text() && !dialect.is_in_data() {
+        let ends_with_semicolon = dialect.is_in_data() || dialect.is_in_comment();
+        if at == bytes.len() && dialect.is_in_text() && !ends_with_semicolon {
             reader.endless = Some(instruction.begin);
             break;
         }

@@ -159,9 +159,14 @@ impl Dialect {
         self.control != Control::None || (self.is_in_force() && self.state != State::Code)
     }
 
-    /// Whether the next byte is data in which any byte from 0x80 up may stand, too.
+    /// Whether the next byte is data in which any byte from 0x80 up may stand, too: that of `PE`.
     pub fn is_in_data(&self) -> bool {
-        self.control == Control::None && matches!(self.state, State::Data | State::Comment(_))
+        self.control == Control::None && self.state == State::Data
+    }
+
+    /// Whether the next byte belongs to a comment.
+    pub fn is_in_comment(&self) -> bool {
+        matches!(self.state, State::Comment(_))
     }
 
     /// Takes the next byte and says what it belongs to.

@@ -189,12 +189,15 @@ impl Machine<'_> {
     /// often meanwhile.
     ///
     /// # Errors
-    /// [`MachineError::State`] unless the machine is idle or in [`Alarm::NotHomed`].
+    /// [`MachineError::State`] unless the machine is idle or in an alarm that can be ended.
     pub fn home(&mut self, switches: Switches) -> Result<(), MachineError> {
         let was_lost = match self.activity {
             Activity::Idle if self.is_stopped() => false,
-            Activity::Alarm(alarm @ Alarm::NotHomed) => {
+            Activity::Alarm(alarm) => {
                 self.release_pins(alarm)?;
+                if alarm == Alarm::Restarted {
+                    self.forget_what_needs_current();
+                }
                 true
             }
             _ => return Err(self.refusal()),

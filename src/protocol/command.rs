@@ -1,6 +1,7 @@
 //! Parses lines into typed commands.
 
 use super::edit::parse_edit;
+use super::gcode::before_hash;
 use super::values::{Decimals, PENS, coordinates, number, split_word, trim, trim_start, whole};
 use super::{CommandError, GCode, Numbers, Significant, next_number};
 use crate::curve::CurveError;
@@ -215,7 +216,10 @@ impl<'a> Command<'a> {
         if let Some(dollar) = line.strip_prefix('$') {
             return Self::parse_dollar(trim(dollar));
         }
-        let line = trim(line.split('#').next().unwrap_or(""));
+        let line = trim(match GCode::begins(line) {
+            true => before_hash(line),
+            false => line.split('#').next().unwrap_or(""),
+        });
         #[cfg(not(feature = "hpgl"))]
         if line.starts_with("IN;") {
             return Err(CommandError::NoHpGl);

@@ -118,6 +118,20 @@ impl LinePart {
     }
 }
 
+/// The part of a line before a `#` that begins a comment, which it does not within one.
+pub(super) fn before_hash(line: &str) -> &str {
+    let mut part = LinePart::Code;
+    let hash = line.bytes().position(|byte| !part.takes(byte) && byte == b'#');
+    hash.and_then(|at| line.get(..at)).unwrap_or(line)
+}
+
+/// Whether a comment goes on at the end of this beginning of a line.
+pub(super) fn ends_in_comment(head: &str) -> bool {
+    let mut part = LinePart::Code;
+    head.bytes().for_each(|byte| drop(part.takes(byte)));
+    part != LinePart::Code
+}
+
 /// The bytes of a line that matter, in upper case.
 #[derive(Clone)]
 pub(crate) struct Significant<'a>(pub core::str::Bytes<'a>);

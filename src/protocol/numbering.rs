@@ -13,6 +13,7 @@
 //! `M110 N…` sets the number of the last line. `M110` alone, with a checksum, asks for it. A
 //! numbered `M2` or `M30` ends the obligation to send numbers, as does ctrl-X.
 
+use super::gcode::ends_in_comment;
 use super::{CommandError, GCode, LINE_LIMIT};
 use crate::checksum::CRC_16;
 
@@ -191,6 +192,7 @@ impl Numbering {
         // A line of G-code may have a checksum alone.
         if let Some((head, Checksum::Xor, value)) = split_checksum(line)
             && GCode::begins(head)
+            && !ends_in_comment(head)
         {
             let is_whole = head.bytes().fold(0, |xor, byte| xor ^ byte) == (value & 0xFF) as u8;
             return if is_whole && value <= 0xFF {

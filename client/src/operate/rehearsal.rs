@@ -50,8 +50,8 @@ fn capacity_in(replies: &[Reply]) -> Option<Capacity> {
     Some(Capacity { vertices: limit("vertices ")?, corners: limit("corners ")?, flash })
 }
 
-/// What the answer to `$model` says of the flash for models: `[FLASH:1097728 bytes for a larger
-/// model]`, or `[FLASH:vertices 9, faces 8, bars 0, corners 24 in 1097728 bytes]`.
+/// What the answer to `$model` says of the flash for models: `[FLASH:1146880 bytes for a larger
+/// model]`, or `[FLASH:vertices 9, faces 8, bars 0, corners 24 in 1146880 bytes]`.
 fn flash_of(reply: &Reply) -> Option<&str> {
     let Reply::Other(line) = reply else { return None };
     line.strip_prefix("[FLASH:")?.strip_suffix(']')

@@ -102,8 +102,13 @@ impl Setup<'_> {
             }
         }
         if value(settings, Setting::Homing) != 0.0 {
+            let question = format!(
+                "How long is a belt, from the motor to the pen, when it has left its switch by the \
+                 {} mm of homing ($27)",
+                value(settings, Setting::HomingPullOff)
+            );
             let belt = self.ask_measure(
-                "How long is a belt, from the motor to the pen, when its switch closes",
+                &question,
                 value(settings, Setting::HomedBelt),
                 bounds(Setting::HomedBelt),
             )?;
