@@ -162,22 +162,22 @@ impl FakePlotter {
             let state = if self.fault == Fault::Busy { "Run" } else { "Idle" };
             let all = self.finished;
             return self.say(&format!(
-                "<{state}|MPos:0.000,0.000|Strokes:{all}/{all}|Ink:{all}/{all}|Left:0>"
+                "<{state}|MPos:0.000,0.000|Drawn:{all}/{all}|Ink:{all}/{all}|Left:0>"
             ));
         };
         let all = self.strokes;
         if self.is_held {
-            return self.say(&format!("<Hold:0|MPos:4.000,2.000|Strokes:{drawn}/{all}>"));
+            return self.say(&format!("<Hold:0|MPos:4.000,2.000|Drawn:{drawn}/{all}>"));
         }
         if let Some((stroke, pen)) = self.pen_before
             && stroke == drawn
         {
             let position = self.requested_pens.len();
             return self
-                .say(&format!("<Hold:0|MPos:{position}.000,2.000|Pen:{pen}|Strokes:{drawn}/9>"));
+                .say(&format!("<Hold:0|MPos:{position}.000,2.000|Pen:{pen}|Drawn:{drawn}/9>"));
         }
         if self.hold_before == Some(drawn) {
-            return self.say(&format!("<Hold:0|MPos:3.000,2.000|Strokes:{drawn}/9>"));
+            return self.say(&format!("<Hold:0|MPos:3.000,2.000|Drawn:{drawn}/9>"));
         }
         let (done, left) = (10 * drawn, all - drawn);
         let speed = match self.percent {
@@ -185,7 +185,7 @@ impl FakePlotter {
             percent => format!("|Ov:{percent},100,100"),
         };
         self.say(&format!(
-            "<Run|MPos:1.000,2.000{speed}|Strokes:{drawn}/{all}|Ink:{done}/{}|Left:{left}>",
+            "<Run|MPos:1.000,2.000{speed}|Drawn:{drawn}/{all}|Ink:{done}/{}|Left:{left}>",
             10 * all
         ));
         if let Fault::AlarmWhileDrawing(number) = self.fault {

@@ -181,7 +181,7 @@ fn the_status_tells_what_the_machine_does() {
         let all = all.split(['|', '>']).next().expect("a number");
         [done, all].map(|number| number.parse::<u32>().expect("a number"))
     };
-    let [done, all] = of("|Strokes:", status);
+    let [done, all] = of("|Drawn:", status);
     let [_, ink] = of("|Ink:", status);
     let left: u32 =
         status.split_once("|Left:").and_then(|(_, left)| left.parse().ok()).expect("a time");

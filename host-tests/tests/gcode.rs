@@ -55,7 +55,7 @@ fn a_program_is_drawn_and_ends_with_the_pen_up() {
     assert_eq!(bench.heard(), "ok\n".repeat(lines - 1) + "[MSG:Pgm End]\nok\n");
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:1/1|Ink:80/80|Left:0>\n"
+        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Drawn:1/1|Ink:80/80|Left:0>\n"
     );
     assert!((inked(&bench) - 80.0).abs() < 0.1, "{}", inked(&bench));
 }
@@ -73,11 +73,7 @@ fn a_line_that_leads_nowhere_draws_a_dot_unless_a_stroke_goes_on() {
         bench.say("F2000\n");
         let answer = bench.say(program);
         bench.finish();
-        assert_eq!(
-            field(&mut bench, "Strokes"),
-            format!("Strokes:{strokes}/{strokes}"),
-            "{answer}"
-        );
+        assert_eq!(field(&mut bench, "Drawn"), format!("Drawn:{strokes}/{strokes}"), "{answer}");
     }
 }
 
@@ -422,7 +418,7 @@ fn checking_refuses_what_would_be_refused_and_moves_nothing() {
     assert!(bench.board.trace().changes().is_empty());
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n"
+        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Drawn:0/0|Ink:0/0|Left:0>\n"
     );
     // A line that was only checked does not change where the next line begins.
     bench.say("G91 G0 X1\n");

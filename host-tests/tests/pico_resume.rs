@@ -78,7 +78,7 @@ fn wait_for(line: &mut Line<Pico>, stroke: u32) -> Result<bool, Box<dyn Error>> 
         if status.starts_with("<Idle") {
             return Ok(true);
         }
-        if strokes(&status, "|Strokes:").is_some_and(|(done, _)| done >= stroke) {
+        if strokes(&status, "|Drawn:").is_some_and(|(done, _)| done >= stroke) {
             return Ok(false);
         }
     }
@@ -92,7 +92,7 @@ fn draw_with_cuts(lines: &[String], cuts: &[PowerCut]) -> Result<Vec<Run>, Box<d
     for text in lines {
         assert_eq!(ask(&mut line, text)?, "ok", "{text}");
     }
-    let all = strokes(&line.status()?, "|Strokes:").ok_or("no job")?.1;
+    let all = strokes(&line.status()?, "|Drawn:").ok_or("no job")?.1;
     let mut runs = Vec::new();
     for (number, cut) in (1..).zip(cuts) {
         let stroke = all * number / (cuts.len() as u32 + 1);

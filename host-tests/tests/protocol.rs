@@ -27,13 +27,30 @@ fn refusal(answer: &str) -> Option<u16> {
     (message.starts_with("[MSG:") && lines.next().is_none()).then_some(number)
 }
 
+/// Some senders take every line that contains `ok` or `error` for the answer to a line.
+#[test]
+fn only_answers_contain_what_answers_are_known_by() {
+    let mut bench = Bench::new();
+    bench.heard();
+    for question in ["?", "$$\n", "$#\n", "$G\n", "$I\n", "$N\n"] {
+        let answer = bench.say(question);
+        let mut lines: Vec<&str> = answer.lines().collect();
+        if question != "?" {
+            assert_eq!(lines.pop(), Some("ok"), "{question}");
+        }
+        let mistaken = lines.iter().find(|line| line.contains("ok") || line.contains("error"));
+        assert_eq!(mistaken, None, "{question}");
+        assert!(!lines.is_empty(), "{question}");
+    }
+}
+
 #[test]
 fn a_new_plotter_greets_and_is_idle() {
     let mut bench = Bench::new();
     assert_eq!(bench.heard(), "\nGrbl 1.1h [penup 0.1.0 '$' for help]\n");
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:0/0|Ink:0/0|Left:0>\n"
+        "<Idle|MPos:0.000,0.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Drawn:0/0|Ink:0/0|Left:0>\n"
     );
     assert_eq!(bench.say("\n"), "ok\n");
     assert_eq!(bench.say("$model\n").lines().last(), Some("ok"));
@@ -182,7 +199,7 @@ fn a_plan_is_drawn_at_true_size_or_refused_with_its_size() {
     bench.finish();
     assert_eq!(
         bench.say("?"),
-        "<Idle|MPos:350.000,50.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Strokes:1/1|\
+        "<Idle|MPos:350.000,50.000,0.000|FS:0,0|WCO:0.000,0.000,0.000|Drawn:1/1|\
          Ink:300/300|Left:0>\n"
     );
     assert_eq!(bench.say("$page=210x297\n$fit=on\n$plot\n"), "ok\nok\nok\n");

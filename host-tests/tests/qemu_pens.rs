@@ -33,7 +33,7 @@ fn a_job_of_three_pens_pauses_twice() -> Result<(), Box<dyn Error>> {
     loop {
         let status = line.status()?;
         if status.starts_with("<Idle") {
-            assert!(status.contains("|Strokes:3/3|"), "{status}");
+            assert!(status.contains("|Drawn:3/3|"), "{status}");
             return Ok(());
         }
         assert!(status.starts_with("<Run"), "{status}");

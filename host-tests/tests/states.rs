@@ -410,7 +410,7 @@ fn words_for_other_machines_move_nothing() {
 fn the_end_of_a_program_comes_behind_the_move_of_its_line() {
     let strokes = |bench: &mut Bench| {
         let report = send(bench, b"?");
-        report.split('|').find(|field| field.starts_with("Strokes:")).unwrap_or("").to_owned()
+        report.split('|').find(|field| field.starts_with("Drawn:")).unwrap_or("").to_owned()
     };
     for end in ["M2", "M30", "M0", "M6"] {
         let mut bench = Bench::small();
@@ -418,7 +418,7 @@ fn the_end_of_a_program_comes_behind_the_move_of_its_line() {
         bench.finish();
         send(&mut bench, b"~");
         bench.finish();
-        assert_eq!(strokes(&mut bench), "Strokes:1/1", "{end}");
+        assert_eq!(strokes(&mut bench), "Drawn:1/1", "{end}");
         bench.board.receive(format!("G0 X10 Y5 {end}\n").as_bytes());
         bench.finish();
         let is_pause = end == "M0" || end == "M6";

@@ -137,7 +137,7 @@ fn strokes_that_are_sent_move_the_pins_as_an_uploaded_job_does() {
 
 /// Checks that all strokes are done, according to a status report.
 fn assert_all_done(status: &str) {
-    let done = status.split_once("Strokes:").expect("strokes").1;
+    let done = status.split_once("Drawn:").expect("strokes").1;
     let (done, all) = done.split('|').next().expect("counts").split_once('/').expect("all");
     assert_eq!(done, all, "{status}");
     assert!(all != "0", "{status}");

@@ -134,7 +134,7 @@ pub struct Status {
     pub state: String,
     /// Whether the machine is at rest in a feed hold (`Hold:0`), no longer slowing down.
     pub is_standing: bool,
-    /// The numbers of `Strokes:done/all`, which is reported during a drawing.
+    /// The numbers of `Drawn:done/all`, which is reported during a drawing.
     pub strokes: Option<(u64, u64)>,
     /// The numbers of `Stopped:done/all`, if a job has stopped that can go on. The second is 0 as
     /// long as nobody knows it.
@@ -186,7 +186,7 @@ impl Reply {
     /// use penup_job::protocol::Reply;
     /// assert_eq!(Reply::parse("ok"), Reply::Ok);
     /// assert_eq!(Reply::parse("error:7"), Reply::Error(7));
-    /// let Reply::Status(status) = Reply::parse("<Run|MPos:1.0,2.0|Strokes:3/12>") else { panic!()
+    /// let Reply::Status(status) = Reply::parse("<Run|MPos:1.0,2.0|Drawn:3/12>") else { panic!()
     /// }; assert_eq!((status.state.as_str(), status.strokes), ("Run", Some((3, 12))));
     /// ```
     pub fn parse(line: &str) -> Self {
@@ -264,7 +264,7 @@ fn parse_status(report: &str) -> Option<Status> {
     Some(Status {
         state,
         is_standing,
-        strokes: done_of_all("Strokes:"),
+        strokes: done_of_all("Drawn:"),
         stopped: done_of_all("Stopped:"),
         stream: stream(),
         ink: done_of_all("Ink:"),
@@ -332,9 +332,9 @@ mod tests {
             "Idle>",
             "[MSG:",
             "<>",
-            "<|Strokes:>",
-            "<Run|Strokes:9>",
-            "<Run|Strokes:a/b>",
+            "<|Drawn:>",
+            "<Run|Drawn:9>",
+            "<Run|Drawn:a/b>",
         ] {
             let reply = Reply::parse(noise);
             assert!(
@@ -354,8 +354,7 @@ mod tests {
             Reply::Status(status) => status,
             other => panic!("{other:?}"),
         };
-        let run =
-            "<Run|MPos:1.000,2.000,0.000|Ov:120,100,100|Pn:XE|Strokes:3/12|Ink:40/90|Left:75>";
+        let run = "<Run|MPos:1.000,2.000,0.000|Ov:120,100,100|Pn:XE|Drawn:3/12|Ink:40/90|Left:75>";
         let run = status(run);
         assert_eq!(
             (run.strokes, run.ink, run.seconds_left),
@@ -365,7 +364,7 @@ mod tests {
         assert!(
             status("<Hold:0|MPos:1,2>").is_standing && !status("<Hold:1|MPos:1,2>").is_standing
         );
-        let stopped = status("<Idle|MPos:0,0,0|Stopped:4/9|Strokes:0/0>");
+        let stopped = status("<Idle|MPos:0,0,0|Stopped:4/9|Drawn:0/0>");
         assert_eq!((stopped.stopped, run.stopped), (Some((4, 9)), None));
         assert_eq!([strokes_drawn(4, 9), strokes_drawn(4, 0)], ["4 of 9 strokes", "4 strokes"]);
         assert_eq!([strokes_drawn(0, 1), strokes_drawn(1, 0)], ["0 of 1 stroke", "1 stroke"]);

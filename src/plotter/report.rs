@@ -268,7 +268,7 @@ impl<I: Index> Inner<'_, I> {
             reply.part(format_args!("|Stream:{taken}/{all},{room}"));
         }
         let (done, all) = (status.done, status.job);
-        reply.part(format_args!("|Strokes:{}/{}", done.strokes, all.strokes));
+        reply.part(format_args!("|Drawn:{}/{}", done.strokes, all.strokes));
         let mm =
             |units: u64| BinaryFraction { units: units as i64, fraction_bits: 18, decimals: 0 };
         let (drawn, left) = (mm(done.drawn), status.seconds_left);

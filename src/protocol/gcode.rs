@@ -128,7 +128,9 @@ pub(super) fn before_hash(line: &str) -> &str {
 /// Whether a comment goes on at the end of this beginning of a line.
 pub(super) fn ends_in_comment(head: &str) -> bool {
     let mut part = LinePart::Code;
-    head.bytes().for_each(|byte| drop(part.takes(byte)));
+    for byte in head.bytes() {
+        part.takes(byte);
+    }
     part != LinePart::Code
 }
 

@@ -286,7 +286,7 @@ const DRIVER_RANGES: [(f64, f64, f64); 3] = if DRIVER_PINS {
 const KEEPS_POINTS: bool = cfg!(feature = "resume");
 /// The name of [`Setting::PointDistance`].
 const POINT_NAME: &str =
-    if KEEPS_POINTS { "within strokes keep the point reached each" } else { "(not on this board)" };
+    if KEEPS_POINTS { "within a line keep the point reached each" } else { "(not on this board)" };
 /// The least and the greatest value of such a setting, and its default.
 const POINT_RANGE: (f64, f64, f64) =
     if KEEPS_POINTS { (0.0, 10000.0, 0.0) } else { (0.0, 0.0, 0.0) };
@@ -351,9 +351,9 @@ pub const SETTINGS: &[SettingInfo] = {
         row(PenSBelow, 217, "pen down at higher S, lower S", "0|1", (0.0, 1.0, 0.0), true),
         row(PointDistance, 219, POINT_NAME, "m", POINT_RANGE, false),
         row(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
-        row(StrokeOverlap, 221, "closed strokes go on by", "mm", (0.0, 10.0, 0.0), false),
-        row(StrokeLead, 222, "open strokes begin early by", "mm", (0.0, 10.0, 0.0), false),
-        row(StrokeTrail, 223, "open strokes end late by", "mm", (0.0, 10.0, 0.0), false),
+        row(StrokeOverlap, 221, "closed lines go on by", "mm", (0.0, 10.0, 0.0), false),
+        row(StrokeLead, 222, "open lines begin early by", "mm", (0.0, 10.0, 0.0), false),
+        row(StrokeTrail, 223, "open lines end late by", "mm", (0.0, 10.0, 0.0), false),
         #[cfg(feature = "pen-overlap")]
         row(
             PenDownEarly,
