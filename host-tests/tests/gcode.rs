@@ -97,9 +97,43 @@ fn arcs_by_centre_and_by_radius_inches_and_bounds() {
     assert_eq!(position_of(&mut bench), "30.000,10.000");
     // The ends of the arc are within the travel, but its lowest point is not.
     let answer = bench.say("G0 X5 Y5\nG3 X25 Y5 I10 J0\n");
-    assert!(answer.contains("beyond") && answer.ends_with("error:15\n"), "{answer}");
     bench.finish();
+    let answer = answer + &bench.heard();
+    assert!(answer.contains("beyond") && answer.ends_with("error:15\nALARM:2\n"), "{answer}");
     assert_eq!(position_of(&mut bench), "5.000,5.000");
+}
+
+/// What comes behind a line that leaves the travel would be drawn from a wrong place.
+#[test]
+fn a_line_that_leads_beyond_the_travel_ends_the_program_behind_the_moves_before_it() {
+    for line in ["G1 X60 Y5000", "G0 X-1", "G2 X60 Y20 I300", "G53 G1 X5000"] {
+        let mut bench = bench();
+        let program = format!("G0 X20 Y20\nM3\nG1 X60 F2000\n{line}\nG1 X60 Y90\nM5\n");
+        bench.board.receive(program.as_bytes());
+        bench.finish();
+        let answers = bench.heard();
+        let numbers: Vec<&str> = answers.lines().filter(|it| !it.starts_with("[MSG:")).collect();
+        let expected = ["ok", "ok", "ok", "error:15", "ALARM:2", "error:9", "error:9"];
+        assert_eq!(numbers, expected, "{line}: {answers}");
+        assert!((inked(&bench) - 40.0).abs() < 0.1, "{line}: {}", inked(&bench));
+        assert_eq!(field(&mut bench, "Alarm:"), "Alarm:2", "{line}");
+        // The position is known, so the alarm ends without homing.
+        assert_eq!(bench.say("$X\n"), "[MSG:Caution: Unlocked]\nok\n", "{line}");
+        assert_eq!(position_of(&mut bench), "60.000,20.000", "{line}");
+        bench.say("G0 X20 Y20\n");
+        bench.finish();
+        assert_eq!(position_of(&mut bench), "20.000,20.000", "{line}");
+    }
+    // Ctrl-X gives up the moves before it, and with them the alarm.
+    let mut bench = bench();
+    bench.board.receive(b"M3\nG1 X200 F600\nG1 X5000\n");
+    bench.work(1000);
+    bench.board.receive(b"\x18");
+    bench.finish();
+    assert_eq!(field(&mut bench, "Idle"), "Idle");
+    // A jog is refused alone, and so is a line of a program that is only checked.
+    assert!(bench.say("$J=X5000 F1000\n").ends_with("error:15\n"));
+    assert_eq!(field(&mut bench, "Idle"), "Idle");
 }
 
 /// Programs that fit arcs to points make some that are shorter than a step.

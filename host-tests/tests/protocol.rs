@@ -78,7 +78,6 @@ fn each_refusal_has_its_own_number_and_changes_nothing() {
         ("M10\n", 20),
         ("G0 X10 U3\n", 20),
         ("$H\n", 5),
-        ("G0 X-1\n", 15),
         ("$J=Y500 F100\n", 15),
         ("G2 X10 Y0\n", 35),
         ("G2 X10 I3\n", 33),

@@ -39,6 +39,9 @@ pub enum Alarm {
     EmergencyStop,
     /// A limit switch was pressed during a move.
     HardLimit,
+    /// A line of G-code led beyond the travel. The moves before it are done, and the position is
+    /// known.
+    SoftLimit,
     /// The machine has just started and does not know its position.
     /// [`Machine::home`](super::Machine::home) finds the position.
     NotHomed,

@@ -91,7 +91,7 @@ impl<I: Index> Inner<'_, I> {
                 self.check_idle()?;
                 self.report_build(board);
             }
-            Command::Settings => {
+            Command::Settings { named } => {
                 #[cfg(feature = "stream")]
                 let may_run = self.is_streamed();
                 #[cfg(not(feature = "stream"))]
@@ -101,7 +101,7 @@ impl<I: Index> Inner<'_, I> {
                 if !may_run && !has_stopped && !matches!(state, State::Check | State::Jog) {
                     self.check_idle()?;
                 }
-                self.task = Some(Task::List(Listing::Settings, 0));
+                self.task = Some(Task::List(Listing::Settings { named }, 0));
             }
             Command::Modes => self.report_modes(board),
             Command::Parameters => {
@@ -184,7 +184,9 @@ impl<I: Index> Inner<'_, I> {
                 Reply(board).line(format_args!("[MSG:Sleeping]"));
             }
             Command::Jog(line) => self.jog(line)?,
-            Command::GCode(line) => self.run_gcode(line, board)?,
+            Command::GCode(line) => {
+                self.run_gcode(line, board).or_else(|error| self.end_at_travel(error))?;
+            }
         }
         Ok(Next::Nothing)
     }

@@ -41,6 +41,8 @@ pub(super) enum Task {
         /// When the settings were kept, in microseconds of the board's clock.
         since: u32,
     },
+    /// Waits until the machine has stopped, then locks it, because a line led beyond the travel.
+    LockAtTravel(MachineError),
     /// Homing: looks for the limit switches.
     Home,
     /// Writes a list, from the row with this index on.
@@ -52,8 +54,12 @@ pub(super) enum Task {
 pub(super) enum Listing {
     /// The commands, as `$` lists them.
     Help,
-    /// The settings of the machine, as `$$` lists them.
-    Settings,
+    /// The settings of the machine, as `$$` lists them, or with names and units as `$settings`
+    /// does.
+    Settings {
+        /// Whether names and units are listed as well.
+        named: bool,
+    },
     /// The options of the plot, as `$options` lists them.
     Options,
     /// Elements of the model of one kind, up to this index, which is excluded.
@@ -133,7 +139,9 @@ impl<I: Index> Inner<'_, I> {
         if alarm != self.alarm_reported {
             self.alarm_reported = alarm;
             if let Some(alarm) = alarm {
-                self.resumption.lose_position();
+                if alarm != Alarm::SoftLimit {
+                    self.resumption.lose_position();
+                }
                 board.step_now();
                 Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
             }
@@ -223,6 +231,11 @@ impl<I: Index> Inner<'_, I> {
                 let (parameter, position) = (*parameter, *position);
                 Ok(Progress::Done(self.set_parameter(parameter, position, board)))
             }
+            Some(Task::LockAtTravel(error)) if is_stopped => {
+                let error = *error;
+                machine.alarm(Alarm::SoftLimit);
+                Ok(Progress::Done(Err(error.into())))
+            }
             Some(Task::Home) if is_stopped => {
                 self.resumption.find_position();
                 self.run_startup_lines(board);
@@ -254,14 +267,18 @@ impl<I: Index> Inner<'_, I> {
                 line(format_args!("{GRBL_HELP}"));
                 help(&mut |usage, meaning| line(format_args!("[HLP:{usage} {meaning}]")));
             }
-            Listing::Settings => {
+            Listing::Settings { named } => {
                 for (info, value) in self.machine.settings().iter() {
                     let (name, unit) = (info.name, info.unit());
                     let number = u32::from(info.number());
                     let units = value.to_bits().into();
                     let decimals = if info.whole { 0 } else { decimals_of(value) };
                     let value = BinaryFraction { units, fraction_bits: 16, decimals };
-                    line(format_args!("${number}={value} ({name}, {unit})"));
+                    if named {
+                        line(format_args!("${number}={value} ({name}, {unit})"));
+                    } else {
+                        line(format_args!("${number}={value}"));
+                    }
                 }
             }
             Listing::Model(..) => {}
@@ -378,6 +395,24 @@ impl<I: Index> Inner<'_, I> {
             }
         }
         Ok(())
+    }
+
+    /// Lets no further line of a program act if the `error` of a line is that it leads beyond the
+    /// travel: the moves before it are done, then the machine is locked. In check mode, and while
+    /// a job is drawn, the line is refused alone.
+    ///
+    /// # Errors
+    /// The `error`, unless the machine will be locked.
+    pub(super) fn end_at_travel(&mut self, error: CommandError) -> Result<(), CommandError> {
+        match error {
+            CommandError::Machine(error @ MachineError::BeyondTravel { .. })
+                if self.machine.state() != State::Check && !self.draws_job() =>
+            {
+                self.task = Some(Task::LockAtTravel(error));
+                Ok(())
+            }
+            error => Err(error),
+        }
     }
 
     /// Carries out a jog. The modes that the line sets do not affect later lines.

@@ -32,6 +32,14 @@ impl AlarmEntry {
                 "free the carriage by hand, then type `penup unlock` and `penup home`; check that \
                  the drawing lies within the travel (settings 130 and 131)",
             ),
+            Alarm::SoftLimit => Self::new(
+                2,
+                "a line of G-code led beyond the travel, so the rest of the program is refused",
+                "send $X, which needs no homing, and move or shrink the drawing; $130 and $131 \
+                 are the travel",
+                "type `penup unlock`, which needs no homing, and move or shrink the drawing; \
+                 settings 130 and 131 are the travel",
+            ),
             Alarm::HomingFailed(_) => Self::new(
                 9,
                 "homing did not find a limit switch, or the switch stayed pressed",
@@ -89,7 +97,8 @@ impl AlarmEntry {
 pub fn alarm_entries() -> std::vec::Vec<AlarmEntry> {
     use crate::machine::Axis;
     let next = |alarm: Alarm| match alarm {
-        Alarm::HardLimit => Some(Alarm::HomingFailed(Axis::X)),
+        Alarm::HardLimit => Some(Alarm::SoftLimit),
+        Alarm::SoftLimit => Some(Alarm::HomingFailed(Axis::X)),
         Alarm::HomingFailed(_) => Some(Alarm::EmergencyStop),
         Alarm::EmergencyStop => Some(Alarm::NotHomed),
         Alarm::NotHomed => Some(Alarm::Queue),

@@ -45,8 +45,11 @@ pub enum Command<'a> {
     Help,
     /// `$I`: reports version, board and limits.
     BuildInfo,
-    /// `$$`: lists the settings of the machine.
-    Settings,
+    /// `$$` and `$settings`: list the settings of the machine.
+    Settings {
+        /// Whether their names and units are listed as well: `$settings`.
+        named: bool,
+    },
     /// `$name=value`: sets an option of the plot, or a setting of the machine.
     Assign {
         /// The text before the equals sign. What is neither the name of an option nor the number
@@ -136,6 +139,7 @@ pub const HELP: [&[(&str, &str)]; 2] = [
         ("$", "this list"),
         ("$I", "version, board and limits; $I=TEXT adds a text of yours"),
         ("$$", "settings of the machine; $NUMBER=VALUE changes one"),
+        ("$settings", "the same with their names and units"),
         ("$#", "coordinate systems, kept positions and offsets"),
         ("$G", "modes of G-code"),
         ("$N", "G-code at the start, such as G20; $N0=LINE and $N1=LINE set it"),
@@ -283,6 +287,7 @@ impl<'a> Command<'a> {
         }
         match text {
             "UF2" => Ok(Self::ShowDrive),
+            "settings" => Ok(Self::Settings { named: true }),
             "options" => Ok(Self::Options),
             "model" => Ok(Self::Model),
             "clear" => Ok(Self::Clear),
@@ -310,7 +315,7 @@ impl<'a> Command<'a> {
         let Some(value) = value else {
             let commands = [
                 ("", Self::Help),
-                ("$", Self::Settings),
+                ("$", Self::Settings { named: false }),
                 ("#", Self::Parameters),
                 ("G", Self::Modes),
                 ("I", Self::BuildInfo),

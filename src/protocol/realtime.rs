@@ -12,6 +12,8 @@ use crate::hpgl::Dialect;
 pub struct RealTime(u16);
 
 impl RealTime {
+    /// A command of Grbl that has no effect on a plotter.
+    pub const NOTHING: Self = Self(0);
     /// `?`: reports the status.
     pub const STATUS: Self = Self(1);
     /// `!`: stops on the path and raises the pen.
@@ -180,6 +182,12 @@ impl Sorter {
             0x18 => RealTime::ABORT,
             // Grbl's safety door: a plotter has none, and stops as for a hold.
             0x84 => RealTime::HOLD,
+            // Other bytes for these commands, which grblHAL has. Programs try them at any plotter.
+            0x80 | 0x87 => RealTime::STATUS,
+            0x81 => RealTime::RESUME,
+            0x82 => RealTime::HOLD,
+            // The speed of a spindle, flood and mist, which a plotter has not.
+            0x99..=0x9E | 0xA0 | 0xA1 => RealTime::NOTHING,
             0x85 => RealTime::CANCEL_JOG,
             0x90 => RealTime::FEED_RESET,
             0x91 => RealTime::FEED_PLUS_10,
