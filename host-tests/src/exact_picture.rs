@@ -353,7 +353,8 @@ impl<'s> Picture<'s> {
         let mut seams = Vec::new();
         for other in 0..self.faces.len() {
             for one in 0..other {
-                if self.shared(one, other) >= 2
+                if self.has_edge_of(one, other)
+                    || self.has_edge_of(other, one)
                     || !self.is_through(one, other)
                     || !self.is_through(other, one)
                 {
@@ -389,10 +390,12 @@ impl<'s> Picture<'s> {
         seams
     }
 
-    /// The number of corners that two faces share.
-    fn shared(&self, one: usize, other: usize) -> usize {
-        let is_there = |corner: &&u16| self.faces[other].contains(corner);
-        self.faces[one].iter().filter(is_there).count()
+    /// Whether both ends of an edge of one face are corners of the other.
+    fn has_edge_of(&self, one: usize, other: usize) -> bool {
+        let corners = &self.faces[one];
+        let is_there = |corner: &u16| self.faces[other].contains(corner);
+        (0..corners.len())
+            .any(|n| [n, (n + 1) % corners.len()].iter().all(|n| is_there(&corners[*n])))
     }
 
     /// Whether a face has corners on both sides of the plane of another face.

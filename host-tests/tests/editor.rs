@@ -448,3 +448,41 @@ fn images_in_any_plane_are_exact_to_a_millionth() {
         }
     }
 }
+
+#[test]
+fn a_face_about_whose_plane_is_mirrored_is_its_own_image() {
+    let mut number = 1u32;
+    let mut below = |limit: f64| {
+        number = number.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (f64::from(number >> 8) / f64::from(1 << 24) * limit * 100.0).round() / 100.0
+    };
+    let mut models = vec!["v 76.2 94.5 83.4\nv -7.4 -92.7 0.1\nv -43.6 -45.3 32.5\n".to_owned()];
+    for _ in 0..200 {
+        let vertex = |_| {
+            let at = [0; 3].map(|_| below(200.0) - 100.0);
+            format!("v {:.2} {:.2} {:.2}\n", at[0], at[1], at[2])
+        };
+        models.push((0..3).map(vertex).collect());
+    }
+    for model in models {
+        let mut bench = Bench::new();
+        bench.heard();
+        bench.say(&format!("{model}f 1 2 3\n"));
+        let answer = bench.say("$mirror=1,2,3\n");
+        assert_eq!(answer, "[EDIT:vertices +0, bars +0, faces +0, curves +0]\nok\n", "{model}");
+    }
+}
+
+#[test]
+fn nothing_is_taken_back_while_a_curve_is_unfinished() {
+    let mut bench = Bench::new();
+    bench.heard();
+    bench.say("v 0 0 0\nv 1 0 0\nv 2 2 0\nv 3 0 0\ndeg 3\ncurv 3 4 1 2 3 4\n");
+    let answer = bench.say("$undo\n");
+    assert!(answer.contains("end") && answer.contains("error:"), "{answer}");
+    assert_eq!(bench.say("parm u 0 1 2 3 4 5 6 7\nend\n"), "ok\nok\n");
+    assert_eq!(
+        (bench.plotter.model().vertices().len(), bench.plotter.model().curve_count()),
+        (4, 1)
+    );
+}

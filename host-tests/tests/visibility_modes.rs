@@ -10,7 +10,9 @@ use penup::protocol::CommandError;
 use penup::stage::NeverCancel;
 use penup::view::View;
 use penup::visibility::Stretch;
+use penup_host_tests::cut_jobs::{ink, strokes_of};
 use penup_host_tests::whole_jobs::{Bench, job_lines};
+use penup_job::pins::PinChange;
 use std::collections::BTreeSet;
 
 const CONVEX: [&str; 5] = ["cube", "octahedron", "icosahedron", "dodecahedron", "eighteen"];
@@ -263,5 +265,92 @@ fn an_eye_inside_sees_what_is_before_it_and_stays_on_the_page() {
             targets > 40 && in_the_middle > 10,
             "{targets} targets, {in_the_middle} in the middle"
         );
+    }
+}
+
+/// The normals of the faces are rounded differently from each eye.
+#[test]
+fn an_edge_that_bends_by_the_crease_is_drawn_from_every_eye() {
+    let prism = |sides: u32| {
+        let mut lines = String::new();
+        for n in 0..sides {
+            let (y, x) = (std::f64::consts::TAU * f64::from(n) / f64::from(sides)).sin_cos();
+            lines +=
+                &format!("v {:.6} {:.6} 0\nv {:.6} {:.6} 9\n", 5.0 * x, 5.0 * y, 5.0 * x, 5.0 * y);
+        }
+        for n in 0..sides {
+            let (a, b) = (2 * n + 1, 2 * ((n + 1) % sides) + 1);
+            lines += &format!("f {a} {b} {} {}\n", b + 1, a + 1);
+        }
+        for end in 0..2 {
+            let corners: Vec<_> = (0..sides).map(|n| (2 * n + 1 + end).to_string()).collect();
+            lines += &format!("f {}\n", corners.join(" "));
+        }
+        lines
+    };
+    for (sides, bend) in [(4, 90), (6, 60), (8, 45), (12, 30)] {
+        let mut bench = Bench::new();
+        bench.heard();
+        assert!(!bench.say(&prism(sides)).contains("error"));
+        for eye in ["30,-40,35", "17,-50,33", "-21,44,-37", "60,31,23", "13,79,-59"] {
+            for projection in ["perspective", "orthographic"] {
+                let view = format!("$eye={eye}\n$at=0,0,4.5\n$projection={projection}\n");
+                let all = seen(&mut bench, &format!("{view}$crease=0\n")).expect("drawn");
+                let found = seen(&mut bench, &format!("$crease={bend}\n")).expect("drawn");
+                assert_eq!(found, all, "{sides} sides from {eye}, {projection}");
+                let fewer = seen(&mut bench, &format!("$crease={}\n", bend + 1)).expect("drawn");
+                assert!(fewer.len() < all.len(), "{sides} sides from {eye}, {projection}");
+            }
+        }
+    }
+}
+
+/// What lies near the plane of the eye has its image almost at infinity.
+#[test]
+fn a_solid_that_is_partly_behind_the_eye_is_as_large_as_its_faces() {
+    let corners = [(-10, -10), (10, -10), (10, 10), (-10, 10)];
+    let mut model = String::new();
+    for z in [-1, 0] {
+        for (x, y) in corners {
+            model += &format!("v {x} {y} {z}\n");
+        }
+    }
+    for face in ["4 3 2 1", "5 6 7 8", "1 2 6 5", "2 3 7 6", "3 4 8 7", "4 1 5 8"] {
+        model += &format!("f {face}\n");
+    }
+    let mut bench = Bench::new();
+    bench.heard();
+    assert!(!bench.say(&format!("{model}$eye=-6,2,3\n$at=8,1,0\n")).contains("error"));
+    let mut drawn = 0;
+    let [faces, vertices] = ["faces", "vertices"].map(|see| {
+        let answer = bench.say(&format!("$see={see}\n$plot\n"));
+        assert!(answer.ends_with("ok\n"), "{see}: {answer}");
+        bench.finish();
+        let strokes = strokes_of(bench.board.trace().changes().iter().map(PinChange::from));
+        let new = ink(strokes.iter().skip(drawn));
+        drawn = strokes.len();
+        new
+    });
+    let differing = faces.symmetric_difference(&vertices).count();
+    assert!(faces.len() > 1000 && differing < 10, "{} {differing}", faces.len());
+}
+
+/// From far away the depths of a model would be the same number, so that nothing hides.
+#[test]
+fn the_same_is_hidden_however_far_the_eye_is() {
+    let mut bench = with_scene("cube", |_| true);
+    for direction in [[6.0, -10.0, 8.0], [-7.0, -3.0, -9.0]] {
+        let eye = |times: f64| {
+            let [x, y, z] = direction.map(|part: f64| part * times);
+            format!("$eye={x},{y},{z}\n$at=0.5,0.5,0.5\n")
+        };
+        let straight = format!("$projection=orthographic\n{}", eye(1.0));
+        let expected = seen(&mut bench, &straight).expect("drawn");
+        assert_eq!(expected.len(), 9);
+        for times in [1.0, 20.0, 100.0, 140.0, 150.0, 170.0, 200.0, 300.0, 1e3, 1e4, 1e6, 1e9, 1e14]
+        {
+            let view = format!("$projection=perspective\n{}", eye(times));
+            assert_eq!(seen(&mut bench, &view).expect("drawn"), expected, "{view}");
+        }
     }
 }

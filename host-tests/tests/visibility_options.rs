@@ -450,3 +450,33 @@ fn an_abort_a_full_sink_and_too_little_memory_end_the_search() -> std::io::Resul
     }
     Ok(())
 }
+
+/// The three squares of an octahedron: each two have two corners in common, but no edge.
+#[test]
+fn faces_that_cross_along_a_common_diagonal_have_a_seam() -> Result<(), VisibilityError> {
+    let mut model = Model::default();
+    for axis in 0..3 {
+        for at in [1.0, -1.0] {
+            model.vertices.push(std::array::from_fn(|n| if n == axis { at } else { 0.0 }));
+        }
+    }
+    for face in [[0, 2, 1, 3], [0, 4, 1, 5], [2, 4, 3, 5]] {
+        model.corners.extend((0..4).map(|n| Corner::new(face[n], false, n == 3)));
+    }
+    let view = View::new(&model, EYE, [0.0; 3], UP, Projection::Perspective);
+    let options = Options { with_seams: true, ..Options::default() };
+    let (_, stretches) = find(&view.vertices, &model.corners, view.projection, options)?;
+    let seams = stretches.iter().filter(|stretch| stretch.edge.is_none());
+    let found: f64 = seams.map(|stretch| length(&view, stretch)).sum();
+    // They are seen where bars along the three axes would be.
+    for axis in 0..3 {
+        model.corners.push(Corner::new(2 * axis, true, false));
+        model.corners.push(Corner::new(2 * axis + 1, true, true));
+    }
+    let (_, stretches) = find(&view.vertices, &model.corners, view.projection, Options::default())?;
+    let is_bar = |stretch: &&Stretch| stretch.edge.is_some_and(|(a, b)| a ^ b == 1);
+    let expected: f64 = stretches.iter().filter(is_bar).map(|stretch| length(&view, stretch)).sum();
+    assert!(expected > 0.2, "{expected}");
+    assert!((found / expected - 1.0).abs() < 1e-4, "{found} {expected}");
+    Ok(())
+}

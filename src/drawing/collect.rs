@@ -243,13 +243,16 @@ pub fn build_graph<I: Index>(
     cancel: &mut dyn Cancel,
 ) -> Result<Stored<I>, GraphError> {
     // A line inside another one that yields to it splits that one into two pieces, so there may be
-    // more segments than lines.
+    // up to twice as many segments as lines. There is room for so many if memory is left beside the
+    // points of the lines and their table.
     let all: &[PackedLine] = items(words, count).unwrap_or(&[]);
     let marks = |line: &PackedLine| line.0[2] >> MARKS;
     let differ = all.iter().any(|line| Some(marks(line)) != all.first().map(marks));
-    let room = if differ { count + count / 4 + 8 } else { count };
-    let line_words = Scratch::bytes_for::<LineOf<I>>(room) / 8;
     let available = size_of_val(words);
+    let point_bytes = 2 * count * (size_of::<PagePoint>() + 2 * size_of::<I>());
+    let spare = available.saturating_sub(point_bytes) / size_of::<LineOf<I>>();
+    let room = if differ { (2 * count).min(spare).max(count + count / 4 + 8) } else { count };
+    let line_words = Scratch::bytes_for::<LineOf<I>>(room) / 8;
     let missing = OutOfScratch { needed: line_words * 8, available };
     let (line_memory, rest) = words.split_at_mut_checked(line_words).ok_or(missing)?;
     let lines: &mut [LineOf<I>] = items_mut(line_memory, room).ok_or(missing)?;

@@ -317,6 +317,24 @@ mod tests {
         }
     }
 
+    /// Layers of a plan: a line, and many shorter ones within it that have a lower pen.
+    #[test]
+    fn a_line_may_be_cut_into_as_many_pieces_as_there_are_lines_within_it() {
+        let steps = |x: i32| PagePoint { x: 10 * x, y: 0 };
+        let short =
+            |at: i32| PackedLine::new(steps(2 * at + 1), steps(2 * at + 2), LineType::Full, 0);
+        for count in [1, 12, 200] {
+            let long = PackedLine::new(steps(0), steps(2 * count + 1), LineType::Full, 1);
+            let lines: Vec<_> = [long].into_iter().chain((0..count).map(short)).collect();
+            let mut words = vec![0; 40 * lines.len() + 100];
+            items_mut(&mut words, lines.len()).unwrap().copy_from_slice(&lines);
+            let stored = build_graph::<u16>(&mut words, lines.len(), &mut NeverCancel).unwrap();
+            let segments = stored.drawing(&words).unwrap().segments;
+            let of_pen = |pen| segments.iter().filter(|segment| segment.pen() == pen).count();
+            assert_eq!([of_pen(0), of_pen(1)], [count as usize, count as usize + 1]);
+        }
+    }
+
     /// What is drawn of these lines, as one strip: `+` at the ends of each segment, and between
     /// them the line type, or the pen if that is not the first.
     fn drawn(lines: &[PackedLine], direction: [i32; 2]) -> String {

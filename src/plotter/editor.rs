@@ -9,7 +9,7 @@ use crate::array::MapEach;
 use crate::fixed::BinaryFraction;
 use crate::index::Index;
 use crate::machine::State;
-use crate::model::{Change, Edit, Element, ElementKind, Model, Numbers};
+use crate::model::{Change, Edit, Element, ElementKind, Model, ModelError, Numbers};
 use crate::protocol::CommandError;
 use crate::stage::Scratch;
 use core::fmt;
@@ -86,9 +86,13 @@ impl<'m, I: Index> Inner<'m, I> {
     /// Restores the copy of the model.
     ///
     /// # Errors
-    /// [`CommandError::NothingToUndo`] if there is no copy.
+    /// [`CommandError::NothingToUndo`] if there is no copy, or [`ModelError::CurveUnfinished`], for
+    /// the copy has not the curve that has begun since.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub(super) fn undo(&mut self) -> Result<(), CommandError> {
+        if self.model.has_unfinished_curve() {
+            return Err(CommandError::Model(ModelError::CurveUnfinished));
+        }
         if core::mem::take(&mut self.copy_words) == 0 {
             return Err(CommandError::NothingToUndo);
         }

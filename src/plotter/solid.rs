@@ -1,11 +1,11 @@
 //! Draws a convex solid that is given without faces: by its vertices alone, or by its vertices and
 //! edges. The visible edges become lines on the page.
 
-use super::job::{Collector, Found, PageSink, Pipeline, move_to_front};
+use super::job::{Collector, Found, PageSink, Pipeline, fit, move_to_front};
 use super::{HiddenLines, VisibilityMode};
 use crate::array::MapEach;
 use crate::convex::{self, EdgeVisibility, Eye, SinkFull, SolidEdge, SolidError, SolidSink};
-use crate::drawing::{Bounds, PageMap};
+use crate::drawing::Bounds;
 use crate::index::Index;
 use crate::model::Corner;
 use crate::protocol::CommandError;
@@ -67,6 +67,8 @@ pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found,
         let visible = edges.iter().take(shown).map(|ends| (ends, true));
         visible.chain(edges.iter().rev().take(hidden).map(|ends| (ends, false)))
     };
+    let is_nearer = |near| model.vertices().iter().any(|position| view.vertex(*position).z < near);
+    let is_cut = view.near().is_some_and(is_nearer);
     let mut bounds = Bounds::NOTHING;
     for ends in all().filter_map(|(ends, _)| on_view(ends)) {
         cancel.check()?;
@@ -75,7 +77,7 @@ pub(super) fn project<I: Index>(pipeline: &mut Pipeline<'_, I>) -> Result<Found,
         }
     }
     let bounds = bounds.known().ok_or(CommandError::NothingToPlot)?;
-    let map = PageMap::fit(&bounds, &options.sheet(), *steps).map_err(CommandError::Page)?;
+    let map = fit(&view, is_cut, &bounds, options, *steps)?;
     let collector = Collector::new(line_words);
     let mut sink =
         PageSink { collector, map: &map, view: &view, options, observer: &mut **observer };

@@ -252,7 +252,34 @@ impl Axes {
         };
         Ok(Self { directions, origin })
     }
+
+    /// The axes of the parallel view that shows the same as the perspective one, if the eye is
+    /// further away than [`FAR`] times the size of what lies between these extents along the axes:
+    /// the coordinates of depth would have too few units there. The images of the two differ by at
+    /// most a 2·[`FAR`]th of their size.
+    pub(super) fn parallel_if_far(&self, extents: &[(f64, f64); 3]) -> Option<Self> {
+        let size = extents.iter().fold(0.0, |most, (low, high)| f64::max(most, high - low));
+        let middle = extents.map(|(low, high)| (low + high) / 2.0);
+        let centre =
+            [0, 1, 2].map(|row: usize| middle[row] - dot(self.directions[row], self.origin));
+        if centre[2] <= FAR * size {
+            return None;
+        }
+        // x/w and y/w around the centre, to the first order.
+        let [right, up, forward] = self.directions;
+        let slanted = |axis: Direction, row: usize| {
+            [0, 1, 2].map(|part: usize| axis[part] - centre[row] / centre[2] * forward[part])
+        };
+        // Measured from the model, because the eye may be as far as 10^15.
+        let origin = [0, 1, 2].map(|part: usize| {
+            (0..3).map(|row| middle[row] * self.directions[row][part]).sum::<f64>()
+        });
+        Some(Self { directions: [slanted(right, 0), slanted(up, 1), forward], origin })
+    }
 }
+
+/// From so many times the size of a model on, the eye counts as infinitely far.
+const FAR: f64 = 2048.0;
 
 /// Returns the directions right, up and forward of an eye that looks from `eye` at `at`.
 fn towards(

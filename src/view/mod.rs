@@ -141,9 +141,17 @@ impl View {
     // Not inlined, so that its variables take no stack while the rest of a job is computed.
     #[inline(never)]
     pub fn new(camera: &Camera, model: &impl Positions) -> Result<Self, ViewError> {
-        let axes = Axes::new(camera)?;
-        let extents = extents(&axes.directions, model).ok_or(ViewError::NothingToSee)?;
-        Self::of_extents(camera, axes, extents, reach(model), model.fraction_bits())
+        let mut axes = Axes::new(camera)?;
+        let mut projection = camera.lens.projection();
+        let extents_along = |axes: &Axes| extents(&axes.directions, model);
+        let mut extents = extents_along(&axes).ok_or(ViewError::NothingToSee)?;
+        if projection == Projection::Perspective
+            && let Some(parallel) = axes.parallel_if_far(&extents)
+        {
+            (axes, projection) = (parallel, Projection::Parallel);
+            extents = extents_along(&axes).unwrap_or(extents);
+        }
+        Self::of_extents(projection, axes, extents, reach(model), model.fraction_bits())
     }
 
     /// Computes the view of a model with these extents along the axes of the camera. `reach` is the
@@ -151,13 +159,12 @@ impl View {
     #[cfg_attr(feature = "tiles", inline(never))] // Both kinds of models share one copy.
     #[cfg_attr(not(feature = "tiles"), inline(always))]
     fn of_extents(
-        camera: &Camera,
+        projection: Projection,
         Axes { directions, origin }: Axes,
         extents: [(f64, f64); 3],
         reach: f64,
         fraction_bits: u32,
     ) -> Result<Self, ViewError> {
-        let projection = camera.lens.projection();
         let limit = f64::from(COORDINATE_LIMIT - 1);
         let shift = directions.map_each(|axis| -dot(axis, origin));
         let width = [0, 1]

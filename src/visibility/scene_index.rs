@@ -185,21 +185,16 @@ impl<I: Index> SceneIndex<'_, I> {
         Extent::around(corners.iter().map(|corner| self.coarse_projection.vertex(corner.vertex())))
     }
 
-    /// Whether two faces have two corners with the same view coordinates. Such faces do not cross
-    /// anywhere else.
+    /// Whether an edge of one of two faces has both ends at corners of the other one, as their view
+    /// coordinates tell. Such faces do not cross anywhere else. Faces whose common corners are no
+    /// such edge, as two squares with a common diagonal, may cross.
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
+        let [one, other] = [one, other].map_each(|face| self.outlines.element(face.first));
         let at = |corner: &Corner<I>| self.coarse_projection.vertex(corner.vertex());
-        let other = self.outlines.element(other.first);
-        if Self::HAS_SHORTCUTS {
-            // Most faces share the vertices themselves.
-            let has = |corner: &&Corner<I>| other.iter().any(|t| t.vertex() == corner.vertex());
-            if self.outlines.element(one.first).iter().filter(has).nth(1).is_some() {
-                return true;
-            }
-        }
-        let shared = |corner: &&Corner<I>| other.iter().any(|there| at(there) == at(corner));
-        let corners = self.outlines.element(one.first);
-        corners.iter().filter(shared).count() >= 2
+        // Most faces share the vertices themselves.
+        Self::HAS_SHORTCUTS && has_edge_of(one, other, &|a, b| a.vertex() == b.vertex())
+            || has_edge_of(one, other, &|a, b| at(a) == at(b))
+            || has_edge_of(other, one, &|a, b| at(a) == at(b))
     }
 
     /// Returns the plane of a face that is a single triangle, and `None` for any other face.
@@ -240,4 +235,18 @@ impl<I: Index> SceneIndex<'_, I> {
     pub fn triangles(&self, face: Face) -> impl Iterator<Item = [I; 3]> {
         (0..).map_while(move |number| self.triangle(face, number))
     }
+}
+
+/// Whether an edge of `face` has both ends at corners of `other`.
+fn has_edge_of<I: Index>(
+    face: &[Corner<I>],
+    other: &[Corner<I>],
+    is_same: &dyn Fn(&Corner<I>, &Corner<I>) -> bool,
+) -> bool {
+    let is_shared = |corner: &Corner<I>| other.iter().any(|there| is_same(corner, there));
+    let mut was_shared = face.last().is_some_and(is_shared);
+    face.iter().any(|corner| {
+        let is_shared = is_shared(corner);
+        core::mem::replace(&mut was_shared, is_shared) && is_shared
+    })
 }

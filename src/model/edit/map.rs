@@ -49,6 +49,14 @@ impl Map {
         Self::Affine(rows, Self::NO_SHIFT)
     }
 
+    /// How far a position is from the one on the plane of a reflection, along the axis on which
+    /// that is most; 0 for other maps.
+    pub(super) fn distance(&self, position: Position) -> u64 {
+        let Self::Reflection(on_plane, _) = self else { return 0 };
+        let pairs = position.coordinates().into_iter().zip(on_plane.coordinates());
+        pairs.map(|(p, q)| p.abs_diff(q).into()).max().unwrap_or(0)
+    }
+
     /// Returns the image of a position, rounded and limited to ±2^62.
     // Not inlined, so that its 128-bit arithmetic is in the program only once.
     #[inline(never)]
@@ -108,7 +116,8 @@ impl<I: Index> Model<'_, I> {
         let normal = cross.map(|part| part / divisor);
         let largest = normal.iter().map(|part| part.unsigned_abs()).max().unwrap_or(1);
         let excess = (u64::BITS - largest.leading_zeros()).saturating_sub(NORMAL_BITS);
-        Ok(Map::Reflection(corners[0], normal.map(|part| part >> excess)))
+        let half = 1i64.checked_shl(excess.wrapping_sub(1)).unwrap_or(0);
+        Ok(Map::Reflection(corners[0], normal.map(|part| part.saturating_add(half) >> excess)))
     }
 
     /// Maps the vertices in `range`, and makes the unit coarser if necessary.

@@ -9,7 +9,8 @@ use crate::stage::Scratch;
 use core::ops::Range;
 
 /// A vertex that differs from its image by at most this many units in each coordinate counts as on
-/// the plane, because of rounding.
+/// the plane, because of rounding. A 2^-25th of its distance from the first vertex of the plane is
+/// added, for the normal of the plane is rounded, too.
 const ON_PLANE: u64 = 16;
 
 impl<I: Index> Model<'_, I> {
@@ -27,7 +28,8 @@ impl<I: Index> Model<'_, I> {
         let mut count = old;
         for (at, image) in range.clone().zip(images.iter_mut()) {
             let Some(position) = self.vertices.get(at) else { continue };
-            let near = |(image, c): (i64, i32)| (image - i64::from(c)).unsigned_abs() <= ON_PLANE;
+            let most = ON_PLANE + (map.distance(*position) >> 25);
+            let near = |(image, c): (i64, i32)| (image - i64::from(c)).unsigned_abs() <= most;
             let stays = map.apply(*position).into_iter().zip(position.coordinates()).all(near);
             // The number fits a corner, otherwise the edit is refused below.
             *image = I::new(if stays { at } else { count });

@@ -15,9 +15,7 @@ mod unordered;
 
 pub(super) use lines::{Collector, PageSink, move_to_front};
 pub(super) use pipeline::{Found, Pipeline};
-#[cfg(feature = "tiles")]
-pub(super) use scale::fit;
-pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP};
+pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, fit};
 pub use strokes::{Cursor, Strokes};
 #[cfg(feature = "early-ink")]
 pub(super) use unordered::{Begun, OrderStep, UNORDERED_WORDS};

@@ -28,6 +28,10 @@ use crate::view::{Camera, Direction, Pose, View};
 use crate::visibility::{self, Crease};
 use core::fmt::{self, Write};
 
+/// How much less than `$crease` an edge may bend to be drawn, in degrees. The normals of faces are
+/// rounded by less, unless the faces are very small.
+const CREASE_MARGIN: f64 = 0.02;
+
 /// The options of a plot. `None` leaves the choice to penup.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlotOptions {
@@ -178,8 +182,11 @@ impl PlotOptions {
     /// The options of the visibility stage for `view`.
     #[inline(never)] // Inlined, its frame would take stack while a job is computed.
     pub fn visibility(&self, view: &View) -> visibility::Options {
+        // A little less than the angle, so that edges that bend by just as much are drawn from
+        // every eye, however the normals of their faces are rounded.
+        let bend = (self.crease - CREASE_MARGIN).max(0.0);
         let crease = (self.crease > 0.0).then(|| Crease {
-            cosine: libm::round(sin_cos_degrees(self.crease).1 * 32768.0) as i32,
+            cosine: libm::round(sin_cos_degrees(bend).1 * 32768.0) as i32,
             depth_stretch: view.depth_stretch(),
         });
         let with_hidden = self.hidden != HiddenLines::Erased;
