@@ -214,3 +214,28 @@ fn what_a_drawing_depends_on_must_be_as_it_was() {
         assert!(stopped(plotter).is_some());
     });
 }
+
+/// The notes of an attempt that was given up before its first stroke are not those of a later one
+/// with another setting.
+#[test]
+fn a_drawing_that_begins_anew_goes_on_with_the_settings_that_it_began_with() {
+    let options = ["$page=20x20", "$margin=4"];
+    let lines = job_lines("cube.obj", &[&QUICK_PEN[..], &options].concat());
+    let mut drawing = Drawing::of(&lines);
+    let job = drawing.from(0);
+    let mut random = Random::new(3);
+    let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+        plotter.order(&drawing.settings);
+        assert!(!send(plotter, &job, 0, 200, &mut random));
+        plotter.board.receive(b"\x18");
+        plotter.run(3000);
+        let [_, drawn, ..] = stopped(plotter).expect("it has stopped");
+        assert_eq!(drawn, 0);
+        plotter.order(&["$3=1".to_owned()]);
+        assert!(!send(plotter, &job, 0, 1500, &mut random));
+    });
+    switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
+        let [_, drawn, ..] = stopped(plotter).expect("it goes on with the setting that it had");
+        assert!(drawn > 0, "{drawn}");
+    });
+}

@@ -90,6 +90,14 @@ impl Machine<'_> {
         (is_end || (is_raised && over != open.noted)).then_some(strokes)
     }
 
+    /// Whether the moves of a job are planned to their end, but its last stroke is not noted yet.
+    /// Nothing else may begin then.
+    pub fn notes_last_stroke(&self) -> bool {
+        matches!(self.activity, Activity::Idle)
+            && self.log.open.is_some()
+            && (!self.is_stopped() || self.stroke_to_note().is_some())
+    }
+
     /// What [`Machine::stroke_to_note`] said has been noted.
     pub fn stroke_noted(&mut self) {
         let Some(open) = self.log.open else { return };
@@ -150,6 +158,11 @@ impl Machine<'_> {
 /// Without the feature, no stroke is noted.
 #[cfg(not(feature = "resume"))]
 impl Machine<'_> {
+    /// Whether the last stroke of a job is not noted yet: never.
+    pub const fn notes_last_stroke(&self) -> bool {
+        false
+    }
+
     /// Whether the machine waits until the stroke before has been noted: never.
     pub(super) const fn waits_for_log(&self) -> bool {
         let StrokeLog {} = self.log;

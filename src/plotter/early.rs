@@ -295,10 +295,9 @@ impl<I: Index> Inner<'_, I> {
         self.job = job;
         Self::make_room(listener, records::flash_bytes(&self.job))?;
         let is_kept = self.save(listener.board);
-        if is_kept {
-            // It has taken the place of a job that has stopped.
-            self.resumption.forget();
-        }
+        // It has taken the place of a job that has stopped. If it is not kept, its order must not
+        // be kept either, behind that other job.
+        self.resumption.forget();
         let measured = self.machine.begin_measuring();
         {
             let strokes = self.job.strokes(self.words, &mut self.cursor, None);
@@ -423,7 +422,8 @@ impl<I: Index> Inner<'_, I> {
         true
     }
 
-    /// Computes the order of a job that was loaded, if it is not known, and keeps it.
+    /// Computes the order of a job that was loaded, if it is not known, and keeps it. Returns the
+    /// number of strokes then, which was an estimate before.
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. The job stays kept as it was.
@@ -431,9 +431,9 @@ impl<I: Index> Inner<'_, I> {
     pub(super) fn complete_order<B: Board>(
         &mut self,
         listener: &mut Listener<'_, B>,
-    ) -> Result<(), CommandError> {
+    ) -> Result<Option<u32>, CommandError> {
         if self.job.unordered().is_none() {
-            return Ok(());
+            return Ok(None);
         }
         self.job = self.job.ordered(self.words, listener)?;
         let strokes = {
@@ -452,6 +452,6 @@ impl<I: Index> Inner<'_, I> {
         if kept.is_err() {
             records::say_not_kept(listener.board);
         }
-        Ok(())
+        Ok(Some(strokes))
     }
 }

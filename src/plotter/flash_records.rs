@@ -223,7 +223,12 @@ impl<F: MultiwriteNorFlash> FlashRecords<F> {
     pub fn note_progress(&mut self, strokes: u32) -> Result<(), NotStored> {
         let open = self.open.as_mut().ok_or(NotStored)?;
         if strokes == u32::MAX {
-            return open.log.close(&mut self.flash).map_err(|_| NotStored);
+            // The flash may refuse to clear a bit that is cleared.
+            if !open.noted.is_closed {
+                open.log.close(&mut self.flash).map_err(|_| NotStored)?;
+                open.noted.is_closed = true;
+            }
+            return Ok(());
         }
         open.log.note(&mut self.flash, open.noted.parts, strokes).map_err(|_| NotStored)?;
         open.noted.parts = open.noted.parts.max(strokes);

@@ -204,7 +204,7 @@ impl<'m, I: Index> Plotter<'m, I> {
         if self.hpgl.was_locked {
             return Outcome::Refused;
         }
-        if !machine.has_room() {
+        if !machine.has_room() || machine.notes_last_stroke() {
             return Outcome::Waits;
         }
         let (from, to, ink) = match action {

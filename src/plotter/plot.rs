@@ -79,7 +79,9 @@ impl<I: Index> Inner<'_, I> {
                 self.load_stopped(at_origin, listener.board).and_then(|stopped| match stopped {
                     StoppedJob::Loaded(drawn) => {
                         #[cfg(feature = "early-ink")]
-                        self.complete_order(&mut listener)?;
+                        if let Some(strokes) = self.complete_order(&mut listener)? {
+                            self.resumption.count_strokes(strokes);
+                        }
                         self.begin_rest(drawn, &mut listener)
                     }
                     StoppedJob::Sent => Ok(()),

@@ -83,7 +83,40 @@ pub(super) fn save_settings<B: Board>(
         let ([a, b], [c, d, e, f]) = (info.number().to_le_bytes(), value.to_bits().to_le_bytes());
         *entry = [a, b, c, d, e, f];
     }
-    board.save(Record::Settings, &[&bytes]).map_err(|_| CommandError::NotStored)
+    save_changed(Record::Settings, &[&bytes], board)
+}
+
+/// Saves a record, unless the board keeps just this already: each time wears the flash, and senders
+/// set what is set.
+///
+/// # Errors
+/// [`CommandError::NotStored`].
+fn save_changed<B: Board>(
+    record: Record,
+    parts: &[&[u8]],
+    board: &mut B,
+) -> Result<(), CommandError> {
+    // A board without the feature keeps nothing.
+    #[cfg(feature = "resume")]
+    {
+        let mut is_kept = false;
+        board.load(record, &mut |stored| is_kept = holds(stored, parts));
+        if is_kept {
+            return Ok(());
+        }
+    }
+    board.save(record, parts).map_err(|_| CommandError::NotStored)
+}
+
+/// Whether a record consists of just these parts.
+#[cfg(feature = "resume")]
+fn holds(stored: &mut dyn Stored, parts: &[&[u8]]) -> bool {
+    let mut is_next = |piece: &[u8]| {
+        let mut bytes = [0; 16];
+        let read = bytes.get_mut(..piece.len()).unwrap_or(&mut []);
+        stored.read(read) == piece.len() && read == piece
+    };
+    parts.iter().flat_map(|part| part.chunks(16)).all(&mut is_next) && stored.read(&mut [0]) == 0
 }
 
 /// A mark at the beginning of kept parameters; those with another layout have another mark. Behind
@@ -158,7 +191,7 @@ pub(super) fn save_parameters<B: Board>(
         &lengths[2],
         info.as_bytes(),
     ];
-    board.save(Record::Parameters, &parts).map_err(|_| CommandError::NotStored)
+    save_changed(Record::Parameters, &parts, board)
 }
 
 /// A mark at the beginning of a kept job; a job with another layout has another mark.

@@ -195,7 +195,8 @@ impl<I: Index> Inner<'_, I> {
     fn advance<B: Board>(&mut self, board: &mut B) -> Result<Progress, MachineError> {
         let machine = &mut self.machine;
         let is_stopped = machine.state() == State::Idle && machine.is_stopped();
-        let may_keep = is_stopped || machine.state() == State::Check;
+        let may_keep =
+            machine.is_stopped() && matches!(machine.state(), State::Idle | State::Check);
         match &mut self.task {
             Some(Task::Arc(from, arc)) if machine.has_room() => {
                 // The chord iterator is made anew for each chord. Keeping it, with the points that
@@ -220,6 +221,10 @@ impl<I: Index> Inner<'_, I> {
                 let text = if *for_pen { "put in the next pen, then" } else { "to go on," };
                 machine.pause()?;
                 machine.reset_ink_budget();
+                if *for_pen {
+                    // Without a T nobody knows which one it is, so the next drawing asks for its own.
+                    machine.set_pen(self.program.numbers().0.checked_sub(1).unwrap_or(u8::MAX));
+                }
                 Reply(board).line(format_args!("[MSG:{text} send ~]"));
                 Ok(Progress::Done(Ok(())))
             }
@@ -441,8 +446,10 @@ impl<I: Index> Inner<'_, I> {
         if self.waits_for_targets() {
             return true;
         }
-        // After ctrl-X and after a jog that was cancelled, lines wait until the machine stands.
+        // After ctrl-X and after a jog that was cancelled, lines wait until the machine stands, and
+        // behind a job until its last stroke is noted.
         self.task.is_some()
+            || self.machine.notes_last_stroke()
             || self.machine.state() == State::Abort
             || (self.machine.is_streaming() && !self.machine.has_room())
     }

@@ -171,6 +171,9 @@ impl<I: Index> Inner<'_, I> {
             _ => RealTime::default(),
         };
         self.machine.start_streamed(header.size, [header.least, header.greatest])?;
+        // A drawing in parts may have ended just before.
+        #[cfg(feature = "tiles")]
+        self.parts.end();
         self.copy_words = 0;
         self.job = Job::default();
         self.cursor = Cursor::default();

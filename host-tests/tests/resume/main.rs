@@ -6,7 +6,7 @@ mod refused;
 mod within_strokes;
 
 use penup::boards::host::{CutFlash, LAYOUT, Stamped};
-use penup::machine::Contacts;
+use penup::machine::{Contacts, State};
 use penup::plotter::Board as _;
 use penup::storage::{LogProgress, NOTE_BYTES};
 use penup_host_tests::cut_jobs::{
@@ -533,4 +533,77 @@ fn a_job_erases_each_sector_once_in_two_jobs() {
     let more: Vec<usize> =
         (0..before.len()).filter(|sector| flash.erasures[*sector] != before[*sector]).collect();
     assert_eq!(more, [LAYOUT.logs[1].start as usize / 4096]);
+}
+
+/// The plan of a job is complete before the pins have drawn all of it.
+#[test]
+fn what_comes_right_behind_a_job_leaves_no_stroke_unnoted() {
+    let lines = cube();
+    for next in ["G1 X5 Y5 F6000", "$J=X5 F6000", "IN;SP1;PU400,400;PD800,800;PU;", "$plot"] {
+        let (flash, _) = switch_on(empty_flash(), |plotter| {
+            plotter.order(&lines);
+            for _ in 0..600_000 {
+                plotter.plotter.poll(plotter.board);
+                let machine = plotter.plotter.machine();
+                if machine.state() == State::Idle {
+                    assert!(!machine.is_stopped(), "it is planned before it is drawn");
+                    break;
+                }
+                plotter.board.wait();
+            }
+            plotter.heard();
+            plotter.board.receive(format!("{next}\n").as_bytes());
+            plotter.finish();
+            let answer = plotter.heard();
+            assert!(!answer.contains("error"), "{next}: {answer}");
+            let status = plotter.status();
+            assert!(!status.contains("Stopped"), "{next}: {status}");
+        });
+        switch_on(flash.powered(), |plotter| {
+            let greeting = plotter.heard();
+            assert!(!greeting.contains("stopped"), "{next}: {greeting}");
+        });
+    }
+}
+
+/// Each time wears the flash, and senders set what is set.
+#[test]
+fn what_is_set_as_it_was_is_not_kept_anew() {
+    let (flash, _) = switch_on(empty_flash(), |plotter| {
+        plotter.order(&["$130=300", "G10 L2 P1 X5", "$N0=G21", "$I=mine"].map(str::to_owned));
+    });
+    let mut before = 0;
+    let (flash, _) = switch_on(flash.powered(), |plotter| {
+        before = plotter.board.flash().map_or(0, |flash| flash.budget);
+        for _ in 0..3 {
+            plotter.order(&["$130=300", "G10 L2 P1 X5", "$N0=G21", "$I=mine"].map(str::to_owned));
+        }
+        assert_eq!(plotter.board.flash().map(|flash| flash.budget), Some(before));
+        plotter.order(&["$130=301".to_owned()]);
+    });
+    assert!(flash.budget < before);
+    switch_on(flash.powered(), |plotter| {
+        plotter.heard();
+        assert!(plotter.say("$$").contains("$130=301.000\n"));
+    });
+}
+
+/// Who changes the pen between two parts of a drawing is asked for the one of the next part.
+#[test]
+fn a_job_goes_on_with_its_own_pen_behind_a_change_by_g_code() {
+    let lines = lattice("$hidden=erased");
+    let (flash, _) = cut_after_five_strokes(&lines);
+    switch_on(flash.powered(), |plotter| {
+        plotter.say("T2 M6");
+        plotter.finish();
+        plotter.say("~");
+        plotter.finish();
+        plotter.heard();
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        plotter.finish();
+        assert!(plotter.heard().contains("[MSG:put in pen 1, then send ~]"));
+        plotter.send("~");
+        plotter.finish();
+        assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
+    });
 }

@@ -171,6 +171,14 @@ impl Resumption {
         self.progress = None;
     }
 
+    /// The job has this many strokes, which was an estimate before.
+    #[cfg(feature = "early-ink")]
+    pub(in crate::plotter) const fn count_strokes(&mut self, strokes: u32) {
+        if let Some([_, all]) = &mut self.progress {
+            *all = strokes;
+        }
+    }
+
     /// Whether the board keeps how far the job comes.
     #[cfg(feature = "early-ink")]
     pub(in crate::plotter) fn keeps(&self) -> bool {
@@ -578,6 +586,7 @@ impl<I: Index> Inner<'_, I> {
             && let Some((notes, _)) = read(board)
             && is_streamed(&notes)
             && word(&notes, 4) == id
+            && self.check_notes(&notes).is_ok()
         {
             self.machine.log_strokes(0);
             self.resumption = Resumption {
