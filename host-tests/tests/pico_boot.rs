@@ -166,7 +166,7 @@ fn travel_is(line: &mut Line<Pico>, wanted: &str) -> Result<bool, Box<dyn Error>
     loop {
         match line.hear()? {
             heard if heard == "ok" => return Ok(is_found),
-            heard => is_found |= heard.starts_with(&format!("$130={wanted} ")),
+            heard => is_found |= heard == format!("$130={wanted}"),
         }
     }
 }

@@ -28,7 +28,7 @@ fn travel(line: &mut Line<Pico>) -> Result<String, Box<dyn Error>> {
             return travel.ok_or_else(|| "there is no $130".into());
         }
         if let Some(value) = heard.strip_prefix("$130=") {
-            travel = value.split(' ').next().map(str::to_owned);
+            travel = Some(value.to_owned());
         }
     }
 }
@@ -132,10 +132,7 @@ impl Watched {
 
 /// The line that changes the travel of x.
 fn changed(line: &str, travel: u32) -> String {
-    match line.strip_prefix("$130=").and_then(|rest| rest.split_once(' ')) {
-        Some((_, meaning)) => format!("$130={travel}.000 {meaning}"),
-        None => line.to_owned(),
-    }
+    if line.starts_with("$130=") { format!("$130={travel}.000") } else { line.to_owned() }
 }
 
 /// The number of power cuts: `PENUP_CUTS`, or else 100.

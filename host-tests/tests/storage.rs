@@ -272,7 +272,7 @@ fn settings_that_are_too_fast_are_kept_and_the_user_hears_how_fast_the_machine_i
     switch_on(flash, |plotter| {
         assert!(plotter.heard().contains(&held(7207)));
         let settings = plotter.say("$$");
-        for line in ["$110=32000.000 ", "$120=400.000 ", "$202=20000.000 "] {
+        for line in ["$110=32000.000\n", "$120=400.000\n", "$202=20000.000\n"] {
             assert!(settings.contains(line), "{settings}");
         }
         assert_eq!(plotter.say("$202=4000"), "ok\n");

@@ -222,7 +222,7 @@ impl<I: Index> Inner<'_, I> {
                 machine.pause()?;
                 machine.reset_ink_budget();
                 if *for_pen {
-                    // Without a T nobody knows which one it is, so the next drawing asks for its own.
+                    // Without a T nobody knows which one it is, so the next drawing asks.
                     machine.set_pen(self.program.numbers().0.checked_sub(1).unwrap_or(u8::MAX));
                 }
                 Reply(board).line(format_args!("[MSG:{text} send ~]"));
