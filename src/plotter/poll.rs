@@ -189,6 +189,14 @@ impl<I: Index> Plotter<'_, I> {
             self.reset(board);
         }
         self.inner.act(requests);
+        // Between two instructions of HP-GL the machine is idle and can hold at once. In other
+        // states this is refused.
+        #[cfg(feature = "hpgl")]
+        if (requests.has(RealTime::HOLD) || requests.has(RealTime::PAUSE))
+            && self.hpgl.port().is_some()
+        {
+            let _ = self.inner.machine.pause();
+        }
         if self.inner.takes_status(requests, board) {
             // Writing the report takes 10 ms, and so may what was done since the queue was last
             // filled.

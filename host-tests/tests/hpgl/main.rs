@@ -212,6 +212,28 @@ fn pens_are_asked_for_when_they_differ_and_status_tells_which() {
     assert_eq!(units(&bench), [[0, 0], [100, 0]]);
 }
 
+/// Whoever holds between two instructions has seen something go wrong.
+#[test]
+fn a_hold_between_two_instructions_stops_what_comes() {
+    for hold in [b"!", b"\xFB"] {
+        let mut bench = Bench::small();
+        bench.board.receive(b"IN;SP1;PU400,400;PD800,400;");
+        bench.work(3000);
+        assert_eq!(bench.plotter.machine().state(), State::Idle);
+        bench.board.receive(hold);
+        bench.work(10);
+        assert_eq!(bench.plotter.machine().state(), State::Hold { stopped: true });
+        let before = bench.plotter.machine().position();
+        bench.board.receive(b"PD800,800;PU;");
+        bench.work(3000);
+        assert_eq!(bench.plotter.machine().position(), before);
+        bench.board.receive(b"~");
+        bench.work(3000);
+        assert_ne!(bench.plotter.machine().position(), before);
+        assert_eq!(bench.plotter.machine().state(), State::Idle);
+    }
+}
+
 #[test]
 fn control_x_and_a_dollar_line_end_it() {
     let mut bench = Bench::small();
