@@ -45,6 +45,9 @@ const MOST_QUESTIONS: u32 = 30;
 /// else than was sent.
 const SURE_OF_OTHER_CONTENTS: u32 = 3;
 
+/// The longest time that the end of a conversation takes.
+const LONGEST_END: Duration = Duration::from_secs(3);
+
 /// A conversation with a plotter that answered and was idle when it began.
 pub struct Sender<'a> {
     link: &'a mut dyn Link,
@@ -270,8 +273,9 @@ impl<'a> Sender<'a> {
     pub fn end(mut self) {
         // A failure is ignored: the abort of the next sender has the same effect.
         let _ = self.send(&format!("{}\n", numbered(Some(self.done + 1), END)));
-        let start = self.link.now();
-        while self.since(start) < self.timeouts.reply {
+        // The time of the conversation may stand still: the plotter may be gone.
+        let (start, begin) = (self.link.now(), Instant::now());
+        while self.since(start) < self.timeouts.reply && begin.elapsed() < LONGEST_END {
             match self.listen() {
                 Ok(Some(Reply::Done(number) | Reply::Refused(number, _)))
                     if number == self.done + 1 =>
