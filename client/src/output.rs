@@ -1,5 +1,6 @@
-//! Writes output files atomically: completely or not at all. `-` is the standard output; after that
-//! the program says everything else on the standard error.
+//! Writes output files atomically: completely or not at all. `-` and `/dev/stdout` are the standard
+//! output; after that the program says everything else on the standard error. What a link leads to
+//! is replaced, and the link stays.
 
 use crate::error::Error;
 use crate::interrupt::while_unfinished;
@@ -43,6 +44,12 @@ pub fn check_outputs(outputs: &[&Path]) -> Result<(), Error> {
 /// The name that stands for the standard output.
 pub const STANDARD_OUTPUT: &str = "-";
 
+/// The name that the system gives it. It may lead to an ordinary file, which the shell has opened.
+const STANDARD_DEVICE: &str = "/dev/stdout";
+
+/// The folder of what the system has opened, or opens in a way of its own.
+const DEVICES: &str = "/dev";
+
 /// Whether a file was written to the standard output.
 static STANDARD_HOLDS_A_FILE: AtomicBool = AtomicBool::new(false);
 
@@ -53,11 +60,38 @@ pub fn standard_holds_a_file() -> bool {
 
 /// Whether `path` stands for the standard output.
 fn is_standard(path: &Path) -> bool {
-    path.as_os_str() == STANDARD_OUTPUT
+    [STANDARD_OUTPUT, STANDARD_DEVICE].into_iter().any(|name| path.as_os_str() == name)
+}
+
+/// The ways to write a file.
+#[derive(Debug, PartialEq, Eq)]
+enum Way {
+    /// To the standard output.
+    Standard,
+    /// Directly: pipes and the like, and what a link leads to that is not there yet.
+    Direct,
+    /// Under another name beside this path first.
+    Beside(PathBuf),
+}
+
+impl Way {
+    fn to(path: &Path) -> Self {
+        if is_standard(path) {
+            return Self::Standard;
+        }
+        let is_ordinary = fs::metadata(path).map_or(!path.is_symlink(), |there| there.is_file());
+        match is_ordinary && !path.starts_with(DEVICES) {
+            true => Self::Beside(path.canonicalize().unwrap_or_else(|_| path.to_owned())),
+            false => Self::Direct,
+        }
+    }
 }
 
 /// The canonical path of a file, which need not exist yet.
 fn identity(path: &Path) -> PathBuf {
+    if is_standard(path) {
+        return PathBuf::from(STANDARD_OUTPUT);
+    }
     let beside = || {
         let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
         let folder = folder.unwrap_or(Path::new(".")).canonicalize().ok()?;
@@ -71,14 +105,11 @@ fn try_to_write(path: &Path) -> io::Result<()> {
     if path.is_dir() || path.to_string_lossy().ends_with(is_separator) {
         return Err(io::ErrorKind::IsADirectory.into());
     }
-    if is_standard(path) {
-        return Ok(());
-    }
-    match fs::metadata(path) {
+    match Way::to(path) {
         // Pipes are not tested, because opening one would wait for its reader.
-        Ok(there) if !there.is_file() => Ok(()),
-        _ => {
-            let unfinished = unfinished(path)?;
+        Way::Standard | Way::Direct => Ok(()),
+        Way::Beside(path) => {
+            let unfinished = unfinished(&path)?;
             while_unfinished(&unfinished, || {
                 fs::write(&unfinished, []).and_then(|()| fs::remove_file(&unfinished))
             })
@@ -96,13 +127,13 @@ fn unfinished(path: &Path) -> io::Result<PathBuf> {
 
 /// Writes `bytes` to `path`. An existing file stays unchanged until the new one is complete.
 ///
-/// A file that is not an ordinary one, such as `/dev/stdout`, is written directly.
+/// A file that is not an ordinary one, such as a pipe, is written directly.
 ///
 /// # Errors
 /// The operating system's error, with the name of the file.
 pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
-    let result = match fs::metadata(path) {
-        _ if is_standard(path) => {
+    let result = match Way::to(path) {
+        Way::Standard => {
             STANDARD_HOLDS_A_FILE.store(true, Ordering::Relaxed);
             let mut stdout = io::stdout().lock();
             match stdout.write_all(bytes).and_then(|()| stdout.flush()) {
@@ -111,8 +142,8 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
                 written => written,
             }
         }
-        Ok(there) if !there.is_file() => fs::write(path, bytes),
-        _ => write_beside(path, bytes),
+        Way::Direct => fs::write(path, bytes),
+        Way::Beside(path) => write_beside(&path, bytes),
     };
     result.map_err(|source| Error::Write { file: path.display().to_string(), source })
 }
@@ -142,6 +173,32 @@ mod tests {
         write(&path, b"new").expect("written");
         assert_eq!(fs::read(&path).expect("readable"), b"new");
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_stays_and_leads_to_the_new_file() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = |name: &str| folder.path().join(name);
+        fs::create_dir(path("out")).expect("created");
+        fs::write(path("out/there.svg"), b"old").expect("written");
+        for name in ["there.svg", "new.svg"] {
+            std::os::unix::fs::symlink(Path::new("out").join(name), path(name)).expect("linked");
+            check_outputs(&[&path(name)]).expect("it can be written");
+            write(&path(name), b"drawing").expect("written");
+            assert!(path(name).is_symlink(), "{name}");
+            assert_eq!(fs::read(path("out").join(name)).expect("readable"), b"drawing", "{name}");
+        }
+        assert_eq!(fs::read_dir(path("out")).expect("listed").count(), 2);
+    }
+
+    #[test]
+    fn the_standard_output_has_two_names() {
+        assert_eq!(Way::to(Path::new("/dev/stdout")), Way::Standard);
+        assert_eq!(Way::to(Path::new("/dev/stderr")), Way::Direct);
+        let both = check_outputs(&[Path::new("-"), Path::new("/dev/stdout")]);
+        let error = both.expect_err("one file").to_string();
+        assert!(error.contains("are one file"), "{error}");
     }
 
     #[test]

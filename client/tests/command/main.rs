@@ -328,6 +328,24 @@ fn a_far_eye_and_a_near_one_are_drawn_or_refused_with_their_option() {
     }
 }
 
+/// The shell has opened the file to which `/dev/stdout` leads.
+#[cfg(unix)]
+#[test]
+fn the_name_of_the_standard_output_is_no_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nl 1 2\n").expect("written");
+    let out = folder.path().join("out.svg");
+    let status = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["preview", "a.obj", "--svg", "/dev/stdout"])
+        .current_dir(folder.path())
+        .stdout(fs::File::create(&out).expect("created"))
+        .status();
+    assert!(status.expect("the program runs").success());
+    let picture = fs::read_to_string(&out).expect("readable");
+    assert!(picture.starts_with("<") && picture.trim_end().ends_with("</svg>"), "{picture}");
+    assert!(std::path::Path::new("/dev/stdout").is_symlink());
+}
+
 /// Every command reads its file from a pipe that never ends, and is given up there.
 #[cfg(unix)]
 #[test]
