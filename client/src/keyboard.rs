@@ -3,7 +3,7 @@
 //! While a [`Keyboard`] exists, the terminal hands over each key at once and shows none. Ctrl-C
 //! still interrupts. The terminal is as before when the keyboard is dropped, or when the program
 //! ends by Ctrl-C. There is no keyboard where the standard input or the standard error is no
-//! terminal.
+//! terminal, or where another program has the terminal because this one runs in the background.
 
 use crate::link::UserRequest;
 
@@ -39,7 +39,8 @@ impl Key {
 #[cfg(unix)]
 mod terminal {
     use super::Key;
-    use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
+    use rustix::process::getpgrp;
+    use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcgetpgrp, tcsetattr};
     use std::io::{IsTerminal as _, Read as _, stderr, stdin};
     use std::sync::mpsc::{self, Receiver};
     use std::sync::{Mutex, PoisonError};
@@ -55,9 +56,14 @@ mod terminal {
     }
 
     impl Keyboard {
-        /// Takes the keys of the terminal; `None` if there is no terminal.
+        /// Takes the keys of the terminal; `None` if there is no terminal, or another program has
+        /// it.
         pub fn take() -> Option<Self> {
             if !stdin().is_terminal() || !stderr().is_terminal() {
+                return None;
+            }
+            // The system stops a program in the background that changes the modes.
+            if tcgetpgrp(stdin()).is_ok_and(|foreground| foreground != getpgrp()) {
                 return None;
             }
             let before = tcgetattr(stdin()).ok()?;

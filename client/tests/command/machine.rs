@@ -9,7 +9,7 @@ use library::{Library, pseudo_terminal, with_ports};
 use std::io::{Read as _, Write as _};
 use std::process::{Child, Stdio};
 use std::sync::atomic::Ordering;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 #[test]
 fn the_only_plotter_is_found_and_two_are_not_chosen_from() {
@@ -296,6 +296,41 @@ fn keys_pause_the_drawing_and_move_the_lowered_pen() {
     assert!(drawn.starts_with("rows.obj is drawn: 120 strokes, 12000.0 mm drawn"), "{drawn}");
     let (_, settings, _) = plotter.run(folder.path(), &["settings", "show"]);
     assert!(settings.contains("211 = 125"), "{settings}");
+}
+
+/// The system stops a program in the background that changes the modes of the terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_plot_in_the_background_is_drawn() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    fs::write(folder.path().join("a.obj"), "v 10 10 0\nv 60 10 0\nl 1 2\n").expect("written");
+    let (mut terminal, name) = pseudo_terminal();
+    let open = || fs::OpenOptions::new().read(true).write(true).open(&name).expect("opened");
+    let job = format!(
+        "set -m; '{}' plot a.obj --port {} & wait $!; echo it ends: $?",
+        env!("CARGO_BIN_EXE_penup"),
+        plotter.device
+    );
+    let mut shell = Command::new("setsid")
+        .args(["--ctty", "--wait", "sh", "-c", &job])
+        .current_dir(folder.path())
+        .stdin(open())
+        .stdout(open())
+        .stderr(open())
+        .spawn()
+        .expect("the shell runs");
+    let (mut said, mut buffer, begin) = (String::new(), [0; 256], Instant::now());
+    while !said.contains("it ends: ") && begin.elapsed() < Duration::from_secs(60) {
+        if let Ok(count) = terminal.read(&mut buffer) {
+            said += &String::from_utf8_lossy(&buffer[..count]);
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    // A hangup ends what is left of the job.
+    drop(terminal);
+    shell.wait().expect("it ends");
+    assert!(said.contains("a.obj is drawn") && said.contains("it ends: 0"), "{said}");
 }
 
 /// What a program has said when it has ended: its exit code, its answer and its notes.
