@@ -6,8 +6,10 @@
 //! is opened again as soon as it is there, and the plotter is asked until it answers.
 //!
 //! A plotter at a USB port greets whoever opens the port, as it does after a start. So a greeting
-//! is left out if the first report of the plotter's state tells that its job goes on.
+//! is left out if the first report of the plotter's state tells that it has not started again: its
+//! job goes on, or it still knows of one. An alarm tells itself what has happened.
 
+use penup_job::protocol::Reply;
 use std::collections::VecDeque;
 use std::io::{self, Read as _, Write as _};
 use std::time::{Duration, Instant};
@@ -312,10 +314,17 @@ fn first_report(bytes: &[u8]) -> Option<&[u8]> {
     whole.map(<[u8]>::trim_ascii).find(|line| line.starts_with(b"<"))
 }
 
-/// The bytes, without a greeting if the first report tells that a job goes on.
+/// The bytes, without a greeting if the first report tells that the plotter has not started again,
+/// or has stopped with an alarm.
 fn without_greeting(bytes: &[u8]) -> impl Iterator<Item = u8> {
-    let goes_on = first_report(bytes)
-        .is_some_and(|report| report.starts_with(b"<Run") || report.starts_with(b"<Hold"));
+    let report = first_report(bytes).map(String::from_utf8_lossy);
+    let goes_on = match report.map(|report| Reply::parse(&report)) {
+        Some(Reply::Status(status)) => {
+            let knows_job = status.strokes.is_some_and(|(_, all)| all > 0);
+            knows_job || matches!(status.state.as_str(), "Run" | "Hold" | "Alarm")
+        }
+        _ => false,
+    };
     let lines = bytes.split_inclusive(|byte| *byte == b'\n');
     let kept = lines.filter(move |line| !(goes_on && line.trim_ascii().starts_with(b"Grbl ")));
     kept.flatten().copied()
@@ -468,6 +477,11 @@ mod tests {
             ("ok\r\n<Hold:0|MPos:1,2,3>\r\n", true),
             ("<Idle|MPos:1,2,3>\r\n<Run|MPos:1,2,3>\r\n", false),
             ("<Run|MPos", false),
+            // The job has ended while the port was away, or was given up.
+            ("<Idle|MPos:1,2,3|Drawn:120/120|Ink:0/0|Left:0>\r\n", true),
+            ("ALARM:10\r\n<Alarm|MPos:1,2,3|Alarm:10|Drawn:0/0>\r\n", true),
+            // It has started again, and its flash knows of a job.
+            ("<Idle|MPos:1,2,3|Stopped:3/9|Drawn:0/0>\r\n", false),
             ("", false),
         ] {
             let expected = format!("{}{report}", if goes_on { "\r\n" } else { greeting });
