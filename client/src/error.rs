@@ -142,6 +142,12 @@ pub enum Error {
         /// The reason, and what to do.
         reason: String,
     },
+    /// The pen cannot be lowered where it stands.
+    #[error("cannot lower the pen: {reason}")]
+    NotLowered {
+        /// The reason, and what to do.
+        reason: String,
+    },
     /// The motion of a machine that is not Cartesian is not plotted.
     #[error("the motion is plotted for machines with setting 230=0 only: leave out --motion")]
     MotionOfOtherMachine,
@@ -462,6 +468,7 @@ impl Error {
             | Self::WithoutNumbers
             | Self::NotSet { .. }
             | Self::BeyondMemory { .. }
+            | Self::NotLowered { .. }
             | Self::Refused { .. } => REFUSED,
             Self::Silent { line: Some(_), .. }
             | Self::LostLine { .. }

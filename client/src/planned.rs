@@ -181,6 +181,8 @@ pub struct Steps {
     levels: Option<u8>,
     height: Option<u8>,
     heights: PenHeights,
+    /// How often the pen was lowered.
+    pub falls: usize,
     job: Option<JobSteps>,
 }
 
@@ -210,6 +212,7 @@ impl Steps {
             levels: None,
             height: None,
             heights: PenHeights::default(),
+            falls: 0,
             job: None,
         }
     }
@@ -274,6 +277,7 @@ impl Steps {
             return;
         }
         let down = self.heights.is_down(height);
+        self.falls += usize::from(down);
         let at = self.at;
         if let Some(job) = &mut self.job {
             job.path.set_pen(down);

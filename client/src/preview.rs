@@ -109,6 +109,16 @@ impl<I: Index> InMemory<I> {
         self.plotter.machine().settings()
     }
 
+    /// Records the path of the pen from now on, as from each plot command on.
+    pub fn record(&mut self) {
+        self.board.steps.begin(self.plotter.machine().settings());
+    }
+
+    /// How often the plotter has lowered its pen.
+    pub fn pen_falls(&self) -> usize {
+        self.board.steps.falls
+    }
+
     fn steps_per_mm(&self) -> [f64; 2] {
         self.settings().page_steps().map(|steps| steps.to_num::<f64>())
     }
@@ -332,7 +342,7 @@ impl<I: Index> Link for InMemory<I> {
             [PLOT, BEGIN_STREAM].into_iter().any(|command| part.starts_with(command.as_bytes()))
         };
         if bytes.split(|byte| *byte == b' ').any(begins) {
-            self.board.steps.begin(self.plotter.machine().settings());
+            self.record();
         }
         self.board.receive(bytes);
         self.answer();

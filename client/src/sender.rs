@@ -38,7 +38,7 @@ use std::time::{Duration, Instant};
 /// it.
 const MOST_RESTARTS: u32 = 5;
 
-/// The maximum number of queries for the checksums while no answer to them arrives.
+/// The maximum number of queries for what no answer has told yet.
 const MOST_QUESTIONS: u32 = 30;
 
 /// The number of differing answers after which the sender reports that the plotter holds something
@@ -67,6 +67,8 @@ pub struct Sender<'a> {
     position: String,
     /// The checksums of the model and of the options, once the plotter has confirmed them.
     contents: Option<[u32; 2]>,
+    /// The last status report, with what it does not tell from those before.
+    last_status: Status,
     /// Whether a machine that is locked after an alarm is no failure.
     allows_alarm: bool,
     /// What the user beside the plotter has asked for and has not been done yet.
@@ -111,6 +113,7 @@ impl<'a> Sender<'a> {
             strokes: 0,
             position: String::new(),
             contents: None,
+            last_status: Status::default(),
             allows_alarm: false,
             requests: VecDeque::new(),
         }
@@ -394,6 +397,11 @@ impl<'a> Sender<'a> {
             let bytes = buffer.get(..count).unwrap_or_default();
             self.replies.extend(bytes.iter().filter_map(|&byte| reader.push(byte)));
         }
-        Ok(self.replies.pop_front())
+        let mut reply = self.replies.pop_front();
+        if let Some(Reply::Status(status)) = &mut reply {
+            status.complete(&self.last_status);
+            self.last_status.clone_from(status);
+        }
+        Ok(reply)
     }
 }

@@ -29,7 +29,8 @@ pub const SETTINGS: &str = "$$";
 pub const HOME: &str = "$H";
 /// Unlocks the machine after an alarm, and wakes it.
 pub const UNLOCK: &str = "$X";
-/// Lowers the pen. The plotter raises it again when no more lines come.
+/// Lowers the pen, unless by the settings of the machine Z or S does it. The plotter raises it
+/// again when no more lines come.
 pub const PEN_DOWN: &str = "M3";
 /// Raises the pen.
 pub const PEN_UP: &str = "M5";
@@ -148,8 +149,8 @@ pub struct Status {
     pub seconds_left: Option<u64>,
     /// The stage that the plotter computes: view, visibility or order.
     pub stage: Option<String>,
-    /// The speeds in percent of those in the settings.
-    pub percent: u16,
+    /// The speeds in percent of those in the settings. Most reports do not tell them.
+    pub percent: Option<u16>,
     /// The letters of the contacts that are pressed: X, Y, and E for the emergency stop.
     pub contacts: String,
     /// Whether the plotter is computing a picture, during which it reads no lines.
@@ -158,8 +159,19 @@ pub struct Status {
     pub alarm: Option<u16>,
     /// The number of `Pen:number`, if the machine has stopped and waits for that pen.
     pub pen_wanted: Option<u8>,
-    /// The machine position as the plotter wrote it.
+    /// The machine position in mm; empty if the report does not tell it.
     pub position: String,
+    /// What the report tells in the coordinates of a program, if anything.
+    pub work: Option<Box<WorkCoordinates>>,
+}
+
+/// What a status report tells in the coordinates of a program, in mm.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct WorkCoordinates {
+    /// The position; empty if the report does not tell it.
+    pub position: String,
+    /// Where the origin of these coordinates is; empty in most reports.
+    pub offset: String,
 }
 
 impl Status {
@@ -171,6 +183,28 @@ impl Status {
     /// Whether the machine is locked after an alarm.
     pub fn is_alarm(&self) -> bool {
         self.state == "Alarm"
+    }
+
+    /// Takes what the report does not tell from an `earlier` one: the speeds, and what the position
+    /// depends on. The plotter reports both anew as soon as they change.
+    pub fn complete(&mut self, earlier: &Self) {
+        self.percent = self.percent.or(earlier.percent);
+        let work = self.work.get_or_insert_default();
+        if let Some(earlier) = &earlier.work
+            && work.offset.is_empty()
+        {
+            work.offset.clone_from(&earlier.offset);
+        }
+        let [at, from] = [&work.position, &work.offset].map(|text| numbers(text));
+        if self.position.is_empty() && !from.is_empty() {
+            let sums = at.into_iter().zip(from).map(|(at, from)| at + from);
+            self.position = in_words(sums);
+        }
+    }
+
+    /// Whether the report tells the machine position and the speeds.
+    pub fn is_complete(&self) -> bool {
+        self.percent.is_some() && !self.position.is_empty()
     }
 
     /// Whether the plotter is ready for a job.
@@ -241,6 +275,27 @@ fn parse_contents(text: &str) -> Option<[u32; 2]> {
 /// The machine states: those of Grbl that penup uses.
 const STATES: &[&str] = &["Idle", "Run", "Hold", "Jog", "Home", "Alarm", "Check", "Sleep", "Door"];
 
+/// Coordinates as numbers, up to the first that is none.
+fn numbers(text: &str) -> Vec<f64> {
+    text.split(',').map_while(|number| number.parse().ok()).collect()
+}
+
+/// Writes coordinates in mm as a plotter does.
+fn in_words(coordinates: impl Iterator<Item = f64>) -> String {
+    // A sum with zero has no negative zero.
+    let rounded = coordinates.map(|mm| (mm * 1000.0).round() / 1000.0 + 0.0);
+    rounded.map(|mm| format!("{mm:.3}")).collect::<Vec<_>>().join(",")
+}
+
+/// Coordinates of a report, in mm. Those in inches have four decimals, all others three.
+fn in_mm(text: &str) -> String {
+    let decimals = |number: &str| number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+    match text.split(',').all(|number| decimals(number) == 4) {
+        true => in_words(numbers(text).into_iter().map(|inches| inches * 25.4)),
+        false => text.to_owned(),
+    }
+}
+
 /// Parses a status report; `None` if it was corrupted on the line.
 fn parse_status(report: &str) -> Option<Status> {
     let mut fields = report.split('|');
@@ -261,7 +316,8 @@ fn parse_status(report: &str) -> Option<Status> {
     let is_standing = full_state == "Hold:0";
     let pen_wanted = field("Pen:").filter(|_| is_standing);
     let stage = field("Stage:");
-    Some(Status {
+    let coordinates = |name| field(name).map(in_mm).unwrap_or_default();
+    let mut status = Status {
         state,
         is_standing,
         strokes: done_of_all("Drawn:"),
@@ -270,13 +326,19 @@ fn parse_status(report: &str) -> Option<Status> {
         ink: done_of_all("Ink:"),
         seconds_left: field("Left:").and_then(|seconds| seconds.parse().ok()),
         stage: stage.map(str::to_owned),
-        percent: percent.unwrap_or(100),
+        percent,
         contacts: field("Pn:").unwrap_or_default().to_owned(),
         is_computing: stage.is_some(),
         alarm: field("Alarm:").and_then(|alarm| alarm.parse().ok()),
         pen_wanted: pen_wanted.and_then(|pen| pen.parse().ok()),
-        position: field("MPos:").unwrap_or_default().to_owned(),
-    })
+        position: coordinates("MPos:"),
+        work: Some(Box::new(WorkCoordinates {
+            position: coordinates("WPos:"),
+            offset: coordinates("WCO:"),
+        })),
+    };
+    status.complete(&Status::default());
+    Some(status)
 }
 
 /// Assembles received bytes into replies. Lines that are longer than any reply are truncated.
@@ -360,7 +422,10 @@ mod tests {
             (run.strokes, run.ink, run.seconds_left),
             (Some((3, 12)), Some((40, 90)), Some(75))
         );
-        assert_eq!((run.percent, run.contacts.as_str(), run.stage.as_deref()), (120, "XE", None));
+        assert_eq!(
+            (run.percent, run.contacts.as_str(), run.stage.as_deref()),
+            (Some(120), "XE", None)
+        );
         assert!(
             status("<Hold:0|MPos:1,2>").is_standing && !status("<Hold:1|MPos:1,2>").is_standing
         );
@@ -371,8 +436,37 @@ mod tests {
         let computing = status("<Run|MPos:0,0,0|Stage:order>");
         assert_eq!(
             (computing.stage.as_deref(), computing.ink, computing.percent),
-            (Some("order"), None, 100)
+            (Some("order"), None, None)
         );
+    }
+
+    #[test]
+    fn a_position_is_that_of_the_machine_in_millimetres() {
+        let status = |line| match Reply::parse(line) {
+            Reply::Status(status) => status,
+            other => panic!("{other:?}"),
+        };
+        let with_offset =
+            status("<Idle|WPos:1.500,-7.000,0.000|WCO:5.000,7.000,0.000|Ov:90,100,100>");
+        assert_eq!(
+            (with_offset.position.as_str(), with_offset.is_complete()),
+            ("6.500,0.000,0.000", true)
+        );
+        for (report, position) in [
+            ("<Idle|MPos:7.500,20.500,0.000>", "7.500,20.500,0.000"),
+            ("<Idle|MPos:0.2953,-0.8071,0.0000>", "7.501,-20.500,0.000"),
+            ("<Idle|WPos:1.000,2.000,0.000>", "6.000,9.000,0.000"),
+            ("<Idle|WPos:0.0984,0.0000,0.0000|WCO:0.1969,0.2756,0.0000>", "7.500,7.000,0.000"),
+        ] {
+            let mut status = status(report);
+            status.complete(&with_offset);
+            assert_eq!(
+                (status.position.as_str(), status.percent),
+                (position, Some(90)),
+                "{report}"
+            );
+        }
+        assert!(status("<Idle|WPos:1.000,2.000,0.000>").position.is_empty());
     }
 
     #[test]

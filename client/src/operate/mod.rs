@@ -1,6 +1,7 @@
 //! The commands that ask or move a plotter: what `penup status`, `penup watch` and the others do.
 
 mod console;
+mod lowering;
 mod orders;
 mod rehearsal;
 mod settings;

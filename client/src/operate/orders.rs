@@ -1,5 +1,7 @@
 //! The commands that move the machine, stop it, or follow what it draws.
 
+use super::lowering::PenLines;
+use super::settings::read;
 use super::status::{as_json, described};
 use super::{converse, open};
 use crate::cli::{
@@ -12,7 +14,7 @@ use crate::plot::KNOWS_PLACE;
 use crate::progress::{Bar, Progress};
 use crate::sender::{Sender, Timeouts};
 use penup::protocol::CommandError;
-use penup_job::protocol::{HOME, PEN_DOWN, PEN_UP, Status, UNLOCK};
+use penup_job::protocol::{HOME, PEN_UP, Status, UNLOCK};
 use std::io::{self, Write as _};
 use std::sync::atomic::AtomicBool;
 
@@ -127,29 +129,38 @@ pub fn unlock(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Err
 /// The way leads beyond the travel, or as [`Sender::ask`].
 pub fn jog(args: &JogArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let _moving = MovingPlotter::new();
-    let line = format!("$J=G91 X{} Y{} F{}", args.x, args.y, args.speed);
-    let status = converse(&args.plotter, interrupt, |sender| {
-        sender.ask(&line)?;
-        sender.wait_until_ready()
-    })?;
+    let status =
+        converse(&args.plotter, interrupt, |sender| jog_by(sender, [args.x, args.y], args.speed))?;
     Ok(done(&format!("the pen is at {} mm", status.position), &status))
+}
+
+/// Moves the raised pen by so many mm, at this speed in mm/min, and waits until it is there.
+pub(super) fn jog_by(
+    sender: &mut Sender<'_>,
+    [x, y]: [f64; 2],
+    speed: f64,
+) -> Result<Status, Error> {
+    // A startup line may have chosen inches.
+    sender.ask(&format!("$J=G21G91 X{x} Y{y} F{speed}"))?;
+    sender.wait_until_ready()
 }
 
 /// Raises or lowers the pen.
 ///
 /// # Errors
-/// As [`Sender::ask`].
+/// The machine has a laser, or as [`Sender::ask`].
 pub fn pen(args: &PenArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let _moving = MovingPlotter::new();
-    let (line, text) = match args.to {
-        PenPosition::Up => (PEN_UP, "the pen is up"),
-        PenPosition::Down => (PEN_DOWN, "the pen was down, and is up again"),
-    };
-    let status = converse(&args.plotter, interrupt, |sender| {
-        sender.ask(line)?;
-        sender.wait_until_ready()
-    })?;
-    Ok(done(text, &status))
+    converse(&args.plotter, interrupt, |sender| match args.to {
+        PenPosition::Up => {
+            sender.ask(PEN_UP)?;
+            Ok(done("the pen is up", &sender.wait_until_ready()?))
+        }
+        PenPosition::Down => {
+            let pen = PenLines::of(&read(sender)?)?;
+            Ok(done("the pen was down, and is up again", &pen.dip(sender)?))
+        }
+    })
 }
 
 /// Prints each new status as a line of JSON.

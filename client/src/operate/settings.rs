@@ -11,6 +11,7 @@ use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::sender::Sender;
+use penup::machine::Setting;
 use penup_job::protocol::{BUILD, Reply, SETTINGS};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -177,6 +178,13 @@ pub(crate) fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Erro
         let settings: Vec<_> = replies.iter().filter_map(setting_in).collect();
         Ok(Some(settings).filter(|settings| !settings.is_empty()))
     })
+}
+
+/// The value of a setting that was read.
+pub(super) fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
+    let number = setting.info().number();
+    let own = settings.iter().find(|it| it.number == number);
+    own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
 }
 
 /// The setting that a line such as `$100=80.000 (steps per mm of x, step/mm)` tells.

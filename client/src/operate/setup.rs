@@ -10,8 +10,10 @@ mod directions;
 mod polargraph;
 
 use self::answers::{Answers, say};
+use super::lowering::PenLines;
 use super::open;
-use super::settings::{as_json, change, read};
+use super::orders::jog_by;
+use super::settings::{as_json, change, read, value};
 use super::squares::{self, MARGIN};
 use crate::cli::PlotterArgs;
 use crate::error::Error;
@@ -21,7 +23,7 @@ use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
 use crate::sender::{Sender, Timeouts};
 use penup::machine::Setting;
-use penup_job::protocol::{HOME, PEN_DOWN, Status};
+use penup_job::protocol::{HOME, Status};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -67,13 +69,6 @@ impl Machine {
             _ => Self::Polargraph,
         }
     }
-}
-
-/// The value of a setting that was read.
-fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
-    let number = setting.info().number();
-    let own = settings.iter().find(|it| it.number == number);
-    own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
 }
 
 /// The setup of one machine.
@@ -132,6 +127,8 @@ impl Setup<'_> {
         let settings = self.on(&mut link, interrupt, |setup, sender| {
             let settings = read(sender)?;
             setup.before.clone_from(&settings);
+            // Without a pen that goes down there is nothing to set up.
+            PenLines::of(&settings)?;
             say("Keep a hand at the switch of the motor supply.");
             Ok(settings)
         })?;
@@ -230,6 +227,7 @@ impl Setup<'_> {
         settings: &[AssignedSetting],
         part: u8,
     ) -> Result<(), End> {
+        let pen = PenLines::of(settings)?;
         say(&format!(
             "{part} of 5: heights of the pen, from 0 (raised) to 127 (lowered). Lay paper below \
              the pen. After each answer it goes down for a moment and up again."
@@ -240,8 +238,7 @@ impl Setup<'_> {
         ] {
             let mut height = value(settings, setting);
             loop {
-                sender.ask(PEN_DOWN)?;
-                sender.wait_until_ready()?;
+                pen.dip(sender)?;
                 let question =
                     format!("{what}: it is {height} now. Which height? (Enter keeps it)");
                 let Some(new) = self.answers.number(&question, [0.0, 127.0])? else { break };
@@ -321,9 +318,8 @@ impl Setup<'_> {
 }
 
 /// Moves the raised pen, and waits until it is there.
-fn jog(sender: &mut Sender<'_>, [x, y]: [f64; 2]) -> Result<Status, Error> {
-    sender.ask(&format!("$J=G91 X{x} Y{y} F{SPEED}"))?;
-    sender.wait_until_ready()
+fn jog(sender: &mut Sender<'_>, by: [f64; 2]) -> Result<Status, Error> {
+    jog_by(sender, by, SPEED)
 }
 
 /// Opens the port of a plotter that was switched off and on.

@@ -31,7 +31,8 @@ pub fn ports(_: &PortsArgs) -> Result<Outcome, Error> {
 /// Nothing answers, or something other than penup does.
 pub fn status(args: &PlotterArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.port)?;
-    let (_, status) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
+    let (mut sender, _) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
+    let status = sender.status()?;
     Ok(Outcome::answer(described(&status), as_json(&status)))
 }
 
@@ -80,8 +81,8 @@ pub(super) fn described(status: &Status) -> String {
     if let Some(seconds) = status.seconds_left.filter(|seconds| *seconds > 0) {
         lines.push(format!("{} are left", duration(seconds)));
     }
-    if status.percent != 100 {
-        lines.push(format!("the speeds are at {} %", status.percent));
+    if let Some(percent) = status.percent.filter(|percent| *percent != 100) {
+        lines.push(format!("the speeds are at {percent} %"));
     }
     if !status.contacts.is_empty() {
         lines.push(format!("these contacts are pressed: {}", status.contacts));

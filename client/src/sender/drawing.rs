@@ -135,10 +135,10 @@ impl Sender<'_> {
     /// Returns the status, in which no job has stopped that could go on. The plotter notes the last
     /// stroke a moment after the machine is at rest, so it is asked again.
     fn fail_if_stopped(&mut self) -> Result<Status, Error> {
-        let mut status = self.status()?;
+        let mut status = self.find_state()?;
         for _ in 0..2 {
             if status.stopped.is_some() {
-                status = self.status()?;
+                status = self.find_state()?;
             }
         }
         match status.stopped {

@@ -1,7 +1,7 @@
 //! Orders to a machine: pause, resume, give up, and single lines with their answers.
 
 use super::drawing::REPORTS_BEFORE_REPEAT;
-use super::{Sender, Timeouts};
+use super::{MOST_QUESTIONS, Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
 use crate::progress::Quiet;
@@ -43,12 +43,21 @@ impl<'a> Sender<'a> {
         Ok((sender, status))
     }
 
-    /// Asks for the status.
+    /// Asks for the status, until a report tells all of it: most do not tell the speeds, or by the
+    /// settings where the machine is.
     ///
     /// # Errors
     /// As [`Sender::join`].
     pub fn status(&mut self) -> Result<Status, Error> {
-        self.find_state()
+        let mut status = self.find_state()?;
+        for _ in 0..MOST_QUESTIONS {
+            // A plotter that computes may take its time to answer.
+            if status.is_complete() || status.is_computing {
+                break;
+            }
+            status = self.find_state()?;
+        }
+        Ok(status)
     }
 
     /// Pauses the machine, and returns its status when it is at rest with the pen up. With
@@ -163,7 +172,8 @@ impl<'a> Sender<'a> {
     /// The machine stops with an alarm, or the plotter falls silent.
     pub fn wait_until_ready(&mut self) -> Result<Status, Error> {
         self.allows_alarm = false;
-        self.wait_until(Status::is_idle)
+        self.wait_until(Status::is_idle)?;
+        self.status()
     }
 
     /// Waits for a status report that `is_enough`.
@@ -172,7 +182,7 @@ impl<'a> Sender<'a> {
     }
 
     /// Asks for the status until `watch` returns true for one.
-    fn wait_watching(
+    pub(super) fn wait_watching(
         &mut self,
         watch: &mut dyn FnMut(&mut Self, &Status) -> Result<bool, Error>,
     ) -> Result<Status, Error> {

@@ -112,6 +112,57 @@ fn the_machine_moves_is_set_and_refuses_in_its_words() {
     );
 }
 
+/// Most reports do not tell the speeds.
+#[test]
+fn the_speeds_are_told_at_any_time() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let mut port = serialport::new(&plotter.device, 115_200).open().expect("opened");
+    port.write_all(b"\x91").expect("sent");
+    while plotter.heard.load(Ordering::Relaxed) == 0 {}
+    drop(port);
+    for _ in 0..3 {
+        let (_, status) = plotter.json(folder.path(), &["status"]);
+        assert_eq!(status["speed_percent"], 110, "{status}");
+    }
+}
+
+/// A laser is on only while it moves.
+#[test]
+fn a_pen_that_nothing_lowers_is_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let run = |arguments: &[&str]| plotter.run(folder.path(), arguments);
+    assert_eq!(run(&["set", "32=1"]).0, Some(0));
+    let (code, _, error) = run(&["pen", "down"]);
+    assert_eq!(code, Some(4), "{error}");
+    assert!(error.contains("cannot lower the pen") && error.contains("set 32=0"), "{error}");
+}
+
+/// Reports may be in inches, and in the coordinates of a program alone.
+#[test]
+fn positions_are_millimetres_whatever_the_plotter_reports() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    // A startup line chooses inches, and the origin of programs is elsewhere.
+    console(&plotter, "$N0=G20\n");
+    console(&plotter, "G21G10L2P1X5Y7\n");
+    for settings in [["10=3", "13=0"], ["10=3", "13=1"], ["10=2", "13=0"], ["10=0", "13=1"]] {
+        let (code, _, error) = plotter.run(folder.path(), &[&["set"], &settings[..]].concat());
+        assert_eq!(code, Some(0), "{error}");
+        for (by, expected) in [(["10", "20.5"], [10.0, 20.5]), (["-10", "-20.5"], [0.0, 0.0])] {
+            let (code, moved) = plotter.json(folder.path(), &["jog", by[0], by[1]]);
+            assert_eq!(code, Some(0), "{settings:?}: {moved}");
+            for told in [moved, plotter.json(folder.path(), &["status"]).1] {
+                for (axis, expected) in expected.iter().enumerate() {
+                    let at = told["position_mm"][axis].as_f64().expect("a number");
+                    assert!((at - expected).abs() < 0.003, "{settings:?}: {told}");
+                }
+            }
+        }
+    }
+}
+
 /// The emergency stop is pressed by the real-time byte 0xFD.
 #[test]
 fn an_abort_says_that_the_machine_is_locked() {

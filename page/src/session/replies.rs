@@ -182,9 +182,7 @@ impl Session {
             self.strokes = all;
         }
         self.place = status.position.split(',').filter_map(|c| c.parse().ok()).collect();
-        if raw.contains("|Ov:") {
-            self.percent = status.percent;
-        }
+        self.percent = status.percent.unwrap_or(self.percent);
         self.events.push(Event::Status {
             state: status.state.clone(),
             position: self.place.clone(),

@@ -1,8 +1,9 @@
 //! The setup of a polargraph. Its pen can only be moved along a line once the plotter knows where
 //! the motors are, so the machine is measured and the pen is brought to the origin first.
 
+use super::super::settings::value;
 use super::answers::say;
-use super::{End, Machine, Setup, expect_origin, reopened, value};
+use super::{End, Machine, Setup, expect_origin, reopened};
 use crate::cli::PlotterArgs;
 use crate::link::SerialLink;
 use crate::machine_settings::AssignedSetting;

@@ -39,6 +39,19 @@ fn a_machine_is_set_up_by_questions() {
     assert_eq!(status["strokes"], serde_json::json!({ "done": 1, "all": 1 }));
 }
 
+#[test]
+fn a_machine_is_set_up_whatever_it_reports_and_whatever_lowers_its_pen() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for settings in [["10=0", "13=1", "206=2"], ["10=2", "13=0", "206=3"]] {
+        let plotter = Library::new();
+        let (code, _, error) = plotter.run(folder.path(), &[&["set"], &settings[..]].concat());
+        assert_eq!(code, Some(0), "{error}");
+        let (code, said, noted) = set_up(&plotter, "\nright\nup\n\n\n\n\n\n\n\nyes\n");
+        assert_eq!(code, Some(0), "{settings:?}: {noted}");
+        assert_eq!(said["settings"], serde_json::json!({}), "{noted}");
+    }
+}
+
 /// The motors of a polargraph are 1000 mm apart; the left one runs the wrong way.
 #[test]
 fn a_polargraph_is_set_up_by_its_own_measures() {
