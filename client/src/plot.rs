@@ -193,7 +193,8 @@ impl Plot<'_> {
         )]);
         self.send(sender, &streamed, self.args.from, passes, progress)?;
         // Strokes that were left out once are drawn from then on.
-        let whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
+        let mut whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
+        whole.ask_for_first_pen();
         for left in (1..passes).rev() {
             self.send(sender, &whole, 0, left, progress)?;
         }
@@ -264,15 +265,17 @@ impl Plot<'_> {
     ) -> Result<(), Error> {
         let mut followed = StrokeCounter { progress, begun: 0 };
         let sent = sender.draw_streamed(streamed, &mut followed);
-        let begun = followed.begun;
-        if sent.is_err() && begun > 0 {
-            // The last stroke that was begun may not be whole.
-            let left_out = u64::from(from) + begun - 1;
+        if let Err(error) = &sent {
             let is_repeated = self.args.passes.multipass > 1;
-            self.note(&[match (self.args.resume, is_repeated.then_some(passes)) {
-                (true, _) => GO_ON_AGAIN.to_owned(),
-                (false, passes) => go_on_from(left_out, passes),
-            }]);
+            let passes = is_repeated.then_some(passes);
+            let go_on = match (is_lost(error, streamed.form()), self.args.resume) {
+                (true, _) => Some(TAKE_UP.to_owned()),
+                (false, _) if followed.begun == 0 => None,
+                (false, true) => Some(GO_ON_AGAIN.to_owned()),
+                // The last stroke that was begun may not be whole.
+                (false, false) => Some(go_on_from(u64::from(from) + followed.begun - 1, passes)),
+            };
+            self.note(go_on.as_slice());
         }
         sent
     }
@@ -336,6 +339,15 @@ pub const KNOWS_PLACE: &str =
 
 /// What the user is told who goes on with a drawing once more.
 const GO_ON_AGAIN: &str = "to go on at the stroke that was begun last, do the same again";
+
+/// What the user is told when the plotter is gone and waits for more strokes.
+const TAKE_UP: &str = "the plotter draws what it has, and then waits for the rest with the pen up: \
+                       once it answers, do the same again, or with --resume if its power was gone";
+
+/// Whether the error leaves a plotter behind that waits for the rest of a drawing in this form.
+fn is_lost(error: &Error, form: Form) -> bool {
+    form == Form::Strokes && matches!(error, Error::Link(_) | Error::Silent { .. })
+}
 
 /// What the user is told who leaves out strokes that are drawn, in the first of these passes that
 /// are left.

@@ -46,17 +46,47 @@ pub struct StreamedJob {
     form: Form,
     /// All lines, one behind the other.
     text: String,
-    /// Where each line begins in the text, and the number of targets before it.
-    begins: Vec<(usize, u32)>,
+    /// Where each line begins.
+    begins: Vec<LineBegin>,
     /// The lines of G-code behind which the machine waits for a pen.
     pen_lines: Vec<usize>,
     /// These pens, counted from 1.
     pens: Vec<u8>,
+    /// The pen that is in at the beginning, counted from 1.
+    first_pen: u8,
     /// The header that is sent before the strokes.
     header: StreamHeader,
     /// The number of lines after the first one that are not sent, because the plotter already has
     /// them.
     skipped: usize,
+}
+
+/// Where a line begins.
+#[derive(Debug, Clone, Copy)]
+struct LineBegin {
+    /// Where in the text.
+    at: usize,
+    /// What came before the line.
+    before: Counts,
+}
+
+/// A part of a drawing, counted.
+#[derive(Debug, Clone, Copy, Default)]
+struct Counts {
+    targets: u32,
+    /// The strokes that have begun.
+    strokes: u32,
+    /// The pen of the last target, if it is down there.
+    lowered: Option<u8>,
+}
+
+impl Counts {
+    fn add(&mut self, StreamedTarget { target, pen }: &StreamedTarget) {
+        let lowered = target.ink.map(|_| *pen);
+        self.strokes += u32::from(lowered.is_some() && lowered != self.lowered);
+        self.lowered = lowered;
+        self.targets += 1;
+    }
 }
 
 /// Reads a path and the pen of each of its targets.
@@ -90,7 +120,8 @@ impl StreamedJob {
         }
         let (text, begins) = (String::new(), Vec::new());
         let (pen_lines, pens) = (Vec::new(), Vec::new());
-        let mut job = Self { form, text, begins, pen_lines, pens, header, skipped: 0 };
+        let (first_pen, skipped) = (1, 0);
+        let mut job = Self { form, text, begins, pen_lines, pens, first_pen, header, skipped };
         match form {
             Form::Strokes => job.write_strokes(path),
             Form::GCode => job.write_gcode(settings, path)?,
@@ -102,22 +133,23 @@ impl StreamedJob {
         Ok(job)
     }
 
-    fn push_line(&mut self, line: &str, targets_before: u32) {
-        self.begins.push((self.text.len(), targets_before));
+    fn push_line(&mut self, line: &str, before: Counts) {
+        self.begins.push(LineBegin { at: self.text.len(), before });
         self.text.push_str(line);
     }
 
     fn write_strokes(&mut self, path: &mut dyn Path) {
-        let (mut writer, mut count, mut before) = (StrokeWriter::default(), 0, 0);
+        let (mut writer, mut count) = (StrokeWriter::default(), Counts::default());
+        let mut before = count;
         for_each(path, &mut |target| {
+            count.add(&target);
             writer.push(target);
-            count += 1;
             if writer.bytes() >= LINE_BYTES {
                 self.push_line(&writer.end_line(), before);
                 before = count;
             }
         });
-        if before < count {
+        if before.targets < count.targets {
             self.push_line(&writer.end_line(), before);
         }
         // The number does not depend on where the pen is when it begins.
@@ -128,29 +160,35 @@ impl StreamedJob {
         let header = self.header.line();
         // The first line is the header.
         self.text.insert_str(0, &header);
-        self.begins.iter_mut().for_each(|(begin, _)| *begin += header.len());
-        self.begins.insert(0, (0, 0));
+        self.begins.iter_mut().for_each(|begin| begin.at += header.len());
+        self.begins.insert(0, LineBegin { at: 0, before: Counts::default() });
     }
 
     fn write_gcode(&mut self, settings: &Settings, path: &mut dyn Path) -> Result<(), StreamError> {
         let steps = settings.page_steps();
         let mut failure = None;
-        let (mut pen, mut motion, mut count) = (None, "", 0);
+        let (mut pen, mut motion, mut count) = (None, "", Counts::default());
         // The modes are set to millimetres, absolute positions, speeds in mm/min and the usual
         // plane, whatever an earlier program has left.
-        self.push_line("G21G90G94G17", 0);
-        for_each(path, &mut |StreamedTarget { target, pen: number }| {
+        self.push_line("G21G90G94G17", count);
+        for_each(path, &mut |streamed| {
+            let StreamedTarget { target, pen: number } = streamed;
             if pen.is_some_and(|pen| pen != number) {
                 self.push_line(&format!("T{}M6", number + 1), count);
                 self.pen_lines.push(self.begins.len() - 1);
                 self.pens.push(number + 1);
+            }
+            if pen.is_none() {
+                self.first_pen = number + 1;
             }
             pen = Some(number);
             match target.ink {
                 None | Some(LineType::Full) => {}
                 Some(_) => failure = Some(StreamError::LineType),
             }
-            let next = if target.ink.is_some() { "G1" } else { "G0" };
+            // A plotter that waits for a second takes the program to be at its end, and G1 would
+            // then draw nothing if it came alone without M3.
+            let next = if target.ink.is_some() { "G1M3" } else { "G0M5" };
             // Each block is in the machine's own coordinates, whatever coordinate system is chosen.
             let mut line = String::from("G53");
             if next != motion {
@@ -169,7 +207,7 @@ impl StreamedJob {
                 let _ = write!(line, "{}", written.unwrap_or_else(|| format!("{exact:.6}")));
             }
             self.push_line(&line, count);
-            count += 1;
+            count.add(&streamed);
         });
         self.push_line("M2", count);
         failure.map_or(Ok(()), Err)
@@ -193,13 +231,31 @@ impl StreamedJob {
     /// Gives the drawing another number, by which a plotter knows the whole of which it is the
     /// rest. As G-code it has none.
     pub fn set_id(&mut self, id: u32) {
-        let (Form::Strokes, Some(&(end, _))) = (self.form, self.begins.get(1)) else { return };
+        let (Form::Strokes, Some(&LineBegin { at: end, .. })) = (self.form, self.begins.get(1))
+        else {
+            return;
+        };
         self.header.id = id;
         let header = self.header.line();
         self.text.replace_range(..end, &header);
-        for (begin, _) in self.begins.iter_mut().skip(1) {
-            *begin = *begin + header.len() - end;
+        for begin in self.begins.iter_mut().skip(1) {
+            begin.at = begin.at + header.len() - end;
         }
+    }
+
+    /// Has the machine wait for the first pen, because another one is in. Strokes name their pens,
+    /// so this is needed for G-code only, and only if there are several pens.
+    pub fn ask_for_first_pen(&mut self) {
+        let Some(begin) = self.begins.get(1).copied().filter(|_| !self.pens.is_empty()) else {
+            return;
+        };
+        let change = format!("T{}M6", self.first_pen);
+        self.text.insert_str(begin.at, &change);
+        self.begins.iter_mut().skip(1).for_each(|begin| begin.at += change.len());
+        self.begins.insert(1, begin);
+        self.pen_lines.iter_mut().for_each(|line| *line += 1);
+        self.pen_lines.insert(0, 1);
+        self.pens.insert(0, self.first_pen);
     }
 
     /// The number of targets: of points, those to which the pen moves without drawing among them.
@@ -222,8 +278,15 @@ impl StreamedJob {
     /// Returns the share of the targets of the drawing that the first `lines` lines contain, 0 to
     /// 1.
     pub fn share(&self, lines: usize) -> f64 {
-        let targets = self.begins.get(lines + self.skipped).map_or(self.targets(), |(_, n)| *n);
+        let begin = self.begins.get(lines + self.skipped);
+        let targets = begin.map_or(self.targets(), |begin| begin.before.targets);
         f64::from(targets) / f64::from(self.targets().max(1))
+    }
+
+    /// Returns the number of strokes of which the first `lines` lines contain a part.
+    pub fn strokes_begun(&self, lines: usize) -> u32 {
+        let begin = self.begins.get(lines + self.skipped);
+        begin.map_or(self.header.size.strokes, |begin| begin.before.strokes)
     }
 
     /// Leaves out the header and the lines with the first `targets` targets, which the plotter has.
@@ -235,7 +298,7 @@ impl StreamedJob {
         }
         let is_all = targets == self.targets();
         // The header has no targets either.
-        let found = self.begins.iter().skip(1).position(|(_, before)| *before == targets);
+        let found = self.begins.iter().skip(1).position(|begin| begin.before.targets == targets);
         match found {
             Some(line) => self.skipped = line + 1,
             None if is_all => self.skipped = self.begins.len(),
@@ -252,8 +315,8 @@ impl Lines for StreamedJob {
 
     fn line(&self, index: usize) -> Option<JobLine> {
         let index = index.checked_add(self.skipped)?;
-        let (begin, _) = *self.begins.get(index)?;
-        let end = self.begins.get(index + 1).map_or(self.text.len(), |(end, _)| *end);
+        let begin = self.begins.get(index)?.at;
+        let end = self.begins.get(index + 1).map_or(self.text.len(), |next| next.at);
         self.text.get(begin..end).map(JobLine::command)
     }
 }

@@ -15,7 +15,7 @@ use std::time::Instant;
 const MOST_RESENDS: u32 = 200;
 
 /// The state of sending a sequence of lines.
-struct Delivery<'l> {
+struct Delivery<'l, 'j> {
     lines: &'l dyn Lines,
     /// The number of the line before the first one.
     base: i32,
@@ -35,10 +35,10 @@ struct Delivery<'l> {
     /// there is room for another line.
     reads_no_lines: bool,
     /// Whether the lines are drawn while they are sent, and how.
-    streaming: Option<Streaming<'l>>,
+    streaming: Option<&'l mut Streaming<'j>>,
 }
 
-impl Delivery<'_> {
+impl Delivery<'_, '_> {
     fn line(&self, number: i32) -> Option<JobLine> {
         line_of(self.lines, self.base, number)
     }
@@ -82,7 +82,7 @@ impl Sender<'_> {
     pub(super) fn deliver_as(
         &mut self,
         lines: &dyn Lines,
-        streaming: Option<Streaming<'_>>,
+        streaming: Option<&mut Streaming<'_>>,
         progress: &mut dyn Progress,
         watch: &mut dyn FnMut(&Reply),
     ) -> Result<(), Error> {
@@ -161,7 +161,7 @@ impl Sender<'_> {
     }
 
     /// Sends as many lines as fit into the plotter's receive queue.
-    fn fill_queue(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
+    fn fill_queue(&mut self, delivery: &mut Delivery<'_, '_>) -> Result<(), Error> {
         while delivery.requested_at.is_none()
             && let Some(line) = delivery.line(delivery.sent + 1)
         {
@@ -185,7 +185,12 @@ impl Sender<'_> {
         Ok(())
     }
 
-    fn advance(&mut self, number: i32, delivery: &mut Delivery<'_>, progress: &mut dyn Progress) {
+    fn advance(
+        &mut self,
+        number: i32,
+        delivery: &mut Delivery<'_, '_>,
+        progress: &mut dyn Progress,
+    ) {
         delivery.forget_up_to(number);
         if number > self.done {
             self.done = number;
@@ -200,7 +205,7 @@ impl Sender<'_> {
     }
 
     /// Asks for the number of the last accepted line. Nothing else is sent until it arrives.
-    fn ask_for_last_number(&mut self, delivery: &mut Delivery<'_>) -> Result<(), Error> {
+    fn ask_for_last_number(&mut self, delivery: &mut Delivery<'_, '_>) -> Result<(), Error> {
         delivery.resends += 1;
         if delivery.resends > MOST_RESENDS {
             let line = delivery.line(self.done + 1).map(Box::new);
@@ -215,14 +220,13 @@ impl Sender<'_> {
     fn follow(
         &mut self,
         status: &Status,
-        delivery: &mut Delivery<'_>,
+        delivery: &mut Delivery<'_, '_>,
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         progress.state(&status.state);
-        let waits = |streaming: &Streaming<'_>| streaming.waits(status);
         delivery.reads_no_lines = status.is_computing
             || status.state == "Home"
-            || delivery.streaming.as_ref().is_some_and(waits);
+            || delivery.streaming.as_ref().is_some_and(|streaming| streaming.waits(status));
         if delivery.reads_no_lines {
             // The plotter reads no line until it has computed the picture or is homed.
             delivery.last_progress = self.link.now();

@@ -1,6 +1,7 @@
 //! Draws what was sent, or follows a job that runs: waits for its end, and asks for the report on
 //! it.
 
+use super::streaming::Streaming;
 use super::{MOST_RESTARTS, Sender};
 use crate::error::Error;
 use crate::link::{Answer, UserRequest};
@@ -85,7 +86,7 @@ impl Sender<'_> {
         let lines = [JobLine::command(PLOT)];
         self.begin_plot(&lines, progress)?;
         let base = self.done - 1;
-        self.follow_drawing(Some(&lines), progress)?;
+        self.follow_drawing(Some(&lines), None, progress)?;
         self.confirm(&lines, base)?;
         self.fail_if_stopped().map(drop)
     }
@@ -113,7 +114,7 @@ impl Sender<'_> {
         let lines = [JobLine::command(command)];
         self.deliver(&lines, &mut Quiet)?;
         let base = self.done - 1;
-        self.follow_drawing(Some(&lines), progress)?;
+        self.follow_drawing(Some(&lines), None, progress)?;
         self.confirm(&lines, base)?;
         self.fail_if_stopped().map(drop)
     }
@@ -125,7 +126,16 @@ impl Sender<'_> {
     /// The machine stops with an alarm or before the end of the job, stays in feed hold, or falls
     /// silent.
     pub fn watch(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
-        let status = self.follow_drawing(None, progress)?;
+        self.watch_sent(None, progress)
+    }
+
+    /// As [`Sender::watch`], where this program has `sent` the drawing as G-code.
+    pub(super) fn watch_sent(
+        &mut self,
+        sent: Option<&mut Streaming<'_>>,
+        progress: &mut dyn Progress,
+    ) -> Result<Status, Error> {
+        let status = self.follow_drawing(None, sent, progress)?;
         if status.stopped.is_some() {
             return self.fail_if_stopped();
         }
@@ -148,10 +158,12 @@ impl Sender<'_> {
     }
 
     /// Asks for the status until the machine is idle, and lets it go on after pauses. `began` are
-    /// the lines that began the drawing, if this program has sent them.
+    /// the lines that began the drawing, if this program has sent them. Of a drawing that was `sent`
+    /// as G-code, it knows more than the plotter.
     fn follow_drawing(
         &mut self,
         began: Option<&[JobLine; 1]>,
+        mut sent: Option<&mut Streaming<'_>>,
         progress: &mut dyn Progress,
     ) -> Result<Status, Error> {
         let command = &|| began.map(|[line]| line.clone());
@@ -164,6 +176,10 @@ impl Sender<'_> {
             self.obey(&mut followed, numbers, progress)?;
             match self.listen()? {
                 Some(Reply::Status(status)) => {
+                    let status = match &mut sent {
+                        Some(streaming) => streaming.told(status, streaming.job.count()),
+                        None => status,
+                    };
                     progress.state(&status.state);
                     if let Some((_, all)) = status.strokes {
                         progress.drawn(&status);

@@ -1,6 +1,6 @@
 //! Sends a drawing that this computer has computed, while it is drawn.
 
-use super::drawing::FollowedDrawing;
+use super::drawing::{FollowedDrawing, Numbers};
 use super::{Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
@@ -35,6 +35,10 @@ pub struct Stopped {
     pub is_lost: bool,
 }
 
+/// The greatest number of lines of G-code that a plotter has taken and not carried out: it plans 15
+/// moves ahead, and reads some lines beyond them.
+const MOST_PLANNED: usize = 20;
+
 /// The state of a drawing while its lines are sent.
 pub(super) struct Streaming<'j> {
     /// The lines of the drawing.
@@ -52,11 +56,10 @@ impl Streaming<'_> {
     /// Whether the plotter, according to its status, cannot take another line before the pen has
     /// moved on.
     pub fn waits(&self, status: &Status) -> bool {
-        match (self.job.form(), status.stream) {
-            (Form::Strokes, Some([_, _, room])) => (room as usize) < MOST_TARGETS,
-            (Form::Strokes, None) => false,
+        match self.job.form() {
+            Form::Strokes => is_full(status),
             // A move waits for room among those that are planned.
-            (Form::GCode, _) => matches!(status.state.as_str(), "Run" | "Hold"),
+            Form::GCode => matches!(status.state.as_str(), "Run" | "Hold"),
         }
     }
 
@@ -70,7 +73,9 @@ impl Streaming<'_> {
         let share = self.job.share(done);
         let part = |all: u64| ((all as f64 * share) as u64, all);
         let seconds = size.milliseconds as f64 * (1.0 - share) / 1000.0;
-        status.strokes = Some(part(size.strokes.into()));
+        // The last moves that the plotter has taken may still wait.
+        let begun = self.job.strokes_begun(done.saturating_sub(MOST_PLANNED));
+        status.strokes = Some((begun.into(), size.strokes.into()));
         status.ink = Some(part(size.drawn >> 18));
         status.seconds_left = Some(seconds as u64);
         // Lines behind the change are taken before the pen is in.
@@ -83,6 +88,11 @@ impl Streaming<'_> {
         }
         status
     }
+}
+
+/// Whether the plotter has no room for another line of strokes, and so reads none.
+fn is_full(status: &Status) -> bool {
+    status.stream.is_some_and(|[_, _, room]| (room as usize) < MOST_TARGETS)
 }
 
 impl<'a> Sender<'a> {
@@ -101,7 +111,9 @@ impl<'a> Sender<'a> {
         if status.stream.is_none() {
             return Ok(None);
         }
-        sender.begin_numbers(None)?;
+        if !sender.begin_numbers_beside_strokes()? {
+            return Ok(None);
+        }
         for _ in 0..super::MOST_QUESTIONS {
             let replies = match sender.ask(STREAM) {
                 Ok(replies) => replies,
@@ -115,6 +127,35 @@ impl<'a> Sender<'a> {
             }
         }
         Ok(None)
+    }
+
+    /// Begins the numbers of lines anew while strokes are drawn. Returns false if their drawing has
+    /// ended meanwhile.
+    fn begin_numbers_beside_strokes(&mut self) -> Result<bool, Error> {
+        loop {
+            if self.wait_for_room()?.stream.is_none() {
+                return Ok(false);
+            }
+            match self.begin_numbers(None) {
+                // The plotter still had lines, which have filled its memory again.
+                Err(Error::LostLine { .. }) if is_full(&self.find_state()?) => {}
+                begun => return begun.map(|()| true),
+            }
+        }
+    }
+
+    /// Waits until the plotter has room for more strokes, because it reads no line before that.
+    /// Lets the machine go on after pauses meanwhile. Returns the last status.
+    fn wait_for_room(&mut self) -> Result<Status, Error> {
+        let mut followed = FollowedDrawing::default();
+        self.wait_watching(&mut |sender, status| {
+            if !is_full(status) {
+                return Ok(true);
+            }
+            sender.obey(&mut followed, Numbers::InUse, &mut Quiet)?;
+            sender.wait_or_resume(status, &mut followed)?;
+            Ok(false)
+        })
     }
 
     /// Whether the plotter, which has these settings, takes strokes, or only G-code.
@@ -174,13 +215,13 @@ impl<'a> Sender<'a> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         self.strokes = job.size().strokes.into();
-        let streaming =
+        let mut streaming =
             Streaming { job, followed: FollowedDrawing::default(), pens_in: 0, waited: false };
-        self.deliver_as(job, Some(streaming), progress, &mut |_| {})?;
+        self.deliver_as(job, Some(&mut streaming), progress, &mut |_| {})?;
         match job.form() {
             Form::Strokes => self.watch(progress)?,
-            // The plotter knows only of what it has not drawn yet.
-            Form::GCode => self.watch(&mut Quiet)?,
+            // The plotter knows only of what it has not drawn yet, and not of the pens.
+            Form::GCode => self.watch_sent(Some(&mut streaming), &mut Quiet)?,
         };
         Ok(())
     }
@@ -202,4 +243,225 @@ fn taken_in(reply: &Reply) -> Option<Taken> {
     let mut next = || numbers.next()?.parse::<u32>().ok();
     let (id, targets, _) = (next()?, next()?, next()?);
     Some(Taken { id, targets, strokes: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::link::Answer;
+    use crate::preview::InMemory;
+    use penup::board_table::LM3S6965;
+    use penup_job::protocol::HOLD;
+    use penup_job::room::Room;
+    use penup_readers::lines::{JobLine, Lines as _};
+    use std::collections::VecDeque;
+    use std::io;
+    use std::time::{Duration, Instant};
+
+    /// A plotter in memory whose line breaks off for three seconds behind this line.
+    struct Stalling {
+        plotter: InMemory<u32>,
+        left: usize,
+        said: VecDeque<u8>,
+        /// The pens that were asked for.
+        pens: Vec<u8>,
+    }
+
+    impl Stalling {
+        fn behind(left: usize) -> Self {
+            let plotter = InMemory::new(Room::usual(), Settings::default());
+            Self { plotter, left, said: VecDeque::new(), pens: Vec::new() }
+        }
+    }
+
+    impl Link for Stalling {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.plotter.send(bytes)?;
+            if bytes.starts_with(b"N") {
+                self.left = self.left.wrapping_sub(1);
+                let begin = self.plotter.now();
+                while self.left == 0 && self.plotter.now() - begin < Duration::from_secs(3) {
+                    let mut buffer = [0; 64];
+                    let count = self.plotter.receive(&mut buffer, Duration::from_millis(100))?;
+                    self.said.extend(&buffer[..count]);
+                }
+            }
+            Ok(())
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+            match self.said.is_empty() {
+                true => self.plotter.receive(buffer, timeout),
+                false => io::Read::read(&mut self.said, buffer),
+            }
+        }
+
+        fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+            self.pens.push(pen);
+            self.plotter.change_pen(pen)
+        }
+
+        fn now(&self) -> Instant {
+            self.plotter.now()
+        }
+    }
+
+    /// A drawing as G-code.
+    fn gcode(lines: &[&str]) -> StreamedJob {
+        let lines: Vec<_> = lines.iter().map(|line| JobLine::command(*line)).collect();
+        let mut host = InMemory::<u32>::new(Room::usual(), Settings::default());
+        assert!(host.take(&lines), "all lines are accepted");
+        host.streamed(Form::GCode, 0).expect("a drawing").0
+    }
+
+    /// Draws jobs one after the other. Returns the length that was inked, and the pens that were
+    /// asked for.
+    fn draw(mut plotter: Stalling, jobs: &[&StreamedJob]) -> (f64, Vec<u8>) {
+        plotter.plotter.record();
+        let interrupt = AtomicBool::new(false);
+        let mut sender =
+            Sender::open(&mut plotter, Timeouts::simulated(), &interrupt).expect("a plotter");
+        for job in jobs {
+            sender.draw_streamed(job, &mut Quiet).expect("it is drawn");
+        }
+        sender.end();
+        let runs = plotter.plotter.drawn().runs;
+        let length = |points: &[[f64; 2]]| -> f64 {
+            points
+                .windows(2)
+                .map(|ends| f64::hypot(ends[1][0] - ends[0][0], ends[1][1] - ends[0][1]))
+                .sum()
+        };
+        let inked = runs.iter().filter(|run| run.pen_down).map(|run| length(&run.points));
+        (inked.sum(), plotter.pens)
+    }
+
+    #[test]
+    fn gcode_loses_no_line_of_a_drawing_when_the_line_breaks_off() {
+        let job = gcode(&[
+            "v 10 10 0",
+            "v 14 10 0",
+            "v 14 13 0",
+            "v 20 20 0",
+            "v 25 20 0",
+            "l 1 2 3",
+            "l 4 5",
+        ]);
+        // A line sets modes, two end the program, and two lead to the beginnings.
+        assert_eq!(job.count(), 7);
+        for line in 0..=job.count() {
+            let (inked, _) = draw(Stalling::behind(line), &[&job]);
+            assert!((inked - 12.0).abs() < 0.05, "behind line {line}: {inked}");
+        }
+    }
+
+    #[test]
+    fn the_next_pass_begins_with_the_first_pen() {
+        let lines =
+            ["v 10 10 0", "v 14 10 0", "v 14 13 0", "usemtl pen1", "l 1 2", "usemtl pen2", "l 2 3"];
+        let (first, mut next) = (gcode(&lines), gcode(&lines));
+        next.ask_for_first_pen();
+        assert_eq!(draw(Stalling::behind(0), &[&first]).1, [2]);
+        assert_eq!(draw(Stalling::behind(0), &[&first, &next]).1, [2, 1, 2]);
+        // With one pen nobody is asked.
+        let mut single = gcode(&["v 10 10 0", "v 14 10 0", "l 1 2"]);
+        single.ask_for_first_pen();
+        assert!(draw(Stalling::behind(0), &[&single]).1.is_empty());
+    }
+
+    #[test]
+    fn no_stroke_is_told_that_the_plotter_may_not_have_drawn() {
+        let mut lines: Vec<String> =
+            (0..200).map(|n| format!("v {} {} 0", 10 + n / 2, 10 + n % 2)).collect();
+        lines.extend((0..100).map(|n| format!("v {} 50 0", 10 + n)));
+        lines.extend((1..200).map(|n| format!("l {n} {}", n + 1)));
+        lines.extend((0..50).map(|n| format!("l {} {}", 201 + 2 * n, 202 + 2 * n)));
+        let job = gcode(&lines.iter().map(String::as_str).collect::<Vec<_>>());
+        let mut streaming = Streaming {
+            job: &job,
+            followed: FollowedDrawing::default(),
+            pens_in: 0,
+            waited: false,
+        };
+        let mut begun = 0;
+        let mut counts = Vec::new();
+        let mut is_down = false;
+        for (done, line) in job.in_order().enumerate() {
+            counts.push(begun);
+            let told = streaming.told(Status::default(), done).strokes.expect("strokes");
+            assert_eq!(told, (counts[done.saturating_sub(20)], 51), "line {done}");
+            is_down = if line.sent.contains("G0") { false } else { is_down };
+            if line.sent.contains("G1M3") && !is_down {
+                (begun, is_down) = (begun + 1, true);
+            }
+        }
+        assert_eq!(begun, 51);
+    }
+
+    /// A plotter in memory that holds, and whose client goes after 200 s of its time.
+    struct Holding {
+        plotter: InMemory<u16>,
+        began: Instant,
+        is_client_here: bool,
+        has_held: bool,
+    }
+
+    impl Link for Holding {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.plotter.send(bytes)?;
+            if bytes.windows(3).any(|part| part == b"$s=") && !self.has_held {
+                self.has_held = true;
+                self.plotter.send(&[HOLD])?;
+            }
+            Ok(())
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+            let is_late = self.plotter.now() - self.began > Duration::from_secs(200);
+            if self.is_client_here && is_late {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            self.plotter.receive(buffer, timeout)
+        }
+
+        fn change_pen(&mut self, _: u8) -> io::Result<bool> {
+            Ok(true)
+        }
+
+        fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {
+            Ok(if self.is_client_here || first { Answer::NotYet } else { Answer::Yes })
+        }
+
+        fn now(&self) -> Instant {
+            self.plotter.now()
+        }
+    }
+
+    /// A plotter whose memory is full reads no line before it has drawn more.
+    #[test]
+    fn a_drawing_is_joined_that_holds_with_a_full_memory() {
+        let mut lines: Vec<String> =
+            (0..6000).map(|n| format!("v {} {} 0", 10 + n % 100, 10 + n / 50)).collect();
+        lines.extend((1..6000).map(|n| format!("l {n} {}", n + 1)));
+        let lines: Vec<_> = lines.iter().map(JobLine::command).collect();
+        let room = Room::for_job(&lines);
+        let mut host = InMemory::<u32>::new(room, Settings::default());
+        assert!(host.take(&lines), "all lines are accepted");
+        let (mut job, _) = host.streamed(Form::Strokes, 0).expect("a drawing");
+        let room = Room::of_board(&LM3S6965);
+        let plotter = InMemory::<u16>::new(room, Settings::default());
+        let began = plotter.now();
+        let mut link = Holding { plotter, began, is_client_here: true, has_held: false };
+        let interrupt = AtomicBool::new(false);
+        let mut sender =
+            Sender::open(&mut link, Timeouts::default(), &interrupt).expect("a plotter");
+        let error = sender.draw_streamed(&job, &mut Quiet).expect_err("the client goes");
+        assert!(matches!(error, Error::Link(_)), "{error}");
+        drop(sender);
+        link.is_client_here = false;
+        let joined = Sender::rejoin(&mut link, Timeouts::default(), &interrupt);
+        let (mut sender, taken) = joined.expect("it answers").expect("it waits for strokes");
+        assert!(taken.id == job.id() && job.skip(taken.targets), "{taken:?}");
+        sender.draw_streamed(&job, &mut Quiet).expect("it is drawn");
+    }
 }

@@ -166,6 +166,23 @@ fn a_port_that_stays_away_ends_the_waiting_in_time() {
     }
 }
 
+/// The plotter waits for the rest, and no option is needed to go on.
+#[test]
+fn a_port_that_stays_away_while_strokes_are_sent_is_told_as_such() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let client = plotter.plot_rows(folder.path(), &["--compute", "host", "--rejoin", "1"]);
+    plotter.slow.store(true, Ordering::Relaxed);
+    while plotter.heard.load(Ordering::Relaxed) < 1000 {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    drop(plotter);
+    let (code, _, noted) = ended(client);
+    assert_eq!(code, Some(5), "{noted}");
+    assert!(noted.contains("once it answers, do the same again"), "{noted}");
+    assert!(!noted.contains("--from"), "{noted}");
+}
+
 #[test]
 fn a_job_that_a_loss_of_power_has_stopped_is_not_taken_for_done() {
     let folder = tempfile::tempdir().expect("a folder");
