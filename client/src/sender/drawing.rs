@@ -158,8 +158,8 @@ impl Sender<'_> {
     }
 
     /// Asks for the status until the machine is idle, and lets it go on after pauses. `began` are
-    /// the lines that began the drawing, if this program has sent them. Of a drawing that was `sent`
-    /// as G-code, it knows more than the plotter.
+    /// the lines that began the drawing, if this program has sent them. The plotter knows less than
+    /// this program of a drawing that was `sent` as G-code.
     fn follow_drawing(
         &mut self,
         began: Option<&[JobLine; 1]>,
