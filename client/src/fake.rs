@@ -238,7 +238,7 @@ impl FakePlotter {
             }
             Received::Line(SETTINGS, label) => {
                 for (info, value) in Settings::default().iter() {
-                    self.say(&format!("${}={value} ({})", info.number(), info.name));
+                    self.say(&format!("${}={value}", info.number()));
                 }
                 self.reply(Ok(()), label);
             }

@@ -205,8 +205,8 @@ fn strangers_and_busy_plotters_are_left_alone() {
 fn a_restart_or_an_alarm_ends_the_job() {
     let (error, _) = failure(Fault::RestartsAt(3));
     assert!(error.contains("gave up in the middle of the job"), "{error}");
-    let (error, _) = failure(Fault::AlarmWhileDrawing(2));
-    assert!(error.contains("alarm 2, which this program does not know"), "{error}");
+    let (error, _) = failure(Fault::AlarmWhileDrawing(3));
+    assert!(error.contains("alarm 3, which this program does not know"), "{error}");
     let (error, _) = failure(Fault::AlarmWhileDrawing(10));
     assert!(error.contains("alarm 10: the emergency stop is pressed"), "{error}");
     assert!(error.contains("\nRelease the stop"), "{error}");

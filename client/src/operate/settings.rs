@@ -187,7 +187,7 @@ pub(super) fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
     own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
 }
 
-/// The setting that a line such as `$100=80.000 (steps per mm of x, step/mm)` tells.
+/// The setting that a line such as `$100=80.000` tells. Firmware of before has its name behind it.
 fn setting_in(reply: &Reply) -> Option<AssignedSetting> {
     let Reply::Other(line) = reply else { return None };
     let assignment = line.strip_prefix('$')?.split(' ').next()?;
