@@ -16,7 +16,7 @@ use crate::source::Source;
 use penup_job::Job;
 use penup_job::protocol::{
     ABORT, AS_SET, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, LAST_NUMBER, PEN_DOWN, PEN_UP, RESUME,
-    ReplyReader, SLOWER, STATUS_QUERY, numbered,
+    ReplyReader, SLOWER, STATUS_QUERY, UNLOCK, numbered,
 };
 use penup_job::results::JobReport;
 use penup_job::twin;
@@ -218,8 +218,10 @@ impl Session {
     /// # Errors
     /// A sentence for the user: the session is doing something else.
     pub fn command(&mut self, text: &str) -> Result<(), String> {
-        if text == "$X" && self.phase == Phase::Alarm {
-            self.out.extend(b"\n$X\n");
+        if text == UNLOCK && self.phase == Phase::Alarm {
+            // Once lines have had numbers, the plotter refuses those that have none.
+            self.begin_numbers();
+            self.out.extend(format!("{}\n", numbered(Some(1), UNLOCK)).bytes());
             self.enter(Phase::Finding);
             return Ok(());
         }

@@ -34,6 +34,14 @@ pub fn refusal(line: Option<&JobLine>, number: u16, messages: &[String]) -> Stri
     for_page(&text)
 }
 
+/// The buttons of the page for the lines that a cure of an alarm tells to send.
+const BUTTONS: [(&str, &str); 4] = [
+    ("send $X", "press Unlock"),
+    ("send $H", "press Unlock, then Home"),
+    ("with $H", "with Home"),
+    ("or $X if", "or Unlock alone if"),
+];
+
 /// Says what an alarm means and what to do about it.
 pub fn alarm(number: u16, messages: &[String]) -> String {
     let said = if messages.is_empty() {
@@ -43,11 +51,13 @@ pub fn alarm(number: u16, messages: &[String]) -> String {
     };
     let entries = alarm_entries();
     match entries.iter().find(|entry| u16::from(entry.number) == number) {
-        Some(AlarmEntry { cause, cure, .. }) => format!(
-            "The plotter stopped with alarm {number}: {}.{said} What to do: {}.",
-            cause.get(),
-            cure.get()
-        ),
+        Some(AlarmEntry { cause, cure, .. }) => {
+            let cure = BUTTONS
+                .iter()
+                .fold(cure.get().to_owned(), |cure, (line, button)| cure.replace(line, button));
+            let cause = cause.get();
+            format!("The plotter stopped with alarm {number}: {cause}.{said} What to do: {cure}.")
+        }
         None => format!(
             "The plotter stopped with alarm {number}, which this page does not know.{said} Its \
              firmware is of another version than the page."

@@ -269,10 +269,16 @@ fn a_test_square_is_a_square_where_the_pen_stands() {
         }
     }
     assert_eq!((low, high), ([30.0, 40.0], [50.0, 60.0]));
-    // A square beyond the travel is refused with a reason, and the session goes on.
+    // A square beyond the travel locks the machine, and the session goes on once it is unlocked.
     pipe.session.test_square(4000.0).expect("sent");
-    let failed = pipe.until("failed");
-    assert!(failed["text"].as_str().is_some_and(|text| text.contains("travel")), "{failed}");
+    let refused = pipe.until("failed");
+    assert!(refused["text"].as_str().is_some_and(|text| text.contains("3610")), "{refused}");
+    let locked = pipe.until("failed");
+    let said = locked["text"].as_str().expect("a sentence");
+    assert!(said.contains("beyond the travel") && said.contains("Unlock"), "{said}");
+    while pipe.until("phase")["name"] != "alarm" {}
+    assert!(pipe.session.command("M5").is_err(), "it is locked");
+    pipe.session.command("$X").expect("sent");
     until_ready(&mut pipe);
     // This board keeps no job.
     pipe.session.go_on(false).expect("sent");
