@@ -5,7 +5,7 @@ import { readFile } from "node:fs/promises";
 import { createRequire } from "node:module";
 import { mkdtemp } from "node:fs/promises";
 import { tmpdir } from "node:os";
-import { extname, join, normalize } from "node:path";
+import { basename, extname, join, normalize } from "node:path";
 
 /** Where `cargo xtask page-test` has installed playwright-core, and has built the page. */
 const INSTALLED = process.env.PENUP_PAGE_TESTS;
@@ -21,16 +21,20 @@ const KINDS = {
   ".wasm": "application/wasm",
 };
 
-/** Serves the built page as any web server would. Returns its address and how to end it. */
-export async function serve() {
+/**
+ * Serves the built page as any web server would. Returns its address and how to end it. `headers`
+ * are sent with each file, and `edited` gets its name and content, and returns what is sent.
+ */
+export async function serve({ headers: more = {}, edited = (_, content) => content } = {}) {
   const asked = [];
   const server = createServer(async ({ url, headers }, answer) => {
     const path = decodeURIComponent(url.split("?")[0]);
     asked.push({ path, headers });
     try {
       const file = join(PAGE, normalize(path === "/" ? "/index.html" : path));
-      const content = await readFile(file);
-      answer.writeHead(200, { "Content-Type": KINDS[extname(file)] ?? "application/octet-stream" });
+      const content = edited(basename(file), await readFile(file));
+      const kind = KINDS[extname(file)] ?? "application/octet-stream";
+      answer.writeHead(200, { "Content-Type": kind, ...more });
       answer.end(content);
     } catch {
       answer.writeHead(404);

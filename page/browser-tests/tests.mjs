@@ -336,6 +336,50 @@ test("without a network it works once it was loaded", async () => {
   await page.context().setOffline(false);
 });
 
+test("an open page keeps its version while a newer one is loaded", async () => {
+  let version = 1;
+  // The browser may keep the files by itself, too.
+  const own = await serve({
+    headers: { "Cache-Control": "max-age=3600" },
+    edited: (name, content) =>
+      name === "worker.js" || name === "offline.js"
+        ? `${content.toString().replace('"penup-', `"penup-${version}-`)}\n// Version ${version}.`
+        : content,
+  });
+  const versionOf = async () =>
+    /Version (\d)/.exec(await page.evaluate(async () => (await fetch("worker.js")).text()))[1];
+  try {
+    await fresh("", { address: own.address });
+    await page.waitForFunction(() => navigator.serviceWorker.controller);
+    assert.equal(await versionOf(), "1");
+    version = 2;
+    await page.evaluate(async () => {
+      const registration = await navigator.serviceWorker.ready;
+      await registration.update();
+      const worker = registration.installing ?? registration.waiting ?? registration.active;
+      const isSettled = () => ["installed", "activated", "redundant"].includes(worker.state);
+      while (!isSettled())
+        await new Promise((done) => {
+          worker.addEventListener("statechange", done, { once: true });
+        });
+    });
+    for (let at = 0; at < 20; at++)
+      assert.equal(await versionOf(), "1", "an open page keeps its files");
+    const waiting = await page.evaluate(async () =>
+      Boolean((await navigator.serviceWorker.ready).waiting),
+    );
+    assert.ok(waiting, "the newer version waits");
+    await page.goto("about:blank");
+    // The newer one takes over once no page is open.
+    await fresh("", { address: own.address });
+    for (let tries = 0; (await versionOf()) === "1" && tries < 50; tries++)
+      await fresh("", { address: own.address });
+    assert.equal(await versionOf(), "2", "the files of the newer version, not those kept before");
+  } finally {
+    own.end();
+  }
+});
+
 /** Starts `penup page` with these arguments. Returns its address, and how to end it. */
 async function program(...more) {
   const own = ["--no-browser", "--folder", process.env.PENUP_PAGE];
