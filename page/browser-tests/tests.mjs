@@ -715,6 +715,19 @@ test("touch: one finger turns, two zoom and move", async () => {
   assert.ok(after.zoom > before.zoom * 1.5, `two fingers zoom: ${after.zoom}`);
   assert.ok(after.offset[1] > before.offset[1] + 20, "two fingers move");
   assert.equal(await page.inputValue("#option-eye"), eye, "two fingers do not turn");
+  // Neither does the last of two fingers, nor does either of them, or a tap, change what is undone.
+  await page.click("#undo");
+  assert.equal(await page.inputValue("#option-eye"), "", "the turn is one step");
+  await touch("touchStart", [x - 40, y], [x + 40, y]);
+  await touch("touchMove", [x - 60, y], [x + 60, y]);
+  await touch("touchEnd", [x - 60, y]);
+  for (let at = 1; at < 8; at++) await touch("touchMove", [x - 60 - 9 * at, y]);
+  await touch("touchEnd");
+  await touch("touchStart", [x, y]);
+  await touch("touchEnd");
+  assert.equal(await page.inputValue("#option-eye"), "", "the last of two fingers does not turn");
+  await page.click("#redo");
+  assert.equal(await page.inputValue("#option-eye"), eye);
   assert.deepEqual(problems, []);
 });
 

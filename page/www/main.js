@@ -402,9 +402,10 @@ function turns() {
   return Boolean(scene) && !(scene.is_plan && !values.has("eye") && !values.has("angles"));
 }
 
-function turn(about, up, nearer) {
+function turn(kind, about, up, nearer) {
   if (!turns()) return;
   if (!camera) return fail("The camera stands by “angles”: clear that option to turn it.");
+  remember(kind);
   if (FIXED.test(values.get("projection") ?? "")) values.set("projection", "orthographic");
   for (const name of DIRECTIONS) values.delete(name);
   const eye = turned(camera, upwards(), about, up, nearer);
@@ -443,7 +444,7 @@ function choose(name) {
 }
 
 function listenToPage() {
-  listen(view, { begin: remember, turn, turns, play: () => tab === "check" && drawing.play() });
+  listen(view, { turn, turns, play: () => tab === "check" && drawing.play() });
   $("file").addEventListener("change", (event) => {
     const [chosen] = event.target.files;
     if (chosen) openFile(chosen);

@@ -9,9 +9,9 @@ const KEY_PIXELS = 40,
   KEY_NEARER = 0.9;
 
 /**
- * Listens at the canvas of `view`. `actions` has `begin` (a drag or key begins), `turn` (degrees
- * about z and up, and a factor of the distance), `play`, and `turns`, which tells whether a drag
- * turns; if not, it moves the sheet.
+ * Listens at the canvas of `view`. `actions` has `turn` (what turns, of which all turns in a row are
+ * one step; degrees about z and up; and a factor of the distance), `play`, and `turns`, which tells
+ * whether a drag turns; if not, it moves the sheet.
  */
 export function listen(view, actions) {
   const { canvas } = view;
@@ -25,13 +25,15 @@ export function listen(view, actions) {
     const [a, b] = [...pointers.values()];
     return b ? Math.hypot(a[0] - b[0], a[1] - b[1]) : 0;
   };
-  let moves = false;
+  let moves = false,
+    drags = 0;
 
   canvas.addEventListener("pointerdown", (event) => {
     canvas.setPointerCapture(event.pointerId);
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
-    moves = event.shiftKey || event.button !== 0 || !actions.turns();
-    if (pointers.size === 1 && !moves) actions.begin();
+    // The last finger of two moves the sheet as well.
+    moves = pointers.size > 1 || event.shiftKey || event.button !== 0 || !actions.turns();
+    drags++;
   });
   canvas.addEventListener("pointermove", (event) => {
     if (!pointers.has(event.pointerId)) return;
@@ -39,11 +41,11 @@ export function listen(view, actions) {
     pointers.set(event.pointerId, [event.offsetX, event.offsetY]);
     const [now, is] = [middle(), spread()];
     const [dx, dy] = [now[0] - before[0], now[1] - before[1]];
-    if (pointers.size > 1 || moves) {
+    if (moves) {
       view.moveBy(dx, dy);
       if (was && is) view.zoomBy(is / was, now[0], now[1]);
-    } else {
-      actions.turn(-dx * DEGREES, dy * DEGREES, 1);
+    } else if (dx || dy) {
+      actions.turn(`drag ${drags}`, -dx * DEGREES, dy * DEGREES);
     }
   });
   for (const end of ["pointerup", "pointercancel"]) {
@@ -56,8 +58,7 @@ export function listen(view, actions) {
       event.preventDefault();
       const amount = event.deltaY * (event.deltaMode === 1 ? 20 : 1);
       if (event.altKey) {
-        actions.begin("wheel");
-        actions.turn(0, 0, Math.exp(amount * 0.001));
+        actions.turn("wheel", 0, 0, Math.exp(amount * 0.001));
       } else {
         view.zoomBy(Math.exp(-amount * 0.0015), event.offsetX, event.offsetY);
       }
@@ -65,10 +66,7 @@ export function listen(view, actions) {
     { passive: false },
   );
 
-  const turn = (about, up, nearer = 1) => {
-    actions.begin("keys");
-    actions.turn(about, up, nearer);
-  };
+  const turn = (about, up, nearer) => actions.turn("keys", about, up, nearer);
   const keys = {
     ArrowLeft: () => turn(-KEY_DEGREES, 0),
     ArrowRight: () => turn(KEY_DEGREES, 0),
