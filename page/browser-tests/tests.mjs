@@ -181,6 +181,43 @@ test("give up: the pen is up, and the next plot is drawn", async () => {
   await state("Drawn");
 });
 
+test("what the plotter has drawn is moved, and goes when the drawing changes", async () => {
+  await fresh("#file=notched.obj&page=80x60");
+  const help = (want) =>
+    page.waitForFunction(
+      (said) => document.getElementById("sheet-help").textContent.startsWith(said),
+      want,
+    );
+  await page.click("#tab-draw");
+  await help("Drag to turn");
+  await page.selectOption("#pace", "1000");
+  await page.click("#plot");
+  await state("Drawn");
+  await help("Drag to move");
+  const box = await page.locator("#sheet").boundingBox();
+  await page.mouse.move(box.x + 200, box.y + 200);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 260, box.y + 230, { steps: 4 });
+  await page.mouse.up();
+  assert.equal(await page.inputValue("#option-eye"), "", "no camera turns unseen");
+  assert.deepEqual(await page.evaluate(() => window.penup.view.offset), [60, 30]);
+  // Another file takes the place of the ink.
+  const count = () => page.evaluate(() => window.penup.plotting.count);
+  assert.ok((await count()) > 0);
+  await page.selectOption("#example", "lblock.obj");
+  await opened("lblock.obj");
+  assert.equal(await count(), 0);
+  await help("Drag to turn");
+  await page.click("#plot");
+  await page.waitForFunction(() => window.penup.plotting.count > 0);
+  await state("Drawn");
+  // So does another option.
+  await page.click("#tab-see");
+  await page.selectOption("#option-hidden", "dashed");
+  assert.equal(await count(), 0);
+  assert.deepEqual(problems, []);
+});
+
 test("a serial port that reads in parts and damages bytes draws the same", async () => {
   await fresh("#file=notched.obj&page=80x60", { before: fakeSerial });
   await page.click("#tab-draw");

@@ -63,7 +63,8 @@ const waiting = [];
 let tab = "see",
   restTimer = 0,
   addressTimer = 0,
-  lastBegin = "";
+  lastBegin = "",
+  lastHelp = "";
 /**
  * Times of frames, of those with all lines of a large model that has turned, and of the longest
  * task, in ms. Tests read them by `window.penup`.
@@ -236,10 +237,6 @@ async function open(name, bytes, keeps = () => true) {
     .join(", ");
   heading = `${name}: ${said}${scene.is_plan ? ", a flat drawing" : ""}`;
   $("file-name").textContent = heading;
-  $("sheet-help").textContent = turns()
-    ? "Drag to turn. Shift and drag, or two fingers, to move. " +
-      "Wheel to zoom, with Alt to step nearer."
-    : "A flat drawing: drag to move, wheel to zoom.";
   leftOutNotes = leftOut;
   note([...leftOut, ...scene.notes]);
   announce(`${name} is open: ${said}`);
@@ -295,6 +292,7 @@ function changed(name = null) {
   $("command").value = file
     ? command(file.name, pairs(), (own) => table.find((it) => it.name === own).is_switch)
     : "";
+  plotting.outdated();
   draw(name);
 }
 
@@ -397,8 +395,9 @@ function settle() {
   for (const done of waiting.splice(0)) done();
 }
 
-/** Whether a drag turns the camera. A flat drawing is moved instead. */
+/** Whether a drag turns the camera. A flat drawing, and what the plotter draws, is moved instead. */
 function turns() {
+  if (tab === "draw" && plotting.isShown) return false;
   return Boolean(scene) && !(scene.is_plan && !values.has("eye") && !values.has("angles"));
 }
 
@@ -423,7 +422,19 @@ function upwards() {
   return up.length === 3 && up.every(Number.isFinite) && up.some(Boolean) ? up : [0, 0, 1];
 }
 
+/** Says at the sheet what a drag does, if that is something else than before. */
+function help() {
+  const said = turns()
+    ? "Drag to turn. Shift and drag, or two fingers, to move. " +
+      "Wheel to zoom, with Alt to step nearer."
+    : `${scene?.is_plan ? "A flat drawing: drag" : "Drag"} to move, wheel to zoom.`;
+  if (said === lastHelp) return;
+  lastHelp = said;
+  $("sheet-help").textContent = said;
+}
+
 function paint(brush) {
+  if (scene) help();
   const picture =
     (tab === "draw" && plotting.paint(brush)) || (tab === "check" && drawing.paint(brush));
   return picture || view.lines(brush, lines);

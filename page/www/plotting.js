@@ -421,6 +421,11 @@ export class Plotting {
     this.count = 0;
   }
 
+  /** The drawing is another one now: what was drawn before is not shown any more. */
+  outdated() {
+    if (["closed", "ready"].includes(this.phase)) this.clear();
+  }
+
   buttons() {
     const busy = ["sending", "computing", "drawing"].includes(this.phase);
     const joined = Boolean(this.session);
@@ -457,9 +462,14 @@ export class Plotting {
     while ($("log").children.length > 100) $("log").firstChild.remove();
   }
 
+  /** Whether there is something to see of what the plotter draws. */
+  get isShown() {
+    return this.count > 0 || (this.isFar && this.phase === "drawing");
+  }
+
   /** What draws what the plotter has drawn over what it will draw; null before it has begun. */
   paint(brush) {
-    return this.count || (this.isFar && this.phase === "drawing") ? this.pieces(brush) : null;
+    return this.isShown ? this.pieces(brush) : null;
   }
 
   *pieces(brush) {
