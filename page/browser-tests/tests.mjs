@@ -361,6 +361,57 @@ test("errors are said on the page, and what was open stays", async () => {
   assert.deepEqual(problems, []);
 });
 
+test("of two files the one that was chosen last is opened, whichever is read first", async () => {
+  await fresh("#file=notched.obj");
+  await page.evaluate(() => {
+    const read = Blob.prototype.arrayBuffer;
+    const slow = new Promise((done) => (window.readSlow = done));
+    Blob.prototype.arrayBuffer = async function () {
+      if (this.name === "slow.obj") await slow;
+      return read.call(this);
+    };
+  });
+  const content = await readFile(scene("lblock"));
+  const file = (name) => ({ name, mimeType: "text/plain", buffer: content });
+  await page.setInputFiles("#file", file("slow.obj"));
+  await page.setInputFiles("#file", file("fast.obj"));
+  await opened("fast.obj");
+  await page.evaluate(async () => {
+    window.readSlow();
+    await new Promise((done) => setTimeout(done, 0));
+  });
+  await computed();
+  assert.match(await text("#file-name"), /^fast\.obj/);
+  assert.deepEqual(problems, []);
+});
+
+test("a pasted link is opened, and the link to a file names no other", async () => {
+  await fresh("#file=notched.obj");
+  await page.evaluate(() => (location.hash = "#file=lblock.obj&hidden=dashed"));
+  await opened("lblock.obj");
+  await page.waitForSelector("html[data-ready]");
+  assert.equal(await page.inputValue("#option-hidden"), "dashed");
+  const link = async () => {
+    await page.click("#copy-link");
+    return new URL(await page.evaluate(() => navigator.clipboard.readText())).hash;
+  };
+  assert.equal(await link(), "#file=lblock.obj&hidden=dashed");
+  await page.setInputFiles("#file", scene("interpen"));
+  await opened("interpen.obj");
+  assert.equal(await link(), "#hidden=dashed", "a file of one's own is in no link");
+  const own = await program(scene("notched"));
+  try {
+    await fresh(own.hash, { address: own.folder });
+    assert.equal(await link(), "#given=notched.obj");
+    await page.selectOption("#example", "lblock.obj");
+    await opened("lblock.obj");
+    assert.equal(await link(), "#file=lblock.obj");
+    assert.deepEqual(problems, []);
+  } finally {
+    own.end();
+  }
+});
+
 test("without a network it works once it was loaded", async () => {
   const own = await serve();
   await fresh("", { address: own.address });

@@ -56,6 +56,10 @@ let lines = new Float32Array(),
 /** How many files were opened or refused so far, and whether one is being opened. */
 let openings = 0,
   isOpening = false;
+/** How many files were chosen so far: the last one is opened, whichever is loaded first. */
+let asks = 0;
+/** The pairs that stand for the file in a link; none if it is the user's own. */
+let origin = [];
 /** Why the drawing cannot be shown as the options say; empty if it is. */
 let refusal = "";
 /** Who waits until the drawing is read and shown with the newest options. */
@@ -97,11 +101,11 @@ async function main() {
     example = link.get("file");
   const known = new Set(table.map((option) => option.name));
   values = new Map([...link].filter(([name]) => known.has(name)));
-  if (given) await openFrom("given", given);
-  else
-    await openExample(
-      EXAMPLES.map((name) => `${name}.obj`).includes(example) ? example : "lattice3.obj",
-    );
+  const isExample = EXAMPLES.some((name) => `${name}.obj` === example);
+  // If it is refused, it stays in the address: it may be mended when the page is loaded again.
+  if (given) origin = [["given", given]];
+  if (given) await openFrom("given", given, origin[0]);
+  else await openExample(isExample ? example : "lattice3.obj");
   if (link.has("tab")) choose(link.get("tab"));
   keepOffline();
   document.documentElement.dataset.ready = "yes";
@@ -135,19 +139,22 @@ async function job() {
 
 // The file.
 
-async function openFrom(address, name, keeps) {
+/** Opens what the server has at an address. In a link `pair` stands for it. */
+async function openFrom(address, name, pair, keeps) {
+  const asked = ++asks;
   try {
     const answer = await fetch(address);
     if (!answer.ok) throw new Error(`the server answers ${answer.status}`);
     const size = Number(answer.headers.get("Content-Length"));
     if (size > LARGEST_FILE) return fail(tooLarge(name, size));
-    await open(name, new Uint8Array(await answer.arrayBuffer()), keeps);
+    const bytes = new Uint8Array(await answer.arrayBuffer());
+    if (asked === asks) await open(name, bytes, keeps, [pair]);
   } catch (error) {
-    fail(`${name} cannot be loaded: ${error.message ?? error}.`);
+    if (asked === asks) fail(`${name} cannot be loaded: ${error.message ?? error}.`);
   }
 }
 
-const openExample = (name, keeps) => openFrom(`scenes/${name}`, name, keeps);
+const openExample = (name, keeps) => openFrom(`scenes/${name}`, name, ["file", name], keeps);
 
 const tooLarge = (name, size) =>
   `${name} has ${Math.round(size / 1e6)} MB; the page opens files up to ` +
@@ -155,10 +162,12 @@ const tooLarge = (name, size) =>
 
 async function openFile(chosen) {
   if (chosen.size > LARGEST_FILE) return fail(tooLarge(chosen.name, chosen.size));
+  const asked = ++asks;
   try {
-    await open(chosen.name, new Uint8Array(await chosen.arrayBuffer()), fitsAnother);
+    const bytes = new Uint8Array(await chosen.arrayBuffer());
+    if (asked === asks) await open(chosen.name, bytes, fitsAnother);
   } catch (error) {
-    fail(`${chosen.name} cannot be read: ${error.message ?? error}.`);
+    if (asked === asks) fail(`${chosen.name} cannot be read: ${error.message ?? error}.`);
   }
 }
 
@@ -182,8 +191,11 @@ async function readFile(name, bytes, nextValues, opening) {
   }
 }
 
-/** Opens a file with those options whose names `keeps` wants. What was open stays if it fails. */
-async function open(name, bytes, keeps = () => true) {
+/**
+ * Opens a file with those options whose names `keeps` wants. In a link the pairs `from` stand for
+ * it. What was open stays if it fails.
+ */
+async function open(name, bytes, keeps = () => true, from = []) {
   const opening = ++openings;
   isOpening = true;
   $("file-name").textContent = `Reading ${name}…`;
@@ -223,6 +235,7 @@ async function open(name, bytes, keeps = () => true) {
     return fail(reason);
   }
   ({ file, scene, camera } = opened);
+  origin = from;
   values = new Map(pairs().filter(([own]) => kept(own)));
   undos.length = redos.length = 0;
   const counts = [
@@ -310,13 +323,7 @@ function writeAddress() {
 }
 
 function link() {
-  const given = new Map(fromLink(location.hash)).get("given");
-  const own = given
-    ? [["given", given]]
-    : file && EXAMPLES.includes(file.name.replace(".obj", ""))
-      ? [["file", file.name]]
-      : [];
-  return toLink([...own, ...pairs()]);
+  return toLink([...origin, ...pairs()]);
 }
 
 // The picture of the camera.
@@ -513,6 +520,11 @@ function listenToPage() {
     event.preventDefault();
     if (event.shiftKey) step(redos, undos);
     else step(undos, redos);
+  });
+  // A link was pasted. What is shown is written into the address without this event.
+  addEventListener("hashchange", () => {
+    clearTimeout(addressTimer);
+    location.reload();
   });
   const drop = $("drop");
   addEventListener("dragover", (event) => {
