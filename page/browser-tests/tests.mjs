@@ -361,6 +361,42 @@ test("errors are said on the page, and what was open stays", async () => {
   assert.deepEqual(problems, []);
 });
 
+test("behind a file that is refused, what was open is drawn with all options", async () => {
+  await fresh("#file=notched.obj");
+  await computed();
+  const lines = await page.evaluate(() => window.penup.lines().length);
+  const garbage = { name: "bad.obj", mimeType: "text/plain", buffer: Buffer.from("v 1 2\n") };
+  const refused = () =>
+    page.waitForFunction(() => /bad\.obj/.test(document.querySelector("#error p").textContent));
+  // An option that is refused does not lose the model.
+  await page.fill("#option-crease", "999");
+  await page.press("#option-crease", "Enter");
+  await page.waitForSelector("#option-crease-problem:not([hidden])");
+  await page.setInputFiles("#file", garbage);
+  await refused();
+  await page.fill("#option-crease", "");
+  await page.press("#option-crease", "Enter");
+  await computed();
+  assert.equal(await page.evaluate(() => window.penup.lines().length), lines);
+  // A picture that was being computed when the file was opened is not forgotten.
+  await page.evaluate(() => {
+    const bytes = new TextEncoder().encode("v 1 2\n");
+    Blob.prototype.arrayBuffer = async () => bytes.buffer;
+    const hidden = document.getElementById("option-hidden");
+    hidden.value = "dashed";
+    hidden.dispatchEvent(new Event("change", { bubbles: true }));
+    const chosen = new DataTransfer();
+    chosen.items.add(new File([bytes], "bad.obj"));
+    const input = document.getElementById("file");
+    input.files = chosen.files;
+    input.dispatchEvent(new Event("change", { bubbles: true }));
+  });
+  await refused();
+  await computed();
+  assert.ok((await page.evaluate(() => window.penup.lines().length)) > lines);
+  assert.deepEqual(problems, []);
+});
+
 test("of two files the one that was chosen last is opened, whichever is read first", async () => {
   await fresh("#file=notched.obj");
   await page.evaluate(() => {

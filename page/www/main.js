@@ -227,9 +227,10 @@ async function open(name, bytes, keeps = () => true, from = []) {
     controls.show(values);
     if (file) {
       const before = { name: file.name, ...file.handed, options: JSON.stringify(pairs()) };
-      await helper.ask("open", before).catch(() => {});
-      // What has changed meanwhile is drawn before the reason is shown.
-      if (drawsAgain !== undefined) await draw(drawsAgain);
+      // If an option is refused, too, the next picture sends the lines of the file again.
+      await helper.ask("open", before).catch(() => (reads = true));
+      // The picture that was begun before was given up. It is drawn before the reason is shown.
+      await draw(drawsAgain);
     }
     settle();
     return fail(reason);
