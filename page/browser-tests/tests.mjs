@@ -218,6 +218,77 @@ test("what the plotter has drawn is moved, and goes when the drawing changes", a
   assert.deepEqual(problems, []);
 });
 
+test("the pen and its newest ink are seen however long the plotter draws", async () => {
+  await fresh("#file=notched.obj");
+  const seen = await page.evaluate(() => {
+    const { plotting, drawing, view } = window.penup;
+    // An hour of strokes, each of 100 samples in a line, with 900 samples of moves between them.
+    const all = 180_000;
+    const path = new Float32Array(4 * all);
+    for (let at = 0; at < all; at++) {
+      const stroke = Math.floor(at / 1000);
+      const along = Math.min(100, at % 1000);
+      const pen = at % 1000 > 0 && at % 1000 <= 100 ? 1 : 0;
+      path.set([at / 50, along, stroke, pen], 4 * at);
+    }
+    // A circle with more samples than can be told from each other.
+    const round = 20_000;
+    const circle = Float32Array.from({ length: 4 * round }, (_, at) => {
+      const angle = (2 * Math.PI * (at >> 2)) / round;
+      return [at / 4, 100 + 80 * Math.cos(angle), 100 + 80 * Math.sin(angle), 1][at % 4];
+    });
+    const lines = [];
+    let place = [0, 0];
+    const brush = {
+      beginPath() {},
+      stroke() {},
+      fill() {},
+      arc: (...disc) => lines.push({ disc }),
+      moveTo: (...to) => (place = to),
+      lineTo(...to) {
+        lines.push({ line: [place, to] });
+        place = to;
+      },
+    };
+    // What is drawn, and how many pieces were counted, before the pen is drawn and in all.
+    const drawn = (pieces) => {
+      lines.length = 0;
+      let counted = 0,
+        beforePen = null;
+      for (const count of pieces) {
+        counted += count;
+        if (beforePen === null && lines.some((it) => it.disc)) beforePen = counted;
+      }
+      return { counted, beforePen, lines: lines.filter((it) => it.line).map((it) => it.line) };
+    };
+    const strokes = drawn(view.path(brush, path, all));
+    const whole = drawn(view.path(brush, circle, round));
+    const planned = new Float32Array(5 * 50_000);
+    Object.assign(plotting, { path, count: 4 * all, planned, phase: "drawing" });
+    const plot = drawn(plotting.pieces(brush));
+    const ends = new Float64Array(4 * 2000);
+    drawing.computed = { path, ends, seconds: all / 50 };
+    drawing.time = all / 50 - 1;
+    const replay = drawn(drawing.pieces(brush));
+    return { strokes, whole, plot, replay, pixel: view.pixel };
+  });
+  assert.deepEqual(
+    seen.strokes.lines,
+    Array.from({ length: 180 }, (_, at) => [[0, at], [100, at]]),
+    "a stroke is a line, whatever samples it has",
+  );
+  assert.ok(seen.strokes.counted < 1000);
+  assert.ok(seen.whole.counted < 2000, `${seen.whole.counted} lines of a circle`);
+  for (const [, [x, y]] of seen.whole.lines)
+    assert.ok(Math.abs(Math.hypot(x - 100, y - 100) - 80) < 0.001);
+  for (const [[x0, y0], [x1, y1]] of seen.whole.lines) {
+    const off = 80 - Math.hypot((x0 + x1) / 2 - 100, (y0 + y1) / 2 - 100);
+    assert.ok(off < 0.5 * seen.pixel, `${off} mm from the circle`);
+  }
+  for (const [name, { beforePen }] of Object.entries({ plot: seen.plot, replay: seen.replay }))
+    assert.ok(beforePen < 1000, `${name}: the pen is drawn after ${beforePen} pieces`);
+});
+
 test("a serial port that reads in parts and damages bytes draws the same", async () => {
   await fresh("#file=notched.obj&page=80x60", { before: fakeSerial });
   await page.click("#tab-draw");

@@ -194,13 +194,17 @@ export class Drawing {
     const { path, ends, seconds } = this.computed;
     const { time, view } = this;
     const end = indexAt(path, time);
-    const rest = { first: end, faint: true };
-    if (time < seconds) yield* view.path(brush, path, path.length / SAMPLE, rest);
-    if ($("show-up").checked) yield* view.moves(brush, ends);
+    const showsUp = $("show-up").checked;
+    const isDone = time >= seconds;
+    if (isDone && showsUp) yield* view.moves(brush, ends);
+    // During a replay a frame may have no time for more than the ink.
     yield* view.path(brush, path, end);
     const now = penAt(path, time);
-    if (time < seconds && now) yield* this.inkTo(brush, path, end, now);
+    if (!isDone && now) yield* this.inkTo(brush, path, end, now);
     view.marks(brush, ends);
+    if (!isDone && showsUp) yield* view.moves(brush, ends);
+    const rest = { first: end, faint: true };
+    if (!isDone) yield* view.path(brush, path, path.length / SAMPLE, rest);
   }
 
   /** Draws the ink from the last sample to where the pen is now, and the pen. */

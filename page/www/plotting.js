@@ -474,12 +474,11 @@ export class Plotting {
 
   *pieces(brush) {
     const { count, path, planned, view } = this;
-    if (planned) {
-      yield* view.lines(brush, planned, PLANNED);
-    }
+    // While the pen moves, a frame may have no time for more than the ink.
     yield* view.path(brush, path, count / SAMPLE);
     const last = path.subarray(count - SAMPLE, count);
     const place = this.hasPins ? [last[1], last[2]] : this.place;
     if (place && this.phase === "drawing") view.pen(brush, place, this.hasPins ? last[3] : 0);
+    if (planned) yield* view.lines(brush, planned, PLANNED);
   }
 }

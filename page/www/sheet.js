@@ -19,6 +19,8 @@ const CHUNK = 500,
   FIRST_BUDGET = 3_000,
   LEAST_BUDGET = 1_000,
   MOST_BUDGET = 8_000;
+/** How far ink may be from the samples of its path, in pixels. */
+const STRAIGHT = 0.25;
 /** How many arrows are drawn at once, and how many lines take as long as one. */
 const ARROWS = 64,
   ARROW_COST = 8;
@@ -189,34 +191,37 @@ export class SheetView {
 
   /**
    * Draws the samples of a path from `first` on, up to the index `end`: time, x, y and pen of
-   * each. `faint` ink is still to be drawn.
+   * each. `faint` ink is still to be drawn. There are many more samples than lines that differ from
+   * them by what can be seen.
    */
   *path(brush, path, end, { first = 0, faint = false } = {}) {
-    let pen = 0,
-      drawn = 0;
     const alpha = faint ? 0.28 : 1;
-    brush.globalAlpha = alpha;
-    for (let at = Math.max(first, 1); at < end; at++) {
-      const now = path[at * SAMPLE + 3];
-      if (now !== pen || drawn === CHUNK) {
-        if (pen) brush.stroke();
-        if (drawn === CHUNK) {
-          yield drawn;
-          drawn = 0;
-          brush.globalAlpha = alpha;
-        }
-        pen = now;
-        if (pen) {
-          brush.strokeStyle = inkOf(pen);
-          brush.beginPath();
-          brush.moveTo(path[at * SAMPLE - 3], path[at * SAMPLE - 2]);
-        }
+    const far = STRAIGHT * this.pixel;
+    const [x, y, penOf] = [1, 2, 3].map((part) => (at) => path[at * SAMPLE + part]);
+    let drawn = 0,
+      at = Math.max(first, 1);
+    while (at < end) {
+      const pen = penOf(at);
+      if (!pen) {
+        at++;
+        continue;
       }
-      if (pen) brush.lineTo(path[at * SAMPLE + 1], path[at * SAMPLE + 2]);
-      drawn++;
+      brush.globalAlpha = alpha;
+      brush.strokeStyle = inkOf(pen);
+      brush.beginPath();
+      brush.moveTo(x(at - 1), y(at - 1));
+      while (at < end && penOf(at) === pen && drawn < CHUNK) {
+        at = straightTo(path, at, end, far);
+        brush.lineTo(x(at), y(at));
+        at++;
+        drawn++;
+      }
+      brush.stroke();
+      brush.globalAlpha = 1;
+      if (drawn < CHUNK) continue;
+      yield drawn;
+      drawn = 0;
     }
-    if (pen) brush.stroke();
-    brush.globalAlpha = 1;
     yield drawn;
   }
 
@@ -276,6 +281,33 @@ export class SheetView {
     else brush.stroke();
     brush.lineWidth = width;
   }
+}
+
+/**
+ * The last sample of the straight line from the one before `at` on: with the same pen, before
+ * `end`, and with all between them not so `far` from the line as that, in mm.
+ */
+function straightTo(path, at, end, far) {
+  const pen = path[at * SAMPLE + 3];
+  const x0 = path[at * SAMPLE - 3],
+    y0 = path[at * SAMPLE - 2];
+  let ux = 0,
+    uy = 0,
+    reached = 0;
+  for (; at < end && path[at * SAMPLE + 3] === pen; at++) {
+    const dx = path[at * SAMPLE + 1] - x0,
+      dy = path[at * SAMPLE + 2] - y0;
+    if (!ux && !uy) {
+      // The first sample that can be told from the beginning tells the direction.
+      const length = Math.hypot(dx, dy);
+      if (length >= far) [ux, uy, reached] = [dx / length, dy / length, length];
+      continue;
+    }
+    const along = dx * ux + dy * uy;
+    if (along < reached - far || Math.abs(dx * uy - dy * ux) > far) break;
+    reached = Math.max(reached, along);
+  }
+  return at - 1;
 }
 
 function disc(brush, [x, y], radius) {
