@@ -7,6 +7,9 @@ export function fakeSerial() {
     damageEvery: 0,
     /** The name of the error with which the port refuses to be opened. */
     refuses: "",
+    /** Promises for which the port waits before it is open, and before it is closed. */
+    opens: null,
+    closes: null,
     counts: { parts: 0, damaged: 0, errors: 0 },
   });
   let board,
@@ -66,6 +69,7 @@ export function fakeSerial() {
     },
     async open() {
       if (control.refuses) throw new DOMException("the port is in use", control.refuses);
+      await control.opens;
       await plugIn();
       port.open_reading();
       port.writable = new WritableStream({
@@ -73,6 +77,7 @@ export function fakeSerial() {
       });
     },
     async close() {
+      await control.closes;
       reading = port.readable = port.writable = null;
     },
   };

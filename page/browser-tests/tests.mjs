@@ -336,6 +336,51 @@ test("a plotter that is unplugged is an error, and plugged in again it is found"
   await state("Ready");
 });
 
+test("another plotter that is chosen takes the place of a serial port at any time", async () => {
+  await fresh("#file=notched.obj&page=80x60", { before: fakeSerial });
+  await page.click("#tab-draw");
+  await page.selectOption("#pace", "1000");
+  await page.click("#plot");
+  await state("Drawn");
+  const { count, planned } = await page.evaluate(() => {
+    const { plotting } = window.penup;
+    const before = plotting.count;
+    const plotter = document.getElementById("plotter");
+    plotter.value = "serial";
+    plotter.dispatchEvent(new Event("change"));
+    return { count: [before > 0, plotting.count], planned: plotting.planned };
+  });
+  assert.deepEqual([count, planned], [[true, 0], null], "the ink of the emulated plotter goes");
+  // While the port is being opened.
+  const gate = (name) =>
+    page.evaluate((own) => {
+      window.fakeSerial[own] = new Promise((done) => (window.pass = done));
+    }, name);
+  // Lets the port go on, and waits until all that follows from it at once is done.
+  const pass = () =>
+    page.evaluate(async () => {
+      window.pass();
+      for (let at = 0; at < 20; at++) await new Promise((done) => setTimeout(done, 0));
+    });
+  await gate("opens");
+  await page.click("#connect");
+  await page.selectOption("#plotter", "emulated");
+  await pass();
+  assert.equal(await page.evaluate(() => window.penup.plotting.session), null);
+  // While the port is being closed.
+  await page.selectOption("#plotter", "serial");
+  await page.click("#connect");
+  await state("Ready");
+  await page.waitForFunction(() => window.penup.plotting.phase === "ready");
+  await gate("closes");
+  await page.selectOption("#plotter", "emulated");
+  await page.click("#plot");
+  await page.waitForFunction(() => window.penup.plotting.session);
+  await pass();
+  await state("Drawn");
+  assert.deepEqual(problems, []);
+});
+
 test("keys, undo, names of controls", async () => {
   await fresh("#file=interpen.obj");
   await page.focus("#sheet");
@@ -1079,6 +1124,17 @@ test("speeds, heights and a square by hand, and a job that has stopped", async (
     const span = (list) => Math.max(...list) - Math.min(...list);
     return xs.length && Math.abs(span(xs) - 20) < 0.02 && Math.abs(span(ys) - 20) < 0.02;
   });
+  // What moves by hand is held, and then given up or resumed.
+  await page.waitForFunction(() => !window.penup.plotting.moves);
+  await page.selectOption("#pace", "1");
+  await page.click("#test-square");
+  await state("Moving");
+  await page.click("#hold");
+  await state("Held");
+  assert.equal(await page.locator("#plot").isDisabled(), true);
+  await page.click("#give-up");
+  await state("Given up");
+  await page.waitForFunction(() => window.penup.plotting.phase === "ready");
   await page.selectOption("#pace", "5");
   await page.click("#plot");
   await state("Drawing");
@@ -1150,6 +1206,18 @@ test("dark, and on a phone", async () => {
     document.documentElement.scrollWidth,
   ]);
   assert.ok(whole <= width, `the page is ${whole} wide on a screen of ${width}`);
+  // The sheet covers no control that is looked for, on a high screen or on a low one.
+  for (const height of [844, 360]) {
+    await page.setViewportSize({ width: 640, height });
+    const [top, bottom] = await page.evaluate(() => {
+      document.documentElement.scrollTop = document.documentElement.scrollHeight;
+      document.getElementById("plotter").scrollIntoView();
+      const stage = document.querySelector(".stage").getBoundingClientRect();
+      return [document.getElementById("plotter").getBoundingClientRect().top, stage.bottom];
+    });
+    assert.ok(top >= bottom, `a control at ${top}, the sheet down to ${bottom}`);
+    assert.ok(top < height - 44, `a control at ${top} on a screen of ${height}`);
+  }
 });
 
 /** The inked paths of a picture: lists of points. */

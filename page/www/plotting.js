@@ -122,6 +122,9 @@ export class Plotting {
   choose() {
     this.close?.();
     this.end();
+    this.clear();
+    this.planned = null;
+    this.view.draw();
     const missing = this.kind === "serial" ? cannot() : "";
     $("plotter-hint").textContent = missing || HINTS[this.kind];
     $("pace-control").hidden = this.isFar;
@@ -133,7 +136,7 @@ export class Plotting {
   end() {
     this.session?.end();
     this.board?.end();
-    this.session = this.board = this.close = this.order = null;
+    this.session = this.board = this.close = this.order = this.line = null;
     this.waiting = this.starting = null;
     this.passes.left = 0;
     this.enter("closed");
@@ -183,12 +186,19 @@ export class Plotting {
       this.begin(port2, "program");
       return this.buttons();
     }
+    const line = (this.line = {});
     try {
-      this.close = await join(port1, (text) => {
+      const close = await join(port1, (text) => {
+        // A port takes a while to close: another session may have begun.
+        if (this.line !== line) return;
         this.end();
         if (text) this.problem(text);
       });
+      // Meanwhile another plotter may have been chosen.
+      if (this.line !== line) return close();
+      this.close = close;
     } catch (text) {
+      if (this.line !== line) return;
       return this.problem(
         typeof text === "string" ? text : `The port cannot be used: ${text.message ?? text}.`,
       );
@@ -430,11 +440,11 @@ export class Plotting {
     const busy = ["sending", "computing", "drawing"].includes(this.phase);
     const joined = Boolean(this.session);
     $("plot").disabled =
-      busy || this.phase === "alarm" || (this.isFar && this.phase !== "ready");
+      busy || this.isHeld || this.phase === "alarm" || (this.isFar && this.phase !== "ready");
     const moves = Boolean(this.moves);
     $("hold").disabled = !(this.phase === "drawing" || moves) || this.isHeld;
     $("resume").disabled = !this.isHeld;
-    $("give-up").disabled = !(busy || moves);
+    $("give-up").disabled = !(busy || moves || this.isHeld);
     $("unlock").hidden = this.phase !== "alarm";
     $("connect").hidden = !this.isFar || joined;
     $("disconnect").hidden = !this.isFar || !joined;
