@@ -75,6 +75,11 @@ impl Delivery {
         ((self.done - self.base).unsigned_abs() as usize, self.lines.count())
     }
 
+    /// Leaves `slept` ms until `now` out of the time without a line being accepted.
+    pub fn leave_out(&mut self, slept: f64, now: f64) {
+        self.last_progress = (self.last_progress + slept).min(now);
+    }
+
     /// Lets the time pass until `now`, in ms. While the plotter `reads_no_lines`, because it
     /// computes or finds its switches, none is missed. What is to be sent is appended to `out`.
     pub fn tick(&mut self, now: f64, reads_no_lines: bool, out: &mut Vec<u8>) -> Outcome {

@@ -30,6 +30,10 @@ const QUERY_EVERY: f64 = 100.0;
 const AGAIN_AFTER: f64 = 1000.0;
 /// The longest time in ms until the plotter counts lines.
 const OPEN_TIMEOUT: f64 = 15_000.0;
+/// The longest time in ms between two ticks that counts. A computer that sleeps, or a browser that
+/// lets a page wait, hears nothing meanwhile.
+const LONGEST_TICK: f64 = 1000.0;
+
 /// The session.
 #[wasm_bindgen]
 #[derive(Debug)]
@@ -41,6 +45,7 @@ pub struct Session {
     since: f64,
     repeated: f64,
     now: f64,
+    last_tick: f64,
     /// The longest time in ms without a byte.
     silence: f64,
     reader: ReplyReader,
@@ -87,6 +92,7 @@ impl Session {
             since: 0.0,
             repeated: 0.0,
             now: 0.0,
+            last_tick: 0.0,
             silence,
             reader: ReplyReader::default(),
             raw: Vec::new(),
@@ -114,7 +120,7 @@ impl Session {
 
     /// Begins to look for the plotter, over a line that was just opened, at the time `now` in ms.
     pub fn connect(&mut self, now: f64) {
-        (self.now, self.last_heard) = (now, now);
+        (self.now, self.last_tick, self.last_heard) = (now, now, now);
         self.reader = ReplyReader::default();
         self.raw.clear();
         self.enter(Phase::Finding);
@@ -250,6 +256,8 @@ impl Session {
     /// Lets the time pass until `now`, in ms.
     pub fn tick(&mut self, now: f64) {
         self.now = now;
+        self.leave_out(now - self.last_tick - LONGEST_TICK);
+        self.last_tick = now;
         if self.phase == Phase::Closed {
             return;
         }
@@ -294,6 +302,18 @@ impl Session {
         if self.name != name {
             self.name = name;
             self.events.push(Event::Phase { name });
+        }
+    }
+
+    /// Leaves `slept` ms until now out of every time that is waited for, if there are any.
+    fn leave_out(&mut self, slept: f64) {
+        if slept <= 0.0 {
+            return;
+        }
+        self.last_heard = (self.last_heard + slept).min(self.now);
+        self.since = (self.since + slept).min(self.now);
+        if let Some(delivery) = &mut self.delivery {
+            delivery.leave_out(slept, self.now);
         }
     }
 

@@ -160,8 +160,32 @@ fn what_is_refused_says_what_to_do() {
 #[test]
 fn a_plotter_that_falls_silent_is_given_up_with_a_sentence() {
     let mut pipe = Pipe::new(|_, _, _| Vec::new());
+    // A browser that lets the page wait a second and a half every time counts one of it.
+    for _ in 0..4 {
+        pipe.now += 1490.0;
+        pipe.step();
+    }
+    assert!(pipe.events.iter().all(|event| event["kind"] != "failed"), "{:?}", pipe.events);
     let failed = pipe.until("failed");
     assert!(failed["text"].as_str().is_some_and(|it| it.contains("does not answer")), "{failed}");
+    assert_eq!(pipe.now.round(), 7010.0);
+}
+
+#[test]
+fn a_computer_that_sleeps_gives_up_no_plotter() {
+    let mut pipe = Pipe::new(clean);
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
+    // While lines are sent, and while the machine draws, each time before an answer has come.
+    for kind in ["sent", "status"] {
+        pipe.until(kind);
+        pipe.now += 3_600_000.0;
+        pipe.session.tick(pipe.now);
+        if kind == "sent" {
+            pipe.until_state("Run");
+        }
+    }
+    pipe.until("drawn");
+    assert!(pipe.events.iter().all(|event| event["kind"] != "failed"), "{:?}", pipe.events);
 }
 
 #[test]
