@@ -336,6 +336,31 @@ test("a plotter that is unplugged is an error, and plugged in again it is found"
   await state("Ready");
 });
 
+test("passes that a page no longer begins are named, also when it has joined again", async () => {
+  await fresh("#file=notched.obj&page=80x60&multipass=3", { before: fakeSerial });
+  await page.click("#tab-draw");
+  await page.selectOption("#plotter", "serial");
+  await page.click("#connect");
+  await page.waitForFunction(() => window.penup.plotting.phase === "ready");
+  await page.evaluate(() => (window.fakeSerial.pace = 1));
+  await page.click("#plot");
+  await state("Drawing");
+  await page.evaluate(() => window.fakeSerial.unplug());
+  const named = () =>
+    page.waitForFunction(() =>
+      /The last 2 of 3 passes are not drawn/.test(
+        document.getElementById("plot-problem").textContent,
+      ),
+    );
+  await named();
+  assert.match(await text("#plot-problem"), /unplugged/);
+  await page.click("#connect");
+  await state("Drawing");
+  await named();
+  assert.equal(await shown("#plot-problem"), true);
+  assert.deepEqual(problems, []);
+});
+
 test("another plotter that is chosen takes the place of a serial port at any time", async () => {
   await fresh("#file=notched.obj&page=80x60", { before: fakeSerial });
   await page.click("#tab-draw");

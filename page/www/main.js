@@ -403,7 +403,7 @@ function settle() {
   for (const done of waiting.splice(0)) done();
 }
 
-/** Whether a drag turns the camera. A flat drawing, and what the plotter draws, is moved instead. */
+/** Whether a drag turns the camera. A flat drawing and what the plotter draws are moved instead. */
 function turns() {
   if (tab === "draw" && plotting.isShown) return false;
   return Boolean(scene) && !(scene.is_plan && !values.has("eye") && !values.has("angles"));

@@ -56,6 +56,8 @@ export class Plotting {
     this.clear();
     /** The job that is drawn several times, how often in all, and how often it is still begun. */
     this.passes = { job: null, all: 1, left: 0 };
+    /** A sentence about the passes that were not begun; empty if all were. */
+    this.missing = "";
     this.place = null;
     this.isHeld = false;
     /** What the machine does by hand, in words; empty if nothing moves by hand. */
@@ -138,12 +140,13 @@ export class Plotting {
     this.board?.end();
     this.session = this.board = this.close = this.order = this.line = null;
     this.waiting = this.starting = null;
-    this.passes.left = 0;
+    this.endPasses();
     this.enter("closed");
   }
 
   begin(pipe, kind) {
-    this.problem("");
+    this.problem(this.missing);
+    this.missing = "";
     this.session = new Helper((said) => this.hear(said));
     this.session.ask("session", { pipe, kind }, [pipe]).catch((text) => this.problem(text));
   }
@@ -176,10 +179,7 @@ export class Plotting {
   async connect() {
     const { port1, port2 } = new MessageChannel();
     if (this.kind === "program") {
-      const ended = (text) => {
-        this.end();
-        if (text) this.problem(text);
-      };
+      const ended = (text) => this.lose(text);
       const { close, order } = joinProgram(port1, ended, (path) => this.draw(path));
       Object.assign(this, { close, order });
       this.clear();
@@ -190,9 +190,7 @@ export class Plotting {
     try {
       const close = await join(port1, (text) => {
         // A port takes a while to close: another session may have begun.
-        if (this.line !== line) return;
-        this.end();
-        if (text) this.problem(text);
+        if (this.line === line) this.lose(text);
       });
       // Meanwhile another plotter may have been chosen.
       if (this.line !== line) return close();
@@ -207,7 +205,14 @@ export class Plotting {
     this.buttons();
   }
 
+  /** The line to the plotter has ended; if it broke, with a sentence. */
+  lose(text) {
+    this.end();
+    if (text || this.missing) this.problem(`${text} ${this.missing}`.trim());
+  }
+
   async plot() {
+    this.missing = "";
     this.problem("");
     try {
       await this.plotJob(await this.job());
@@ -259,7 +264,10 @@ export class Plotting {
     try {
       await this.session.ask(call, args);
       // What was wrong before this command may not be so any more.
-      if (call === "command") this.problem("");
+      if (call === "command") {
+        this.missing = "";
+        this.problem("");
+      }
     } catch (text) {
       this.problem(text);
     }
@@ -331,9 +339,9 @@ export class Plotting {
         this.readSetting(event.text);
         break;
       case "failed":
-        this.passes.left = 0;
+        this.endPasses();
         this.log(event.text);
-        this.problem(event.text);
+        this.problem(`${event.text} ${this.missing}`.trim());
         break;
       case "stopped":
         this.passes.left = 0;
@@ -347,6 +355,16 @@ export class Plotting {
         $("progress").value = 1;
         break;
     }
+  }
+
+  /** Begins no further pass, and keeps in mind which are missing. */
+  endPasses() {
+    const { all, left } = this.passes;
+    this.passes.left = 0;
+    if (!left) return;
+    const which =
+      left === 1 ? `The last of ${all} passes is` : `The last ${left} of ${all} passes are`;
+    this.missing = `${which} not drawn: set multipass to ${left} and plot again.`;
   }
 
   /** How often everything was drawn, in words. */

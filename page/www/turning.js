@@ -9,9 +9,9 @@ const KEY_PIXELS = 40,
   KEY_NEARER = 0.9;
 
 /**
- * Listens at the canvas of `view`. `actions` has `turn` (what turns, of which all turns in a row are
- * one step; degrees about z and up; and a factor of the distance), `play`, and `turns`, which tells
- * whether a drag turns; if not, it moves the sheet.
+ * Listens at the canvas of `view`. `actions` has `turn` (what turns, all of whose turns in a row
+ * are one step; degrees about z and up; and a factor of the distance), `play`, and `turns`, which
+ * tells whether a drag turns; if not, it moves the sheet.
  */
 export function listen(view, actions) {
   const { canvas } = view;
