@@ -30,6 +30,8 @@ const QUERY_EVERY: f64 = 100.0;
 const AGAIN_AFTER: f64 = 1000.0;
 /// The longest time in ms until the plotter counts lines.
 const OPEN_TIMEOUT: f64 = 15_000.0;
+/// Makes coordinates absolute, which they are at first.
+const ABSOLUTE: &str = "G90";
 /// The longest time in ms between two ticks that counts. A computer that sleeps, or a browser that
 /// lets a page wait, hears nothing meanwhile.
 const LONGEST_TICK: f64 = 1000.0;
@@ -74,8 +76,8 @@ pub struct Session {
     /// Equal reports of a machine that waits, one after the other.
     holds: (Option<u8>, String, u32),
     is_given_up: bool,
-    /// Where the plotter last told that the pen is, in mm.
-    place: Vec<f64>,
+    /// Whether coordinates may be relative, because a test square was begun and has not ended.
+    is_relative: bool,
     /// The speeds in percent of those in the settings, which not every status tells.
     percent: u16,
 }
@@ -113,7 +115,7 @@ impl Session {
             reads_no_lines: false,
             holds: (None, String::new(), 0),
             is_given_up: false,
-            place: Vec::new(),
+            is_relative: false,
             percent: 100,
         }
     }
@@ -196,16 +198,15 @@ impl Session {
     /// Draws a square with sides of this many `mm` to the right of the pen and above it.
     ///
     /// # Errors
-    /// A sentence for the user: the session is doing something else, or does not know where the
-    /// pen is.
+    /// A sentence for the user: the session is doing something else.
     pub fn test_square(&mut self, mm: f64) -> Result<(), String> {
-        let &[x, y, ..] = self.place.as_slice() else {
-            return Err("The plotter has not told yet where its pen is.".to_owned());
-        };
-        let corners = [(mm, 0.0), (mm, mm), (0.0, mm), (0.0, 0.0)];
-        let sides = corners.map(|(dx, dy)| format!("G21 G53 G1 X{:.3} Y{:.3}", x + dx, y + dy));
-        let lines = [PEN_DOWN.to_owned()].into_iter().chain(sides).chain([PEN_UP.to_owned()]);
+        // Where the pen is may be told in another unit, or not at all.
+        let sides = [('X', mm), ('Y', mm), ('X', -mm), ('Y', -mm)];
+        let sides = sides.map(|(axis, by)| format!("G21 G91 G1 {axis}{by:.3}"));
+        let ends = [PEN_UP, ABSOLUTE].map(str::to_owned);
+        let lines = [PEN_DOWN.to_owned()].into_iter().chain(sides).chain(ends);
         self.begin_lines(lines.collect())?;
+        self.is_relative = true;
         self.enter(Phase::Commanding);
         Ok(())
     }

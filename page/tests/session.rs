@@ -270,13 +270,34 @@ fn speeds_follow_the_buttons() {
     pipe.until("drawn");
 }
 
+/// The modes of the plotter, as it tells them.
+fn modes(pipe: &mut Pipe) -> String {
+    pipe.session.command("$G").expect("sent");
+    let told = pipe.until("reply")["text"].as_str().expect("a line").to_owned();
+    (0..100).for_each(|_| pipe.step());
+    told
+}
+
+/// A line on which the first line is damaged that makes coordinates absolute.
+fn losing_the_end(count: &mut u64, to_plotter: bool, bytes: Vec<u8>) -> Vec<u8> {
+    let end = bytes.windows(3).position(|part| part == b"G90");
+    let (Some(at), true, 0) = (end, to_plotter, *count) else { return bytes };
+    *count = 1;
+    [&bytes[..at], b"\xFF", &bytes[at + 1..]].concat()
+}
+
 #[test]
 fn a_test_square_is_a_square_where_the_pen_stands() {
     let mut pipe = Pipe::new(clean);
-    assert!(pipe.session.test_square(20.0).is_err(), "nobody knows where the pen is");
+    assert!(pipe.session.test_square(20.0).is_err(), "the plotter is not found yet");
     let until_ready = |pipe: &mut Pipe| while pipe.until("phase")["name"] != "ready" {};
     until_ready(&mut pipe);
-    pipe.session.command("$J=G91 X30 Y40 F3000").expect("sent");
+    // The place of the pen is told in inches, and in the coordinates of the user alone.
+    for setting in ["$13=1", "$10=0"] {
+        pipe.session.command(setting).expect("sent");
+        (0..100).for_each(|_| pipe.step());
+    }
+    pipe.session.command("$J=G91 G21 X30 Y40 F3000").expect("sent");
     pipe.until_state("Idle");
     (0..200).for_each(|_| pipe.step());
     pipe.board.begin_again();
@@ -293,6 +314,22 @@ fn a_test_square_is_a_square_where_the_pen_stands() {
         }
     }
     assert_eq!((low, high), ([30.0, 40.0], [50.0, 60.0]));
+    assert!(modes(&mut pipe).contains("G90"), "coordinates are absolute again");
+    // In check mode only the second side of a square that is too high is refused, and the machine
+    // is not locked. The line that ends the square may be lost behind that.
+    pipe.session.command("$131=100").expect("sent");
+    (0..100).for_each(|_| pipe.step());
+    pipe.session.command("$C").expect("sent");
+    pipe.until_state("Check");
+    (pipe.line, pipe.count) = (losing_the_end, 0);
+    pipe.session.test_square(90.0).expect("sent");
+    pipe.until("failed");
+    (0..100).for_each(|_| pipe.step());
+    assert!(modes(&mut pipe).contains("G90"), "coordinates are absolute behind it, too");
+    pipe.session.command("$C").expect("sent");
+    pipe.until_state("Idle");
+    (0..200).for_each(|_| pipe.step());
+    pipe.events.clear();
     // A square beyond the travel locks the machine, and the session goes on once it is unlocked.
     pipe.session.test_square(4000.0).expect("sent");
     let refused = pipe.until("failed");
@@ -304,6 +341,7 @@ fn a_test_square_is_a_square_where_the_pen_stands() {
     assert!(pipe.session.command("M5").is_err(), "it is locked");
     pipe.session.command("$X").expect("sent");
     until_ready(&mut pipe);
+    assert!(modes(&mut pipe).contains("G90"));
     // This board keeps no job.
     pipe.session.go_on(false).expect("sent");
     pipe.until("failed");

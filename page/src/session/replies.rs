@@ -1,7 +1,7 @@
 //! What a session does with what the plotter answers: each reply, and each step of a delivery, may
 //! end its phase.
 
-use super::Session;
+use super::{ABSOLUTE, Session};
 use crate::delivery::Outcome;
 use crate::event::Event;
 use crate::phase::Phase;
@@ -32,6 +32,11 @@ impl Session {
             Reply::Done(0) if self.phase == Phase::Numbering => {
                 self.number = 0;
                 self.enter(Phase::Ready);
+                if std::mem::take(&mut self.is_relative) {
+                    // The end of the square was refused, too.
+                    self.deliver(Rc::new(vec![JobLine::command(ABSOLUTE)]));
+                    self.enter(Phase::Commanding);
+                }
                 self.begin_job();
             }
             Reply::Other(line) => {
@@ -120,7 +125,11 @@ impl Session {
                 self.events.push(Event::Drawn { report });
                 self.enter(Phase::Ready);
             }
-            _ => self.enter(Phase::Ready),
+            _ => {
+                self.is_relative = false;
+                self.enter(Phase::Ready);
+                self.begin_job();
+            }
         }
     }
 
@@ -129,6 +138,7 @@ impl Session {
             self.fail(format!("What answers is not penup: it said \u{201c}{text}\u{201d}."));
             return self.close();
         }
+        self.is_relative = false;
         match self.phase {
             Phase::Closed | Phase::Finding => {}
             Phase::Greeting | Phase::Numbering => {
@@ -181,11 +191,10 @@ impl Session {
         if let Some((_, all)) = status.strokes {
             self.strokes = all;
         }
-        self.place = status.position.split(',').filter_map(|c| c.parse().ok()).collect();
         self.percent = status.percent.unwrap_or(self.percent);
         self.events.push(Event::Status {
             state: status.state.clone(),
-            position: self.place.clone(),
+            position: status.position.split(',').filter_map(|c| c.parse().ok()).collect(),
             percent: self.percent,
             stopped: status.stopped,
             strokes: status.strokes,
