@@ -65,7 +65,10 @@ export function fakeSerial() {
     readable: null,
     writable: null,
     open_reading() {
-      port.readable = new ReadableStream({ start: (controller) => (reading = controller) });
+      port.readable = new ReadableStream({
+        start: (controller) => (reading = controller),
+        cancel: () => (reading = null),
+      });
     },
     async open() {
       if (control.refuses) throw new DOMException("the port is in use", control.refuses);
