@@ -101,11 +101,14 @@ async function main() {
     example = link.get("file");
   const known = new Set(table.map((option) => option.name));
   values = new Map([...link].filter(([name]) => known.has(name)));
-  const isExample = EXAMPLES.some((name) => `${name}.obj` === example);
-  // If it is refused, it stays in the address: it may be mended when the page is loaded again.
-  if (given) origin = [["given", given]];
-  if (given) await openFrom("given", given, origin[0]);
-  else await openExample(isExample ? example : "lattice3.obj");
+  if (given) {
+    // If it is refused, it stays in the address: it may be mended when the page is loaded again.
+    origin = [["given", given]];
+    await openFrom("given", given, origin[0]);
+  } else {
+    const isExample = EXAMPLES.some((name) => `${name}.obj` === example);
+    await openExample(isExample ? example : "lattice3.obj");
+  }
   if (link.has("tab")) choose(link.get("tab"));
   keepOffline();
   document.documentElement.dataset.ready = "yes";

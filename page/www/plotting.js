@@ -207,8 +207,10 @@ export class Plotting {
 
   /** The line to the plotter has ended; if it broke, with a sentence. */
   lose(text) {
+    const { missing } = this;
     this.end();
-    if (text || this.missing) this.problem(`${text} ${this.missing}`.trim());
+    // What was said already stays.
+    if (text || this.missing !== missing) this.problem(`${text} ${this.missing}`.trim());
   }
 
   async plot() {
@@ -451,7 +453,9 @@ export class Plotting {
 
   /** The drawing is another one now: what was drawn before is not shown any more. */
   outdated() {
-    if (["closed", "ready"].includes(this.phase)) this.clear();
+    if (!["closed", "ready"].includes(this.phase)) return;
+    this.clear();
+    this.view.draw();
   }
 
   buttons() {
