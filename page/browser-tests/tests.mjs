@@ -402,6 +402,7 @@ test("another plotter that is chosen takes the place of a serial port at any tim
   await page.click("#plot");
   await page.waitForFunction(() => window.penup.plotting.session);
   await pass();
+  assert.ok(await page.evaluate(() => Boolean(window.penup.plotting.session)), "it goes on");
   await state("Drawn");
   assert.deepEqual(problems, []);
 });
