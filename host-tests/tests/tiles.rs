@@ -118,7 +118,7 @@ impl ModelSource for Given<'_> {
 fn options(seed: u64) -> Options {
     let mut random = Random::new(!seed);
     let [with_hidden, with_seams, merged_blocks, with_crease] = [0; 4].map(|_| random.once_in(2));
-    let crease = with_crease.then_some(Crease { cosine: 1 << 14, depth_stretch: (1, 1) });
+    let crease = with_crease.then_some(Crease { cosine: 1 << 19, depth_stretch: (1, 1) });
     Options { with_hidden, with_seams, merged_blocks, crease }
 }
 

@@ -305,6 +305,34 @@ fn an_edge_that_bends_by_the_crease_is_drawn_from_every_eye() {
     }
 }
 
+/// Two rectangles with a common edge. Cosines of small angles hardly differ from 1.
+#[test]
+fn a_slight_bend_is_told_from_one_that_is_a_little_less() {
+    for bend in [0.5, 1.0, 2.0, 5.0] {
+        let (y, x) = f64::to_radians(bend).sin_cos();
+        let mut bench = Bench::new();
+        bench.heard();
+        let model = format!(
+            "v -5 0 0\nv -5 0 9\nv 0 0 9\nv 0 0 0\nv {:.6} {:.6} 0\nv {:.6} {:.6} 9\nf 1 2 3 4\n\
+             f 4 3 6 5\n",
+            5.0 * x,
+            5.0 * y,
+            5.0 * x,
+            5.0 * y
+        );
+        assert!(!bench.say(&model).contains("error"));
+        for eye in ["30,-40,35", "17,-50,33", "-21,-44,-37", "5,-60,23", "13,-79,-59"] {
+            for projection in ["perspective", "orthographic"] {
+                let view = format!("$eye={eye}\n$at=0,0,4.5\n$projection={projection}\n");
+                for (crease, edges) in [(bend, 7), (bend + 0.1, 6), (bend - 0.1, 7)] {
+                    let found = seen(&mut bench, &format!("{view}$crease={crease}\n"));
+                    assert_eq!(found.expect("drawn").len(), edges, "{bend} {crease} {eye}");
+                }
+            }
+        }
+    }
+}
+
 /// What lies near the plane of the eye has its image almost at infinity.
 #[test]
 fn a_solid_that_is_partly_behind_the_eye_is_as_large_as_its_faces() {

@@ -178,7 +178,7 @@ fn a_ball_with_creases_only_is_its_outline() -> Result<(), VisibilityError> {
     }
     let view = View::new(&ball, EYE, [0.0; 3], UP, Projection::Parallel);
     let crease = Some(Crease {
-        cosine: 28378, // 30 degrees
+        cosine: 908_093, // 30 degrees
         depth_stretch: view.depth_stretch(),
     });
     let options = Options { crease, ..Options::default() };

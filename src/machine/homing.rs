@@ -198,7 +198,8 @@ impl Machine<'_> {
                 if alarm == Alarm::Restarted {
                     self.forget_what_needs_current();
                 }
-                true
+                // A line that led beyond the travel has lost nothing.
+                alarm != Alarm::SoftLimit
             }
             _ => return Err(self.refusal()),
         };

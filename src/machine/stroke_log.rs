@@ -53,10 +53,11 @@ impl Machine<'_> {
         self.log.open = Some(Open { begin, noted, most: None, is_whole: false });
     }
 
-    /// Whether a stroke may have to be noted now.
+    /// Whether a stroke may have to be noted now. The last one is so wherever the pen is: once
+    /// drivers are off, nobody knows where a motor has left it.
     #[inline(always)] // It is called in every turn of the main loop.
     pub fn may_note_stroke(&self) -> bool {
-        self.runner.is_pen_up() && self.log.open.is_some()
+        self.log.open.is_some_and(|open| open.is_whole || self.runner.is_pen_up())
     }
 
     /// Whether the machine waits with the pen raised until the stroke before has been noted.

@@ -25,9 +25,9 @@ impl<I: Index> Plotter<'_, I> {
         self.act(requests, board);
         self.inner.watch(board);
         self.inner.watch_idleness(board);
+        self.inner.note_progress(board);
         #[cfg(feature = "driver-pins")]
         self.inner.watch_drivers(board);
-        self.inner.note_progress(board);
         let planned = self.inner.plan(BegunJob::default(), board);
         #[cfg(feature = "early-ink")]
         let planned = self.inner.follow_order(board) || planned;
@@ -50,7 +50,7 @@ impl<I: Index> Plotter<'_, I> {
         // delays the steps.
         let waits = self.inner.must_wait();
         #[cfg(feature = "hpgl")]
-        let waits = self.hpgl.must_wait(waits);
+        let waits = self.hpgl.must_wait(waits) || self.inner.machine.notes_last_stroke();
         let waits = waits || !board.has_room(REPLY_BYTES);
         let byte = if waits { None } else { board.read_byte() };
         let Some((mut port, mut byte)) = byte else {

@@ -222,8 +222,8 @@ impl<I: Index> Inner<'_, I> {
                 machine.pause()?;
                 machine.reset_ink_budget();
                 if *for_pen {
-                    // Without a T nobody knows which one it is, so the next drawing asks.
-                    machine.set_pen(self.program.numbers().0.checked_sub(1).unwrap_or(u8::MAX));
+                    // Nobody knows whether it is changed, so the next drawing asks for its own.
+                    machine.set_pen(u8::MAX);
                 }
                 Reply(board).line(format_args!("[MSG:{text} send ~]"));
                 Ok(Progress::Done(Ok(())))

@@ -262,7 +262,9 @@ impl Axes {
         let middle = extents.map(|(low, high)| (low + high) / 2.0);
         let centre =
             [0, 1, 2].map(|row: usize| middle[row] - dot(self.directions[row], self.origin));
-        if centre[2] <= FAR * size {
+        // Far beside the line of sight, the axes would be too long for the arithmetic.
+        let is_ahead = |row: usize| libm::fabs(centre[row]) <= 2.0 * centre[2];
+        if centre[2] <= FAR * size || !is_ahead(0) || !is_ahead(1) {
             return None;
         }
         // x/w and y/w around the centre, to the first order.

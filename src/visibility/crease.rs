@@ -13,10 +13,10 @@ use crate::geometry::{Projection, Vertex, dot};
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
 pub struct Crease {
-    /// The cosine of the limit angle, in units of 2^-15, within ±2^15. An edge is drawn if the
+    /// The cosine of the limit angle, in units of 2^-20, within ±2^20. An edge is drawn if the
     /// angle between the normals of its two faces exceeds the limit.
     ///
-    /// A value of 2^15 draws every edge that is not flat; 0 draws those that are sharper than a
+    /// A value of 2^20 draws every edge that is not flat; 0 draws those that are sharper than a
     /// right angle.
     pub cosine: i32,
     /// The factor by which the view stretches depth relative to width and height, as a ratio. It is
@@ -70,8 +70,8 @@ impl Crease {
     fn is_sharp(&self, one: [i64; 3], other: [i64; 3]) -> bool {
         let dot = |a: [i64; 3], b: [i64; 3]| (0..3).map(|n| a[n] * b[n]).sum::<i64>(); // below 2^42
         // Compares the cosine of the angle between the normals with the limit. Both are squared and
-        // keep their signs; they stay below 2^115.
-        let cosine = dot(one, other) << 15;
+        // keep their signs; they stay below 2^124.
+        let cosine = dot(one, other) << 20;
         let limit = i64::from(self.cosine);
         product(cosine, cosine.abs())
             < product(dot(one, one), dot(other, other)) * i128::from(limit * limit.abs())
@@ -98,20 +98,22 @@ mod tests {
 
     #[test]
     fn the_angle_between_the_faces_decides() {
-        // cos 45 degrees = 23170 / 2^15.
+        // cos 45 degrees = 741455 / 2^20.
         for (left, right, is_drawn) in
             [(0, 0, false), (0, 999, false), (0, 1001, true), (-500, -500, true)]
         {
-            assert_eq!(draws(23170, (1, 1), left, right), is_drawn, "{left} {right}");
+            assert_eq!(draws(741_455, (1, 1), left, right), is_drawn, "{left} {right}");
         }
         // A right angle, approached from both sides; obtuse limits work as well.
         assert!(!draws(0, (1, 1), -999, -999) && draws(0, (1, 1), -1001, -1001));
-        assert!(!draws(-16384, (1, 1), -1700, -1700) && draws(-16384, (1, 1), -1800, -1800));
+        assert!(
+            !draws(-(1 << 19), (1, 1), -1700, -1700) && draws(-(1 << 19), (1, 1), -1800, -1800)
+        );
     }
 
     #[test]
     fn one_plane_has_no_crease_unless_it_is_folded() {
-        let crease = Crease { cosine: 1 << 15, depth_stretch: (1, 1) };
+        let crease = Crease { cosine: 1 << 20, depth_stretch: (1, 1) };
         let far = Vertex::new(0, 500, 1000);
         for (across, is_one_plane, is_drawn) in
             [(1000, true, false), (1000, false, true), (-1000, true, true)]
@@ -127,12 +129,12 @@ mod tests {
 
     #[test]
     fn the_stretch_of_depth_is_undone() {
-        assert!(!draws(23170, (7, 2), 0, 3499) && draws(23170, (7, 2), 0, 3501));
+        assert!(!draws(741_455, (7, 2), 0, 3499) && draws(741_455, (7, 2), 0, 3501));
     }
 
     #[test]
     fn a_silhouette_is_drawn_however_blunt() {
-        let crease = Crease { cosine: -(1 << 15), depth_stretch: (1, 1) };
+        let crease = Crease { cosine: -(1 << 20), depth_stretch: (1, 1) };
         let far = Vertex::new(0, 500, 1000);
         let one = [AT, far, Vertex::new(-1000, 0, 0)];
         for (tip, is_drawn) in [(-1, true), (0, true), (1, false)] {

@@ -607,3 +607,22 @@ fn a_job_goes_on_with_its_own_pen_behind_a_change_by_g_code() {
         assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
     });
 }
+
+/// Without current nobody knows where a motor holds the pen, so it counts as neither up nor down.
+#[test]
+fn a_job_whose_drivers_go_off_at_once_is_noted_to_its_end() {
+    let motors = ["$209=1", "$132=5", "$102=400", "$1=0"].map(str::to_owned);
+    let lines = [&motors[..], &cube()].concat();
+    switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.finish();
+        plotter.heard();
+        plotter.board.receive(b"$I\n");
+        for _ in 0..2000 {
+            while plotter.plotter.poll(plotter.board) {}
+            plotter.board.wait();
+        }
+        assert!(plotter.heard().ends_with("ok\n"), "the line is read");
+        assert!(!plotter.status().contains("Stopped"));
+    });
+}

@@ -15,7 +15,9 @@ mod unordered;
 
 pub(super) use lines::{Collector, PageSink, move_to_front};
 pub(super) use pipeline::{Found, Pipeline};
-pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP, fit};
+#[cfg(any(feature = "convex", feature = "tiles"))]
+pub(super) use scale::fit;
+pub(super) use scale::{FOR_BOUNDS, HALF_A_STEP};
 pub use strokes::{Cursor, Strokes};
 #[cfg(feature = "early-ink")]
 pub(super) use unordered::{Begun, OrderStep, UNORDERED_WORDS};

@@ -186,7 +186,7 @@ impl PlotOptions {
         // every eye, however the normals of their faces are rounded.
         let bend = (self.crease - CREASE_MARGIN).max(0.0);
         let crease = (self.crease > 0.0).then(|| Crease {
-            cosine: libm::round(sin_cos_degrees(bend).1 * 32768.0) as i32,
+            cosine: libm::round(sin_cos_degrees(bend).1 * 1_048_576.0) as i32,
             depth_stretch: view.depth_stretch(),
         });
         let with_hidden = self.hidden != HiddenLines::Erased;
