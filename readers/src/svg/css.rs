@@ -5,11 +5,15 @@
 //! custom properties, because `usvg` reads nothing that follows them. The pseudo-class `:root`
 //! becomes an attribute selector, which counts as much, for an attribute that the root is given.
 //! Units in capitals become small letters, and the marks of a comment of HTML around a style sheet
-//! are left out, as CSS wants it.
+//! are left out, as CSS wants it. A declaration that `usvg` cannot read is left out, so that the
+//! one before it or the attribute holds and those that follow are read. If there is nothing else
+//! and the declaration matters, a declaration of [`UNREAD`] takes its place, and the user is told.
 
 use super::{lengths, unread};
+use simplecss::DeclarationTokenizer;
 use std::borrow::Cow;
 use std::ops::Range;
+use svgtypes::Paint;
 use usvg::roxmltree::{Document, Node};
 
 /// A range of a text, and what stands there instead.
@@ -17,6 +21,14 @@ pub(super) type Edit = (Range<usize>, String);
 
 /// The attribute that the root of an SVG has for style sheets that name it.
 pub(super) const ROOT: &str = "data-penup-root";
+
+/// The property that stands for one whose value is not read. Its value is the name of that
+/// property, or [`VARIABLE`] if the value is a variable.
+pub(super) const UNREAD: &str = "penup-unread";
+pub(super) const VARIABLE: &str = "var";
+
+/// The properties whose values are paints or colours.
+const PAINTS: [&str; 4] = ["fill", "stroke", "color", "stop-color"];
 
 const ROOT_CLASS: &str = ":root";
 
@@ -29,9 +41,17 @@ pub(super) fn names_root(document: &Document<'_>) -> bool {
 
 /// The corrections of the CSS that an element has, in the text of the document.
 pub(super) fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<Edit> {
-    let mut ranges: Vec<_> =
-        node.attribute_node("style").map(|style| style.range_value()).into_iter().collect();
+    let mut ranges = Vec::new();
     let mut found = Vec::new();
+    for attribute in node.attributes().filter(|it| it.namespace().is_none()) {
+        if attribute.name() == "style" {
+            ranges.push(attribute.range_value());
+        } else if PAINTS.contains(&attribute.name()) {
+            let paint = plain_paint(attribute.value()).filter(|it| *it != attribute.value());
+            let paint = paint.filter(|paint| !paint.contains(['"', '\'', '&', '<']));
+            found.extend(paint.map(|paint| (attribute.range_value(), paint.to_owned())));
+        }
+    }
     if is_sheet(node) {
         let sheets = contents(node, text);
         let marks = sheets.iter().flat_map(|sheet| html_marks(text, sheet.clone()));
@@ -40,7 +60,8 @@ pub(super) fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<Edit> {
     }
     for range in ranges {
         let start = range.start;
-        let edits = edits(text.get(range).unwrap_or_default()).into_iter();
+        let has_attribute = |name: &str| !is_sheet(node) && node.has_attribute(name);
+        let edits = edits(text.get(range).unwrap_or_default(), has_attribute).into_iter();
         found.extend(edits.map(|(it, instead)| (start + it.start..start + it.end, instead)));
     }
     found
@@ -76,14 +97,36 @@ fn is_sheet(node: Node<'_, '_>) -> bool {
     node.is_element() && node.tag_name().name() == "style"
 }
 
-/// The corrections of a style sheet, or of a list of declarations.
-fn edits(css: &str) -> Vec<Edit> {
+/// The corrections of a style sheet, or of a list of declarations of an element that
+/// `has_attribute`s.
+fn edits(css: &str, has_attribute: impl Fn(&str) -> bool) -> Vec<Edit> {
     let mut edits = Vec::new();
+    // The paints that the present list has, and whether anything of the list is left.
+    let (mut paints, mut is_begun) = (Vec::new(), false);
     for part in parts(css) {
-        match part.end {
-            Some(b'{') => edits.extend(edits_of_selectors(&part)),
-            _ => edits.extend(edit_of_declaration(&part)),
+        if part.end == Some(b'{') {
+            edits.extend(edits_of_selectors(&part));
+            paints.clear();
+            is_begun = false;
+            continue;
         }
+        let has_paint = |name: &str| has_attribute(name) || paints.contains(&name);
+        let edit = match without_leading_comments(part.text) {
+            // `usvg` reads nothing behind a semicolon with which a list begins.
+            "" => (!is_begun && part.end == Some(b';')).then(|| {
+                let end = part.start + part.text.len();
+                (end..end + 1, String::new())
+            }),
+            own => edit_of_declaration(&part, own, has_paint),
+        };
+        is_begun |= match &edit {
+            Some((_, instead)) => !instead.is_empty(),
+            None => !part.text.trim().is_empty(),
+        };
+        if edit.as_ref().is_none_or(|(_, it)| !it.is_empty() && !it.starts_with(UNREAD)) {
+            paints.extend(part.text.split(':').next().map(str::trim));
+        }
+        edits.extend(edit);
     }
     for (range, instead) in &mut edits {
         // The lines of the text keep their numbers.
@@ -175,30 +218,70 @@ fn edits_of_selectors(part: &Part<'_>) -> Vec<Edit> {
     ranges.map(|range| (range, format!("[{ROOT}]"))).collect()
 }
 
-/// The correction of a declaration.
-fn edit_of_declaration(part: &Part<'_>) -> Option<Edit> {
-    let own = without_leading_comments(part.text);
+/// The correction of a declaration, which is `own` and perhaps comments before it. `has_paint`
+/// tells whether a paint is known without it.
+fn edit_of_declaration(
+    part: &Part<'_>,
+    own: &str,
+    has_paint: impl Fn(&str) -> bool,
+) -> Option<Edit> {
     let end = part.start + part.text.len();
     // The marks of CDATA stay.
     if own.contains('<') || own.contains("]]>") {
         return None;
     }
     let (name, value) = own.split_once(':')?;
-    if name.starts_with("--") {
-        // A semicolon alone is an error to `usvg`.
-        let end = end + usize::from(part.end == Some(b';'));
-        return is_whole(own)
-            .then(|| (part.start + part.text.len() - own.len()..end, String::new()));
-    }
     let start = end - value.trim_start().len();
     let value = unread::without_important(value);
     let plain = without_comments(value);
-    let instead = match name.trim_end() {
-        "transform" => unread::plain_transform(&plain)?,
-        "font" => without_line_height(&plain)?,
-        name => lengths::plain_value(name, &plain)?,
+    let name = name.trim_end();
+    let instead = match name {
+        "transform" => unread::plain_transform(&plain),
+        "font" => without_line_height(&plain),
+        name if PAINTS.contains(&name) => plain_paint(&plain).map(str::to_owned),
+        name => lengths::plain_value(name, &plain),
     };
-    (instead != value).then(|| (start..start + value.len(), instead))
+    if let Some(instead) = instead {
+        return (instead != value).then(|| (start..start + value.len(), instead));
+    }
+    let is_name = |letter: char| letter.is_alphanumeric() || matches!(letter, '-' | '_');
+    let is_read = || {
+        let read = DeclarationTokenizer::from(own).next();
+        !PAINTS.contains(&name)
+            && read.is_some_and(|read| without_comments(read.value).trim() == plain.trim())
+    };
+    if name.is_empty() || !name.chars().all(is_name) || !is_whole(own) || is_read() {
+        return None;
+    }
+    let start = end - own.len();
+    let what = if plain.contains("var(") { VARIABLE } else { name };
+    let is_silent = plain.is_empty()
+        || !unread::is_told(name)
+        || what != VARIABLE && PAINTS.contains(&name) && has_paint(name);
+    Some(match is_silent {
+        // A semicolon alone is an error to `usvg`.
+        true => (start..end + usize::from(part.end == Some(b';')), String::new()),
+        false => (start..end, format!("{UNREAD}:{what}")),
+    })
+}
+
+/// A paint as `usvg` reads it, which is the light one of two; `None` if it reads none.
+fn plain_paint(paint: &str) -> Option<&str> {
+    let pair = paint.strip_prefix("light-dark(");
+    let mut depth = 0_u32;
+    let is_end = |letter: char| {
+        match letter {
+            '(' => depth += 1,
+            ')' => depth = depth.saturating_sub(1),
+            _ => {}
+        }
+        depth == 0 && letter == ','
+    };
+    let light = pair.and_then(|pair| pair.get(..pair.find(is_end)?));
+    let paint = light.unwrap_or(paint).trim();
+    let keywords = ["none", "currentColor", "initial", "unset", "revert"];
+    let keyword = keywords.into_iter().find(|it| it.eq_ignore_ascii_case(paint));
+    keyword.or_else(|| Paint::from_str(paint).is_ok().then_some(paint))
 }
 
 fn without_leading_comments(text: &str) -> &str {
@@ -241,7 +324,7 @@ mod tests {
 
     fn edited(css: &str) -> String {
         let mut edited = css.to_owned();
-        for (range, instead) in edits(css).into_iter().rev() {
+        for (range, instead) in edits(css, |_| false).into_iter().rev() {
             edited.replace_range(range, &instead);
         }
         edited
@@ -274,7 +357,16 @@ mod tests {
             (".a{--b:c]]>", ".a{--b:c]]>"),
             ("--b:<![CDATA[;]]>c", "--b:<![CDATA[;]]>c"),
             ("'\\';transform:rotate(1deg)", "'\\';transform:rotate(1deg)"),
-            ("ä:{;}:;--:;é'", "ä:{;}:;é'"),
+            ("ä:{;}:;--:;é'", "ä:{}:;é'"),
+            ("a{; /**/;fill:red;;stroke-dasharray: ;}", "a{ /**/fill:red;;}"),
+            ("a:b(c(d));b:a/b;c:a=b;e:a:b;fill:red", "fill:red"),
+            ("fill:url(&quot;#a&quot;);stroke:red", "fill:url(&quot;#a&quot;);stroke:red"),
+            ("marker:url(data:a;base64,b);fill:RED", "marker:url(data:a;base64,b);fill:RED"),
+            ("fill:red;fill:color(a 1 1 1);stroke:oklch(1)", "fill:red;penup-unread:stroke"),
+            ("fill:a(1)}.b{fill:red}.c{fill:b(", "penup-unread:fill}.b{fill:red}.c{fill:b("),
+            ("stroke:light-dark(rgb(1, 2, 3), #FFF);fill:NONE", "stroke:rgb(1, 2, 3);fill:none"),
+            ("fill:CurrentColor;stroke:var(--a, b)", "fill:currentColor;penup-unread:var"),
+            ("r:calc((1px));--a:b;@import url(a:b);", "penup-unread:r;@import url(a:b);"),
         ] {
             assert_eq!(edited(css), corrected, "{css}");
         }

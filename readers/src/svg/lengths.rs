@@ -22,7 +22,7 @@ fn plain_length(length: &str) -> Option<String> {
 }
 
 /// The attributes and properties whose values are lengths, or lists of them.
-const LENGTHS: [&str; 23] = [
+pub(super) const LENGTHS: [&str; 23] = [
     "cx",
     "cy",
     "dx",

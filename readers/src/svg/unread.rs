@@ -1,7 +1,7 @@
 //! What an SVG asks for by means that are not read: properties and rules of CSS, scripts,
 //! animations, and paints of other programs. All of it is counted, for the user.
 
-use super::css::without_comments;
+use super::css::{UNREAD, VARIABLE, without_comments};
 use super::lengths;
 use super::markup::{Count, SHAPES, is_one_of};
 use std::collections::{BTreeMap, BTreeSet};
@@ -116,11 +116,27 @@ fn selects_sized(selectors: &str, sized: &BTreeSet<String>) -> bool {
     })
 }
 
+/// Whether it is told that a value of this property is not read.
+pub(super) fn is_told(name: &str) -> bool {
+    matches!(name, "fill" | "stroke" | "clip-path" | "font" | "transform")
+        || NOT_READ.contains(&name)
+        || lengths::LENGTHS.contains(&name)
+}
+
 /// What is not read of a property.
 fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> Option<String> {
     let is_usual = matches!(value, "" | "none" | "auto" | "inherit" | "initial" | "unset");
     if is_usual {
         return None;
+    }
+    if name == UNREAD {
+        return Some(match value {
+            VARIABLE => "a variable of CSS".to_owned(),
+            "fill" | "stroke" => {
+                format!("a {value} that is no name of a colour, #rrggbb, rgb() or hsl()")
+            }
+            name => format!("the property {name} of CSS"),
+        });
     }
     let is_unread = match name {
         "clip-path" => !value.starts_with("url(") && !value.contains("var("),

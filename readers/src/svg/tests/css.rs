@@ -62,6 +62,38 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
 }
 
 #[test]
+fn a_paint_that_is_not_read_leaves_the_one_before_it() {
+    let read = |path: &str| {
+        let contents = read(&in_mm(&format!("{path} d='M10 10H20'/>"))).expect("an SVG");
+        (polylines(&contents).len(), contents.notes().join("; "))
+    };
+    let path = "<path fill='none' stroke='#000'";
+    for style in [
+        "stroke:color(display-p3 0.74 0.95 0.39)",
+        "stroke: light-dark(rgb(0, 0, 0), rgb(255, 255, 255));",
+        "fill: light-dark(#ffffff, var(--dark, #121212)); stroke: light-dark(#000, rgb(1,1,1))",
+        "background: light-dark(rgb(1,1,1), a(2)); stroke: oklch(0.6 0.2 30)",
+        "; stroke: red",
+    ] {
+        assert_eq!(read(&format!("{path} style='{style}'")), (1, String::new()), "{style}");
+    }
+    for (shape, count) in [
+        ("<path fill='NONE' stroke='currentcolor'", 1),
+        ("<path fill='none' stroke='light-dark(rgb(1, 2, 3), #fff)'", 1),
+        (
+            "<path d='M1 1H9V9' style='stroke:NONE;stroke-dasharray: ;fill:red'/><path fill='none'",
+            1,
+        ),
+    ] {
+        assert_eq!(read(shape), (count, String::new()), "{shape}");
+    }
+    let sheet = "<style>.a{fill:none;stroke:oklch(0.6 0.2 30)}</style><path class='a' stroke='red'";
+    let (count, notes) = read(sheet);
+    assert_eq!(count, 1);
+    assert!(notes.contains("has a stroke that is no name of a colour, #rrggbb"), "{notes}");
+}
+
+#[test]
 fn the_dashes_of_a_stroke_of_fixed_width_are_measured_on_the_page() {
     // 20 pixels are 5.292 mm.
     let dashed = "<g transform='scale(10)'><path d='M1 1H2' stroke='red' stroke-dasharray='20' \
