@@ -22,6 +22,9 @@ const HARMLESS_RULES: [&str; 5] = ["charset", "font-face", "keyframes", "namespa
 /// The classes of a selector that are read.
 const CLASSES: [&str; 6] = ["active", "first-child", "focus", "hover", "link", "visited"];
 
+/// What is said of a style sheet by which a stroke is not seen.
+const WITHOUT_WIDTH: &str = "a stroke of the width 0";
+
 /// Counts what is not read, in sentences.
 pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
     let mut unread: BTreeMap<String, Count> = BTreeMap::new();
@@ -68,7 +71,8 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
     paints.say(&mut said, ["mesh or hatch is", "meshes or hatches are"], what);
     for (what, count) in &unread {
         let nouns = ["element or style sheet has", "elements or style sheets have"];
-        count.say(&mut said, nouns, &format!("{what}, which is not obeyed"));
+        let end = if what == WITHOUT_WIDTH { "drawn: give it a width" } else { "obeyed" };
+        count.say(&mut said, nouns, &format!("{what}, which is not {end}"));
     }
     said
 }
@@ -176,6 +180,7 @@ fn of_sheet(sheet: &str, sized: &BTreeSet<String>) -> Vec<String> {
         };
         let list = block.split('}').next().unwrap_or_default();
         unread.extend(of_selectors(prelude, list));
+        unread.extend(has_stroke_without_width(list).then(|| WITHOUT_WIDTH.to_owned()));
         // Other sizes are those of the whole picture, or of none.
         let reads_sizes = selects_sized(prelude, sized);
         let properties = declarations(list)
@@ -186,6 +191,15 @@ fn of_sheet(sheet: &str, sized: &BTreeSet<String>) -> Vec<String> {
         rest = after_block(body);
     }
     unread
+}
+
+/// Whether declarations ask for a stroke and give it the width 0. Illustrator gives that to what
+/// has no stroke.
+fn has_stroke_without_width(list: &str) -> bool {
+    let last = |name| declarations(list).filter(|it| it.0 == name).map(|it| it.1).last();
+    let width = last("stroke-width").unwrap_or_default();
+    let width = width.trim_end_matches(|letter: char| letter.is_ascii_alphabetic()).parse::<f64>();
+    width == Ok(0.0) && last("stroke").is_some_and(|paint| paint != "none")
 }
 
 /// What is not read of the selectors of a rule with these declarations.
@@ -308,6 +322,8 @@ mod tests {
             (".a{font:4px/1.5 Arial} .b{font:inherit} .c{font:bold 4px Arial !important}", ""),
             (".a{font:caption}", "the property font of CSS"),
             (".a{clip-path:circle(5px)}", "the property clip-path of CSS"),
+            (".a{stroke:red;stroke-width:0px}", "a stroke of the width 0"),
+            (".a{stroke-width:0}.b{stroke:none;stroke-width:0}.c{stroke:red;stroke-width:.1}", ""),
             (".a{", ""),
             ("@media {", "the rule @media of CSS"),
             ("}}{;@", ""),
