@@ -124,6 +124,15 @@ pub(super) fn is_said(root: Node<'_, '_>) -> bool {
     sides.any(|side| plain_length(side).is_some())
 }
 
+/// Whether no side of the root of an SVG has a unit of its own other than a pixel.
+pub(super) fn is_in_pixels(root: Node<'_, '_>) -> bool {
+    let mut sides = ["width", "height"].into_iter().filter_map(|name| root.attribute(name));
+    sides.all(|side| {
+        let number = side.trim().trim_end_matches(['p', 'x', 'P', 'X', '%']);
+        number.parse::<f64>().is_ok()
+    })
+}
+
 /// The corrections of the size of an SVG, whose root this is. Where one side has a length and the
 /// other is a part of the window, that other is left out, so that it follows from the viewBox.
 pub(super) fn edits_of_size(root: Node<'_, '_>) -> Vec<Edit> {

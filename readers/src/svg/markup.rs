@@ -295,20 +295,32 @@ impl<'a, 'input> Markup<'a, 'input> {
         said
     }
 
-    /// Says how large a unit is taken to be, if the file does not say the size of its `page`.
+    /// Says how large a unit is taken to be, if the file does not say the size of its `page`, or
+    /// says it in pixels of a program whose pixels have another size.
     pub(super) fn size_note(&self, page: Page) -> Option<String> {
-        if lengths::is_said(self.document.root_element()) {
+        let root = self.document.root_element();
+        let version = root.attribute((INKSCAPE, "version")).unwrap_or_default();
+        let minor = version.strip_prefix("0.").and_then(|it| it.split(['.', ' ']).next());
+        let is_old = minor.and_then(|it| it.parse().ok()).is_some_and(|minor: u32| minor < 92);
+        let program = if self.document.input_text().contains("Adobe Illustrator") {
+            Some(("Adobe Illustrator", 72.0, "1.3333"))
+        } else {
+            is_old.then_some(("Inkscape before 0.92", 90.0, "1.0667"))
+        };
+        let is_said = lengths::is_said(root);
+        if is_said && (program.is_none() || !lengths::is_in_pixels(root)) {
             return None;
         }
+        let what = if is_said { "gives its size in px" } else { "does not say its size" };
         let Page { width, height } = page;
         let mut note = format!(
-            "the SVG does not say its size: 96 units are taken as an inch, and its page is {width} \
-             x {height} mm"
+            "the SVG {what}: 96 units are taken as an inch, and its page is {width} x {height} mm"
         );
-        if self.document.input_text().contains("Adobe Illustrator") {
-            let [width, height] = [width, height].map(|size| (size * 400.0).round() / 300.0);
+        if let Some((program, units, scale)) = program {
+            let [width, height] =
+                [width, height].map(|size| (size * 9600.0 / units).round() / 100.0);
             note += &format!(
-                "; Adobe Illustrator takes 72: its size by --scale 1.3333 --page {width}x{height}"
+                "; {program} takes {units}: its size by --scale {scale} --page {width}x{height}"
             );
         }
         Some(note)

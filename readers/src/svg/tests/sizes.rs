@@ -94,3 +94,33 @@ fn units_in_capitals_are_units_and_other_lengths_are_named() {
         assert!(drawn(&format!("<g {harmless}>{line}</g>")).1.is_empty(), "{harmless}");
     }
 }
+
+#[test]
+fn programs_whose_pixels_have_another_size_are_told() {
+    let note = |attributes: &str| {
+        let svg = format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' \
+             xmlns:inkscape='http://www.inkscape.org/namespaces/inkscape' {attributes} \
+             viewBox='0 0 720 360'><path d='M10 25H90' stroke='red'/></svg>"
+        );
+        read(&svg).expect("an SVG").notes().join("; ")
+    };
+    let illustrator = "width='720px' height='360px' data-by='Adobe Illustrator 24'";
+    assert_eq!(
+        note(illustrator),
+        "the SVG gives its size in px: 96 units are taken as an inch, and its page is 190.5 x \
+         95.25 mm; Adobe Illustrator takes 72: its size by --scale 1.3333 --page 254x127"
+    );
+    let inkscape =
+        |version: &str, size: &str| note(&format!("inkscape:version='{version}' {size}"));
+    let size = "width='744.09448' height='1052.3622'";
+    for version in ["0.91 r13725", "0.48.4 r9939"] {
+        let note = inkscape(version, size);
+        let hint = "Inkscape before 0.92 takes 90: its size by --scale 1.0667 --page 210x297";
+        assert!(note.ends_with(hint), "{note}");
+        assert_eq!(inkscape(version, "width='210mm' height='297mm'"), "");
+    }
+    for version in ["0.92.4", "1.3.2 (091e20e)", "0.x", ""] {
+        assert_eq!(inkscape(version, size), "");
+    }
+}
