@@ -6,7 +6,7 @@ use usvg::roxmltree::Node;
 
 /// A length of CSS as `usvg` reads it: with a unit in small letters; `None` if it is no length, or
 /// depends on the window.
-fn plain_length(length: &str) -> Option<String> {
+pub(super) fn plain_length(length: &str) -> Option<String> {
     let length = length.trim();
     let number = length.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
     let unit = length.strip_prefix(number)?.to_ascii_lowercase();

@@ -124,3 +124,18 @@ fn programs_whose_pixels_have_another_size_are_told() {
         assert_eq!(inkscape(version, size), "");
     }
 }
+
+#[test]
+fn a_symbol_with_a_size_has_it_where_it_is_used() {
+    let used = |size: &str, own: &str| {
+        let path = "<path d='M1 1H9' stroke='red'/>";
+        positions(&in_mm(&format!(
+            "<symbol id='s' viewBox='0 0 10 10' {size}>{path}</symbol><use href='#s' {own}/>"
+        )))
+    };
+    let size = "width='20' height='20'";
+    assert_eq!(used(size, ""), [[[2.0, 98.0], [18.0, 98.0]]]);
+    assert_eq!(used(size, ""), used("", size));
+    assert_eq!(used(size, "width='10' height='10'"), [[[1.0, 99.0], [9.0, 99.0]]]);
+    assert_eq!(used("width='20'", "height='20'"), used("", size));
+}
