@@ -62,6 +62,11 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
         }
     }
     let mut said = Vec::new();
+    let mut sheets = Count::default();
+    let is_sheet = |it: &Node<'_, '_>| it.pi().is_some_and(|it| it.target == "xml-stylesheet");
+    document.root().children().filter(is_sheet).for_each(|node| sheets.add(document, node));
+    let what = "not read: put it into a style element of the file";
+    sheets.say(&mut said, ["style sheet elsewhere is", "style sheets elsewhere are"], what);
     scripts.say(&mut said, ["script is", "scripts are"], "not run");
     let what = "not obeyed: what is drawn is the state without them";
     animations.say(&mut said, ["animation is", "animations are"], what);

@@ -49,6 +49,11 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
         let notes = notes(more);
         assert!(matches!(notes.as_slice(), [note] if note.contains(said)), "{more}: {notes:?}");
     }
+    let svg = format!("<?xml version='1.0'?>\n<?xml-stylesheet href='a.css'?>{}", in_mm(line));
+    let notes_of_sheet = read(&svg).expect("an SVG").notes().to_vec();
+    let what =
+        "1 style sheet elsewhere is not read: put it into a style element of the file (line 2)";
+    assert_eq!(notes_of_sheet, [what]);
     for more in [
         "<path d='M1 1H9' fill='none'/>",
         "<g visibility='hidden'><path d='M1 1H9' fill='none' stroke='red' stroke-width='0'/></g>",
