@@ -77,7 +77,7 @@ impl Format for Svg {
     }
 
     fn may_be_binary(&self, beginning: &[u8]) -> bool {
-        beginning.starts_with(encoding::GZIP)
+        [encoding::GZIP, b"\xFF\xFE", b"\xFE\xFF"].iter().any(|it| beginning.starts_with(it))
     }
 
     fn read(

@@ -307,7 +307,8 @@ fn text_of_other_encodings_is_read() {
     let expected = of(svg.clone().into_bytes());
     assert!(expected.is_ok());
     let utf16 = |to_bytes: fn(u16) -> [u8; 2]| {
-        let text = format!("\u{FEFF}<?xml version='1.0' encoding='UTF-16'?>{svg}");
+        let text =
+            format!("\u{FEFF}<?xml version='1.0' encoding='UTF-16'?><!-- Привет, мир -->{svg}");
         text.encode_utf16().flat_map(to_bytes).collect::<Vec<u8>>()
     };
     assert_eq!(of(utf16(u16::to_le_bytes)), expected);
