@@ -51,18 +51,23 @@ const MOST_POINTS: usize = 10_000_000;
 const MOST_WORK: usize = 300_000_000;
 
 /// The units of `$INSUNITS` and their lengths in mm.
-const UNITS: [(i64, f64); 11] = [
+const UNITS: [(i64, f64); 15] = [
     (1, 25.4),
     (2, 304.8),
+    (3, 1_609_344.0),
     (4, 1.0),
     (5, 10.0),
     (6, 1000.0),
+    (7, 1_000_000.0),
     (8, 0.000_025_4),
     (9, 0.0254),
     (10, 914.4),
     (12, 0.000_1),
     (13, 0.001),
     (14, 100.0),
+    // The foot and the inch of surveyors in the USA.
+    (21, 1_200_000.0 / 3937.0),
+    (22, 100_000.0 / 3937.0),
 ];
 
 /// What is said of the entities of the space that is not drawn.
@@ -229,8 +234,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
                     self.skip("SPLINE without control points", entity.line);
                     return Ok(());
                 }
-                let wrong = || (entity.line, "the knots of the spline do not fit it".to_owned());
-                Curve::spline(spline).ok_or_else(wrong)?
+                let Some(curve) = Curve::spline(spline) else {
+                    self.skip("SPLINE whose knots do not fit it", entity.line);
+                    return Ok(());
+                };
+                curve
             }
             "POINT" => Curve::polyline(&[entity.point(10)?]),
             "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {

@@ -114,7 +114,9 @@ impl Curve {
 
     /// An arc of an ellipse with these half axes and angles in radians.
     pub(super) fn ellipse(centre: Point, axes: [Point; 2], [start, end]: [f64; 2]) -> Self {
-        let turn = (end - start).rem_euclid(TAU);
+        // The end of a whole ellipse may be rounded.
+        let is_whole = (TAU - 1e-5..TAU + 1e-5).contains(&(end - start));
+        let turn = if is_whole { 0.0 } else { (end - start).rem_euclid(TAU) };
         let turn = if turn < 1e-9 { TAU } else { turn };
         Self::elliptic(centre, axes, start, turn)
     }

@@ -41,7 +41,8 @@ fn strokes(text: &str) -> Vec<(String, Vec<[f64; 2]>)> {
 #[test]
 fn lines_and_polylines_have_true_size_in_any_unit() {
     let line = "0 LINE 8 walls 10 1 20 2 30 0 11 3 21 4 31 0";
-    for (units, factor) in [("4", 1.0), ("5", 10.0), ("1", 25.4), ("0", 1.0)] {
+    for (units, factor) in [("4", 1.0), ("5", 10.0), ("1", 25.4), ("0", 1.0), ("21", 304.800_609_6)]
+    {
         let at = |value: f64| (value * factor * 1000.0).round() / 1000.0;
         let expected = [[at(1.0), at(2.0)], [at(3.0), at(4.0)]];
         let [(pen, points)] = &strokes(&dxf(units, "", line))[..] else { panic!("{units}") };
@@ -160,6 +161,11 @@ fn arcs_circles_ellipses_bulges_and_splines_are_followed() {
         10.0 * FRAC_PI_2,
         [[5.0, 15.0], east],
     );
+    let whole = "0 ELLIPSE 10 5 20 5 11 10 21 0 40 1 41 0 42";
+    for end in ["6.28319", "6.283185307179586", "6.28318"] {
+        let drawn = strokes(&dxf("4", "", &format!("{whole} {end}")));
+        assert!(drawn.iter().flat_map(|it| &it.1).any(|[x, _]| *x < -4.9), "{end}");
+    }
     let round = "0 ELLIPSE 10 5 20 5 11 0 21 10 40 1 41 0 42 3.141592653589793";
     is_arc(round, [5.0; 2], 10.0, 10.0 * PI, [[5.0, 15.0], [5.0, -5.0]]);
     let bulge = |bulge: &str| format!("0 LWPOLYLINE 70 0 10 -5 20 5 42 {bulge} 10 15 20 5");
@@ -269,8 +275,8 @@ fn damaged_files_are_refused_with_their_line() {
         (dxf("4", "", "0 LINE 10 one"), "this is no number"),
         (dxf("4", "", "0 LINE 10 1e300"), "this is no number"),
         (dxf("4", "", "0 LINE 10 nan"), "this is no number"),
-        (dxf("3", "", "0 LINE 11 5"), "its unit ($INSUNITS) is none"),
-        (dxf("4", "", spline), "the knots of the spline do not fit it"),
+        (dxf("15", "", "0 LINE 11 5"), "its unit ($INSUNITS) is none"),
+        (dxf("4", "", spline), "1 SPLINE whose knots do not fit it is not drawn"),
         (dxf("4", "", "0 CIRCLE 40 1e11"), "too many points"),
         (dxf("4", "", "0 TEXT 1 a"), "nothing to draw in this DXF with 1 entity; 1 TEXT is not"),
         ("0\nEOF\n".to_owned(), "nothing to draw in this DXF"),
