@@ -229,7 +229,23 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
         dialect.take(byte);
     }
     let mut instruction = Instruction::default();
+    // The byte at which what is passed over ends: a line of PJL, or a name in quotation marks.
+    let mut passed_to = None;
     for (at, &byte) in bytes.iter().chain(b";").enumerate() {
+        if let Some(end) = passed_to {
+            passed_to = passed_to.filter(|_| byte != end);
+            continue;
+        }
+        if !dialect.is_in_text() && bytes.get(at..).is_some_and(|rest| rest.starts_with(b"@PJL")) {
+            passed_to = Some(b'\n');
+            continue;
+        }
+        // Only in a parameter of the instruction is it a name; behind CO it begins a comment.
+        if byte == b'"' && instruction.name == "BP" && !dialect.is_in_text() {
+            let rest = bytes.get(at + 1..).unwrap_or_default();
+            passed_to = rest.contains(&byte).then_some(byte);
+            continue;
+        }
         // The end of the file ends its last instruction, but is not a letter of a label.
         let ends_with_semicolon = dialect.is_in_data() || dialect.is_in_comment();
         if at == bytes.len() && dialect.is_in_text() && !ends_with_semicolon {

@@ -33,6 +33,17 @@ fn strokes_pens_and_relative_moves_are_read_whatever_ends_an_instruction() {
 }
 
 #[test]
+fn lines_of_pjl_and_names_in_quotation_marks_are_passed_over() {
+    let plain = lines("IN;PU40,40;PD80,40;");
+    for text in [
+        "\x1B%-12345X@PJL JOB NAME=\"PD1\"\r\n@PJL SET PD9,9\r\n\x1B%0BIN;PU40,40;PD80,40;",
+        "IN;BP1,\"PD1\",2,\"PD9,9\";PU40,40;PD80,40;",
+    ] {
+        assert_eq!(lines(text), plain, "{text:?}");
+    }
+}
+
+#[test]
 fn scales_turns_arcs_and_outlines_are_drawn() {
     assert_eq!(lines("IP0,0,4000,4000;SC0,10,0,10;PU1,1;PD2,1;")[1..3], ["v 10 10 0", "v 20 10 0"]);
     assert_eq!(lines("RO90;PU40,0;PD80,0;")[1..3], ["v 0 1 0", "v 0 2 0"]);
