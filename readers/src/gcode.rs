@@ -174,6 +174,10 @@ impl Interpreter {
                 self.changes.pause(number);
                 return Ok(true);
             }
+            Line::Servo(level) => {
+                self.signals.servo = Some(level);
+                return Ok(true);
+            }
             Line::Command(name) => {
                 self.skip(name, number);
                 return Ok(true);

@@ -1,12 +1,12 @@
 //! Decides which signal of a program lifts the pen, and during which moves it is down.
 //!
-//! In this order: the angle of a servo (`M280`, `M300`, `M340`); the height Z; the power S, where
-//! the spindle is on from the first move that draws to the last; the spindle or laser (`M3`, `M4`,
-//! `M5`), which with the power 0 does not draw, nor before the first power if the program says one;
-//! or, if none of these changes between moves, G1 to G3 draw and G0 does not. A height that only
-//! sets the focus of a laser is down during G0 with the laser off: then the laser must be on, too,
-//! for a move to draw. A laser that stays on over G0 does not burn there. But if any move extrudes,
-//! as on a 3D printer, those that do draw, and no others.
+//! In this order: the angle of a servo (`M280`, `M300`, `M340`, `SET_SERVO`); the height Z; the
+//! power S, where the spindle is on from the first move that draws to the last; the spindle or
+//! laser (`M3`, `M4`, `M5`), which with the power 0 does not draw, nor before the first power if
+//! the program says one; or, if none of these changes between moves, G1 to G3 draw and G0 does not.
+//! A height that only sets the focus of a laser is down during G0 with the laser off: then the
+//! laser must be on, too, for a move to draw. A laser that stays on over G0 does not burn there.
+//! But if any move extrudes, as on a 3D printer, those that do draw, and no others.
 //!
 //! A signal has levels at which the pen is up and others at which it is down. They are divided
 //! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may

@@ -15,6 +15,9 @@ pub(super) enum Line {
     Pause,
     /// A command of this name that takes no words, but text or named values.
     Command(String),
+    /// A command of Klipper, or a macro of its usual name, that sets the servo of the pen to this
+    /// level.
+    Servo(f64),
 }
 
 /// The commands `M` of Marlin behind which a text follows, such as a message or the name of a file.
@@ -86,6 +89,19 @@ pub(super) fn parse(text: &str) -> Result<Line, RefusalText> {
         return Ok(if code > Some(1) { Line::Command(name) } else { Line::Pause });
     }
     let takes_values = rest.split_whitespace().skip(1).all(|word| word.contains('='));
+    let level = match name.as_str() {
+        "PEN_UP" => Some(1.0),
+        "PEN_DOWN" => Some(0.0),
+        "SET_SERVO" => rest.split_whitespace().find_map(|word| {
+            let (key, level) = word.split_once('=')?;
+            let is_level = ["ANGLE", "WIDTH"].iter().any(|it| it.eq_ignore_ascii_case(key));
+            level.parse().ok().filter(|level: &f64| is_level && level.is_finite())
+        }),
+        _ => None,
+    };
+    if let Some(level) = level.filter(|_| takes_values) {
+        return Ok(Line::Servo(level));
+    }
     if letters.len() > 1 && name.len() > 2 && takes_values {
         return Ok(Line::Command(name));
     }
