@@ -44,7 +44,7 @@ fn a_job_that_comes_by_usb_is_the_same() -> TestResult {
 #[test]
 fn replies_longer_than_a_packet_and_floods_lose_no_byte() -> TestResult {
     let mut line = plugged_in()?;
-    line.emulator.send(b"$$\n")?;
+    line.emulator.send(b"$settings\n")?;
     let settings = hear_all(&mut line)?;
     assert!(settings.len() > 20, "{settings:?}");
     assert!(
