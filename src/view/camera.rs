@@ -259,25 +259,26 @@ impl Axes {
     /// most a 2·[`FAR`]th of their size.
     pub(super) fn parallel_if_far(&self, extents: &[(f64, f64); 3]) -> Option<Self> {
         let size = extents.iter().fold(0.0, |most, (low, high)| f64::max(most, high - low));
-        let middle = extents.map(|(low, high)| (low + high) / 2.0);
-        let centre =
-            [0, 1, 2].map(|row: usize| middle[row] - dot(self.directions[row], self.origin));
+        let [right, up, forward] = self.directions;
+        let [x, y, z] = extents.map(|(low, high)| (low + high) / 2.0);
+        let from_eye = |middle: f64, axis: Direction| middle - dot(axis, self.origin);
+        let [across, above, depth] = [from_eye(x, right), from_eye(y, up), from_eye(z, forward)];
         // Far beside the line of sight, the axes would be too long for the arithmetic.
-        let is_ahead = |row: usize| libm::fabs(centre[row]) <= 2.0 * centre[2];
-        if centre[2] <= FAR * size || !is_ahead(0) || !is_ahead(1) {
+        let is_ahead = |beside: f64| libm::fabs(beside) <= 2.0 * depth;
+        if depth <= FAR * size || !is_ahead(across) || !is_ahead(above) {
             return None;
         }
         // x/w and y/w around the centre, to the first order.
-        let [right, up, forward] = self.directions;
-        let slanted = |axis: Direction, row: usize| {
-            [0, 1, 2].map(|part: usize| axis[part] - centre[row] / centre[2] * forward[part])
-        };
+        let slanted = |axis, beside: f64| sum(axis, -beside / depth, forward);
         // Measured from the model, because the eye may be as far as 10^15.
-        let origin = [0, 1, 2].map(|part: usize| {
-            (0..3).map(|row| middle[row] * self.directions[row][part]).sum::<f64>()
-        });
-        Some(Self { directions: [slanted(right, 0), slanted(up, 1), forward], origin })
+        let origin = sum(sum(sum([0.0; 3], x, right), y, up), z, forward);
+        Some(Self { directions: [slanted(right, across), slanted(up, above), forward], origin })
     }
+}
+
+/// Returns a + factor b.
+fn sum([ax, ay, az]: Direction, factor: f64, [bx, by, bz]: Direction) -> Direction {
+    [ax + factor * bx, ay + factor * by, az + factor * bz]
 }
 
 /// From so many times the size of a model on, the eye counts as infinitely far.

@@ -191,10 +191,11 @@ impl<I: Index> SceneIndex<'_, I> {
     pub fn share_edge(&self, one: Face, other: Face) -> bool {
         let [one, other] = [one, other].map_each(|face| self.outlines.element(face.first));
         let at = |corner: &Corner<I>| self.coarse_projection.vertex(corner.vertex());
+        let is_same = |a: &Corner<I>, b: &Corner<I>| at(a) == at(b);
         // Most faces share the vertices themselves.
         Self::HAS_SHORTCUTS && has_edge_of(one, other, &|a, b| a.vertex() == b.vertex())
-            || has_edge_of(one, other, &|a, b| at(a) == at(b))
-            || has_edge_of(other, one, &|a, b| at(a) == at(b))
+            || has_edge_of(one, other, &is_same)
+            || has_edge_of(other, one, &is_same)
     }
 
     /// Returns the plane of a face that is a single triangle, and `None` for any other face.
