@@ -268,20 +268,24 @@ fn edit_of_declaration(
 /// A paint as `usvg` reads it, which is the light one of two; `None` if it reads none.
 fn plain_paint(paint: &str) -> Option<&str> {
     let pair = paint.strip_prefix("light-dark(");
+    let light = pair.and_then(|pair| pair.get(..find_outside_brackets(pair, |it| it == ',')?));
+    let paint = light.unwrap_or(paint).trim();
+    let keywords = ["none", "currentColor", "initial", "unset", "revert"];
+    let keyword = keywords.into_iter().find(|it| it.eq_ignore_ascii_case(paint));
+    keyword.or_else(|| Paint::from_str(paint).is_ok().then_some(paint))
+}
+
+/// Where the first such letter outside brackets stands.
+fn find_outside_brackets(text: &str, is_end: impl Fn(char) -> bool) -> Option<usize> {
     let mut depth = 0_u32;
-    let is_end = |letter: char| {
+    text.find(|letter| {
         match letter {
             '(' => depth += 1,
             ')' => depth = depth.saturating_sub(1),
             _ => {}
         }
-        depth == 0 && letter == ','
-    };
-    let light = pair.and_then(|pair| pair.get(..pair.find(is_end)?));
-    let paint = light.unwrap_or(paint).trim();
-    let keywords = ["none", "currentColor", "initial", "unset", "revert"];
-    let keyword = keywords.into_iter().find(|it| it.eq_ignore_ascii_case(paint));
-    keyword.or_else(|| Paint::from_str(paint).is_ok().then_some(paint))
+        depth == 0 && is_end(letter)
+    })
 }
 
 fn without_leading_comments(text: &str) -> &str {
@@ -305,16 +309,9 @@ fn without_line_height(font: &str) -> Option<String> {
     let slash = font.find(['/', '"', '\'']).filter(|at| font.as_bytes().get(*at) == Some(&b'/'))?;
     let (size, rest) = font.split_at(slash);
     let rest = rest.trim_start_matches('/').trim_start();
-    let mut depth = 0_u32;
-    let is_end = |letter: char| {
-        match letter {
-            '(' => depth += 1,
-            ')' => depth = depth.saturating_sub(1),
-            _ => {}
-        }
-        depth == 0 && (letter.is_whitespace() || matches!(letter, '"' | '\'' | '&'))
-    };
-    let family = rest.find(is_end).and_then(|end| rest.get(end..)).unwrap_or_default();
+    let is_end = |it: char| it.is_whitespace() || matches!(it, '"' | '\'' | '&');
+    let family =
+        find_outside_brackets(rest, is_end).and_then(|end| rest.get(end..)).unwrap_or_default();
     Some(format!("{} {}", size.trim_end(), family.trim_start()))
 }
 
