@@ -13,7 +13,8 @@
 //! many strokes are drawn. Its parts are computed again, and those that are drawn are left out.
 //!
 //! After a restart the machine does not know where the pen is. It must be homed, or the user puts
-//! the pen at the origin by hand and says so.
+//! the pen at the origin by hand and says so. A job that began at an origin set by hand does not go
+//! on in the coordinates of a machine that has been homed since: they begin elsewhere.
 //!
 //! Without the feature `resume` nothing of this takes space in an image.
 
@@ -45,7 +46,20 @@ pub(super) struct Resumption {
     /// Whether the job is computed part by part.
     #[cfg(feature = "tiles")]
     in_parts: bool,
-    /// Whether the position of the pen is not known since the job stopped.
+    /// How the plotter knows where the pen is.
     #[cfg(feature = "resume")]
-    is_lost: bool,
+    origin: Origin,
+}
+
+/// How the plotter knows where the pen is, and thus from where it counts coordinates.
+#[cfg(feature = "resume")]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+enum Origin {
+    /// The user has put the pen at the origin, or has drawn from where it was.
+    #[default]
+    ByHand,
+    /// The machine has been homed.
+    Homed,
+    /// Nobody has told it since a start, an alarm or `$SLP`.
+    Lost,
 }

@@ -187,16 +187,21 @@ fn after_a_cut_before_any_byte_of_the_log_the_drawing_is_whole() {
 fn cut_after_five_strokes(lines: &[String]) -> (CutFlash, Run) {
     let (flash, changes) = switch_on(empty_flash(), |plotter| {
         plotter.order(lines);
-        for _ in 0..60_000 {
-            plotter.run(1);
-            if plotter.plotter.machine().status().done.strokes == 6 {
-                break;
-            }
-        }
-        assert_eq!(plotter.plotter.machine().status().done.strokes, 6);
-        plotter.run(30);
+        draw_five_strokes(plotter);
     });
     (flash, strokes_of(changes.iter().map(PinChange::from)))
+}
+
+/// Draws on until the sixth stroke is planned.
+fn draw_five_strokes(plotter: &mut Powered<'_, '_>) {
+    for _ in 0..60_000 {
+        plotter.run(1);
+        if plotter.plotter.machine().status().done.strokes == 6 {
+            break;
+        }
+    }
+    assert_eq!(plotter.plotter.machine().status().done.strokes, 6);
+    plotter.run(30);
 }
 
 #[test]
@@ -419,6 +424,15 @@ fn a_job_that_is_given_up_or_stopped_in_an_emergency_can_go_on() {
     });
 }
 
+/// Where the pen is, in steps from where it was when the power came.
+fn position_of(plotter: &Powered<'_, '_>) -> Point {
+    let mut machine = Machine::default();
+    for change in plotter.board.trace().changes() {
+        machine.change(PinChange::from(&change));
+    }
+    machine.position()
+}
+
 /// Homes a machine whose pen was left at `at`, in steps from its switches, and returns where it is
 /// homed, in steps from there.
 fn home(plotter: &mut Powered<'_, '_>, at: Point) -> Point {
@@ -443,22 +457,67 @@ fn home(plotter: &mut Powered<'_, '_>, at: Point) -> Point {
 
 #[test]
 fn a_machine_with_limit_switches_is_homed_first() {
+    let lines = lattice("$hidden=erased");
+    let (whole, ..) = undisturbed(&lines);
+    let mut runs = vec![];
+    let mut flash = empty_flash();
+    for at in [(900, 400), (700, 300)] {
+        let mut homed = (0, 0);
+        let (kept, changes) = switch_on(flash, |plotter| {
+            plotter.heard();
+            if runs.is_empty() {
+                assert_eq!(plotter.say("$22=1"), "ok\n");
+                homed = home(plotter, at);
+                plotter.order(&lines);
+                draw_five_strokes(plotter);
+                return;
+            }
+            assert!(plotter.status().starts_with("<Alarm"));
+            assert!(plotter.say("$resume").ends_with("error:9\n"));
+            homed = home(plotter, at);
+            assert_eq!(plotter.say("$resume"), "ok\n");
+            plotter.finish();
+        });
+        flash = kept;
+        let mut strokes = strokes_of(changes.iter().map(PinChange::from));
+        for (x, y) in strokes.iter_mut().flatten() {
+            (*x, *y) = (*x - homed.0, *y - homed.1);
+        }
+        runs.push(strokes);
+    }
+    assert_one_drawing(&whole, &runs);
+}
+
+/// The origin that the user has set by hand is another one than that which homing finds, so the
+/// rest of the drawing would lie elsewhere on the sheet.
+#[test]
+fn a_job_that_began_at_an_origin_set_by_hand_does_not_go_on_from_a_homed_one() {
     let mut lines = lattice("$hidden=erased");
     let (whole, ..) = undisturbed(&lines);
     lines.insert(0, "$22=1".to_owned());
     let (flash, before) = cut_after_five_strokes(&lines);
-    let mut homed = (0, 0);
+    let mut origin = (0, 0);
     let (_, changes) = switch_on(flash, |plotter| {
-        plotter.heard();
-        assert!(plotter.status().starts_with("<Alarm"));
-        assert!(plotter.say("$resume").ends_with("error:9\n"));
-        homed = home(plotter, (700, 300));
-        assert_eq!(plotter.say("$resume"), "ok\n");
+        home(plotter, (700, 300));
+        let said = plotter.say("$resume");
+        assert!(said.contains("$SLP") && said.ends_with("error:169\n"), "{said}");
+        assert!(plotter.say("$resume=origin").ends_with("error:169\n"));
+        assert!(plotter.status().contains("|Stopped:5/"), "{}", plotter.status());
+        // The user moves the pen to that origin, and does what the message says.
+        assert_eq!(plotter.say("$J=G91 X3 Y2 F2000"), "ok\n");
         plotter.finish();
+        origin = position_of(plotter);
+        assert!(plotter.say("$SLP").ends_with("ok\n"));
+        plotter.send("\x18");
+        plotter.run(100);
+        assert!(plotter.say("$X").ends_with("ok\n"));
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        plotter.finish();
+        assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
     });
     let mut after = strokes_of(changes.iter().map(PinChange::from));
     for (x, y) in after.iter_mut().flatten() {
-        (*x, *y) = (*x - homed.0, *y - homed.1);
+        (*x, *y) = (*x - origin.0, *y - origin.1);
     }
     assert_one_drawing(&whole, &[before, after]);
 }

@@ -1,6 +1,6 @@
 //! What a board does that keeps how far jobs come.
 
-use super::Resumption;
+use super::{Origin, Resumption};
 use crate::checksum::Crc32;
 use crate::index::Index;
 use crate::machine::{Path, Setting, Settings, State, Value};
@@ -43,13 +43,13 @@ const PLACING: [Setting; 19] = [
 ];
 
 /// A mark at the beginning of the notes; those with another layout have another mark.
-const LAYOUT: u32 = u32::from_le_bytes(*b"run4");
+const LAYOUT: u32 = u32::from_le_bytes(*b"run5");
 /// The mark of the notes of a job that is sent while it is drawn.
-const STREAMED: u32 = u32::from_le_bytes(*b"str3");
+const STREAMED: u32 = u32::from_le_bytes(*b"str4");
 /// The mark of the notes of a drawing that is computed and drawn part by part. Its number of
 /// strokes is not known when it begins.
 #[cfg(feature = "tiles")]
-const PARTS: u32 = u32::from_le_bytes(*b"prt3");
+const PARTS: u32 = u32::from_le_bytes(*b"prt4");
 /// So many first strokes of a drawing in parts are noted one by one.
 #[cfg(feature = "tiles")]
 const ONE_BY_ONE: u32 = 1 << 14;
@@ -67,10 +67,11 @@ const MOST_NOTED: u32 = {
 #[cfg(feature = "stream")]
 const MOST_AT_ONCE: u32 = 1 << 12;
 /// Number of words before the settings: layout, version, strokes, whether the model is known, the
-/// checksums of model and options, and that of the firmware's sources. For a job that is sent the
-/// three before the last are how many strokes are noted at once, the number by which its sender
-/// knows it, and 0. For a drawing in parts, whose record has all that, they are 0.
-const HEAD: usize = 7;
+/// checksums of model and options, that of the firmware's sources, and whether the machine was
+/// homed. For a job that is sent the fourth to sixth are how many strokes are noted at once, the
+/// number by which its sender knows it, and 0. For a drawing in parts, whose record has all that,
+/// they are 0.
+const HEAD: usize = 8;
 /// Size of the notes in words: each setting takes two.
 const WORDS: usize = HEAD + 2 * PLACING.len();
 const _: () = assert!(WORDS * size_of::<u32>() <= crate::storage::NOTE_BYTES);
@@ -116,12 +117,19 @@ fn word(notes: &Notes, index: usize) -> u32 {
     notes.get(index).map_or(0, |word| u32::from_le_bytes(*word))
 }
 
-/// Returns the notes of a job of this many strokes. `layout` is the mark of their layout, and
-/// `more` are three words that identify the job.
+/// Returns the notes of a job of this many strokes, which is drawn from this origin. `layout` is
+/// the mark of their layout, and `more` are three words that identify the job.
 #[inline(never)] // It is called in several places, and its loop is unrolled.
-fn begin_notes(settings: &Settings, layout: u32, strokes: u32, more: [u32; 3]) -> Notes {
+fn begin_notes(
+    settings: &Settings,
+    layout: u32,
+    strokes: u32,
+    more: [u32; 3],
+    origin: Origin,
+) -> Notes {
     let [first, second, third] = more;
-    let head = [layout, version(), strokes, first, second, third, records::SOURCES];
+    let is_homed = u32::from(origin == Origin::Homed);
+    let head = [layout, version(), strokes, first, second, third, records::SOURCES, is_homed];
     let settings = PLACING.into_iter().flat_map(|setting| {
         [setting.info().number().into(), placed(settings, setting).to_bits().cast_unsigned()]
     });
@@ -158,6 +166,16 @@ pub(in crate::plotter) struct KeptParts {
     pub drawn: Option<u32>,
 }
 
+impl Origin {
+    /// The origin of what is drawn now.
+    const fn taken_for_known(self) -> Self {
+        match self {
+            Self::Homed => Self::Homed,
+            Self::ByHand | Self::Lost => Self::ByHand,
+        }
+    }
+}
+
 impl Resumption {
     /// How many strokes of a job that has stopped are drawn, and how many there are.
     pub(in crate::plotter) fn stopped(&self, state: State) -> Option<[u32; 2]> {
@@ -185,14 +203,20 @@ impl Resumption {
         self.progress.is_some()
     }
 
-    /// Whether the position of the pen is not known since the job stopped.
+    /// What is known when a job begins: nothing but the origin. A user who draws where nobody has
+    /// told the plotter where the pen is takes that place for known.
+    fn anew(self) -> Self {
+        Self { origin: self.origin.taken_for_known(), ..Self::default() }
+    }
+
+    /// The position of the pen is not known any more.
     pub(in crate::plotter) fn lose_position(&mut self) {
-        self.is_lost = true;
+        self.origin = Origin::Lost;
     }
 
     /// The machine has been homed.
     pub(in crate::plotter) fn find_position(&mut self) {
-        self.is_lost = false;
+        self.origin = Origin::Homed;
     }
 
     /// Reports a job that has stopped, if there is one.
@@ -240,7 +264,7 @@ impl<I: Index> Inner<'_, I> {
         let found = read(board);
         self.resumption.progress =
             found.map(|(notes, noted)| [done(&notes, noted), all_strokes(&notes, noted, board)]);
-        self.resumption.is_lost = true;
+        self.resumption.lose_position();
     }
 
     /// Begins to keep how far the job comes that has just begun. `contents` as for
@@ -255,7 +279,7 @@ impl<I: Index> Inner<'_, I> {
         if self.machine.state() != State::Run {
             return;
         }
-        self.resumption = Resumption::default();
+        self.resumption = self.resumption.anew();
         if !board.keeps_progress() {
             return;
         }
@@ -265,7 +289,8 @@ impl<I: Index> Inner<'_, I> {
         if self.job.unordered().is_some() {
             more[0] |= IS_ESTIMATE;
         }
-        let notes = begin_notes(self.machine.settings(), LAYOUT, strokes, more);
+        let origin = self.resumption.origin;
+        let notes = begin_notes(self.machine.settings(), LAYOUT, strokes, more, origin);
         if board.begin_progress(notes.as_flattened(), strokes).is_err() {
             return refuse(board);
         }
@@ -365,18 +390,17 @@ impl<I: Index> Inner<'_, I> {
             if !at_origin {
                 return Err(CommandError::NothingToResume);
             }
-            if !self.resumption.is_lost {
+            if self.resumption.origin != Origin::Lost {
                 return Err(CommandError::PositionKnown);
             }
             self.machine.declare_origin()?;
-            self.resumption.is_lost = false;
+            self.resumption.origin = Origin::ByHand;
             return Ok(StoppedJob::Sent);
         }
-        if self.resumption.is_lost && !at_origin {
-            return Err(CommandError::PositionUnknown);
-        }
-        if at_origin && !self.resumption.is_lost {
-            return Err(CommandError::PositionKnown);
+        match (self.resumption.origin, at_origin) {
+            (Origin::Lost, false) => return Err(CommandError::PositionUnknown),
+            (Origin::ByHand | Origin::Homed, true) => return Err(CommandError::PositionKnown),
+            _ => {}
         }
         #[cfg(feature = "tiles")]
         if is_in_parts(&notes) {
@@ -387,8 +411,8 @@ impl<I: Index> Inner<'_, I> {
             }
             if at_origin {
                 self.machine.declare_origin()?;
+                self.resumption.origin = Origin::ByHand;
             }
-            self.resumption.is_lost = false;
             let drawn = Some(done(&notes, noted));
             return Ok(StoppedJob::InParts(KeptParts { drawn, ..kept }));
         }
@@ -405,7 +429,7 @@ impl<I: Index> Inner<'_, I> {
             self.machine.declare_origin()?;
         }
         let progress = Some([noted.parts, all]);
-        self.resumption = Resumption { progress, ..Resumption::default() };
+        self.resumption = Resumption { progress, ..self.resumption.anew() };
         Ok(StoppedJob::Loaded(noted))
     }
 
@@ -466,7 +490,7 @@ impl<I: Index> Inner<'_, I> {
         if board.note_progress(u32::MAX).is_err() {
             refuse(board);
         }
-        self.resumption = Resumption::default();
+        self.resumption = self.resumption.anew();
         Reply(board).line(format_args!("[MSG:nothing is left to draw: the drawing is complete]"));
         Ok(())
     }
@@ -482,13 +506,14 @@ impl<I: Index> Inner<'_, I> {
         kept: Option<KeptParts>,
         board: &mut B,
     ) {
-        self.resumption = Resumption::default();
+        self.resumption = self.resumption.anew();
         if !board.keeps_progress() {
             return;
         }
         let drawn = kept.and_then(|kept| kept.drawn);
         if drawn.is_none() {
-            let notes = begin_notes(self.machine.settings(), PARTS, u32::MAX, [0; 3]);
+            let origin = self.resumption.origin;
+            let notes = begin_notes(self.machine.settings(), PARTS, u32::MAX, [0; 3], origin);
             // The rest of what another build has kept would be refused.
             let is_saved = kept.is_some_and(|kept| kept.sources == records::SOURCES);
             if !is_saved && !records::save_parts(&self.options, time_model, model, board) {
@@ -524,6 +549,9 @@ impl<I: Index> Inner<'_, I> {
         let is_computed = is_known != 0 && !is_streamed(notes);
         if is_computed && !is_empty && model != self.model.checksum() {
             return Err(CommandError::OtherModel);
+        }
+        if self.resumption.origin == Origin::Homed && word(notes, 7) == 0 {
+            return Err(CommandError::OtherOrigin);
         }
         Ok(())
     }
@@ -575,7 +603,8 @@ impl<I: Index> Inner<'_, I> {
     #[cfg(feature = "stream")]
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(in crate::plotter) fn keep_streamed<B: Board>(&mut self, id: u32, board: &mut B) {
-        let stopped = core::mem::take(&mut self.resumption).progress;
+        let stopped = self.resumption.progress;
+        self.resumption = self.resumption.anew();
         if self.machine.state() != State::Run || !board.keeps_progress() {
             return;
         }
@@ -593,7 +622,7 @@ impl<I: Index> Inner<'_, I> {
                 progress: Some([drawn, all]),
                 more_at_once: word(&notes, 3).saturating_sub(1),
                 drawn_before: drawn,
-                ..Resumption::default()
+                ..self.resumption
             };
             return;
         }
@@ -604,7 +633,8 @@ impl<I: Index> Inner<'_, I> {
         for power in 0..=MOST_AT_ONCE.ilog2() {
             let at_once = 1 << power;
             let more = [at_once, id, 0];
-            let notes = begin_notes(self.machine.settings(), STREAMED, strokes, more);
+            let origin = self.resumption.origin;
+            let notes = begin_notes(self.machine.settings(), STREAMED, strokes, more, origin);
             let parts = strokes.div_ceil(at_once);
             if board.begin_progress(notes.as_flattened(), parts).is_ok() {
                 self.machine.log_strokes(0);
@@ -637,7 +667,7 @@ impl<I: Index> Inner<'_, I> {
         };
         self.check_notes(&notes)?;
         let id = word(&notes, 4);
-        let is_lost = u8::from(self.resumption.is_lost);
+        let is_lost = u8::from(self.resumption.origin == Origin::Lost);
         Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost}]"));
         Ok(true)
     }
@@ -763,11 +793,11 @@ mod tests {
             (1 | IS_ESTIMATE, 10, 11),
             (IS_ESTIMATE, 25, 26),
         ] {
-            let notes = begin_notes(&settings, LAYOUT, 10, [known, 7, 8]);
+            let notes = begin_notes(&settings, LAYOUT, 10, [known, 7, 8], Origin::Homed);
             assert_eq!(strokes_without_order(&notes, done), all, "{known}: {done}");
         }
         // In other notes the word is something else.
-        let notes = begin_notes(&settings, STREAMED, 10, [3, 7, 8]);
+        let notes = begin_notes(&settings, STREAMED, 10, [3, 7, 8], Origin::Homed);
         assert_eq!(strokes_without_order(&notes, 10), 10);
     }
 }

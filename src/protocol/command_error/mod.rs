@@ -157,6 +157,9 @@ pub enum CommandError {
     },
     /// The model is not that of the job that has stopped.
     OtherModel,
+    /// The job that has stopped began at an origin set by hand, and the machine has been homed
+    /// since.
+    OtherOrigin,
     /// A line of strokes is not written as one.
     #[cfg(feature = "stream")]
     NotStrokes,
@@ -446,6 +449,18 @@ impl CommandError {
                 ),
             ),
             #[cfg(feature = "resume")]
+            Self::OtherOrigin => row(
+                error(169, "the job began at an origin set by hand").client(
+                    "the job began at an origin set by hand, and the machine was homed since: put \
+                     the pen at that origin (`penup jog` moves it), switch the plotter off and on, \
+                     then `penup unlock` and `penup resume --at-origin`",
+                ),
+                format_args!(
+                    "$H found another origin than the one at which the job began: move the pen to \
+                     that one, then send $SLP, ctrl-X, $X and $resume=origin"
+                ),
+            ),
+            #[cfg(feature = "resume")]
             Self::PositionKnown => row(
                 error(168, "the plotter knows where the pen is").client(
                     "the plotter knows where the pen is: leave out --at-origin; if the pen was \
@@ -462,7 +477,8 @@ impl CommandError {
             | Self::PositionKnown
             | Self::OtherVersion
             | Self::OtherSetting { .. }
-            | Self::OtherModel => Self::NoJobKept.explain(row),
+            | Self::OtherModel
+            | Self::OtherOrigin => Self::NoJobKept.explain(row),
             #[cfg(feature = "stream")]
             Self::NotStrokes => row(
                 error(180, "not a line of strokes"),

@@ -97,6 +97,7 @@ pub fn error_samples() -> Vec<CommandError> {
         OtherVersion,
         OtherSetting { setting: Setting::DotLength, before: one },
         OtherModel,
+        OtherOrigin,
         Damaged,
         OutOfOrder { expected: 17 },
         Unnumbered,
