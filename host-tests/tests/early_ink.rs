@@ -509,3 +509,64 @@ fn a_job_without_an_order_is_drawn_again() {
         assert_eq!(drawn(&changes), whole);
     }
 }
+
+/// The flash refuses a job, and takes writes again before the order of that job is known. The order
+/// must not be kept behind the job that the flash still holds, which goes on with its own.
+#[test]
+fn an_order_is_not_kept_behind_another_job() {
+    let lines = lattice();
+    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
+    let budget = bytes - 256 * (whole.len() + 2);
+    let flash = CutFlash { budget, ..empty_flash() };
+    let (flash, before) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
+        plotter.order(&lines);
+        plotter.run(10_000);
+    });
+    let (plot, model) = lines.split_last().expect("a job");
+    let (flash, _) = switch_on_early::<16384>(flash.powered(), Some(MILLISECOND), |plotter| {
+        plotter.order(model);
+        assert_eq!(plotter.say("$page=59x59"), "ok\n");
+        plotter.board.flash().expect("flash").budget = 0;
+        let answer = plotter.say(plot);
+        assert!(answer.contains("$again will not draw this") && answer.ends_with("ok\n"), "{answer}");
+        let flash = plotter.board.flash().expect("flash");
+        (flash.budget, flash.is_cut) = (usize::MAX, false);
+        plotter.finish();
+        assert_eq!(strokes_stopped(&plotter.status()), None);
+    });
+    let (_, after) = switch_on_early::<16384>(flash.powered(), Some(MILLISECOND), |plotter| {
+        assert!(go_on(plotter));
+        plotter.finish();
+    });
+    assert_one_drawing(&whole, &[drawn(&before), drawn(&after)]);
+}
+
+/// The number of strokes is an estimate as long as the order is not known.
+#[test]
+fn a_resumed_job_tells_its_strokes_once_its_order_is_known() {
+    let lines = lattice();
+    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
+    let budget = bytes - 256 * (whole.len() + 2);
+    let flash = CutFlash { budget, ..empty_flash() };
+    let (flash, _) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
+        plotter.order(&lines);
+        plotter.run(10_000);
+    });
+    switch_on_early::<16384>(flash.powered(), Some(MILLISECOND), |plotter| {
+        let estimate = plotter.status();
+        assert_ne!(strokes_stopped(&estimate), Some(whole.len()), "{estimate}");
+        assert_eq!(plotter.say("$resume=origin"), "ok\n");
+        plotter.run(2000);
+        plotter.send("\x18");
+        plotter.run(1000);
+        let status = plotter.status();
+        assert_eq!(strokes_stopped(&status), Some(whole.len()), "{status}");
+    });
+}
+
+/// The number of all strokes of the job that has stopped, according to a status.
+fn strokes_stopped(status: &str) -> Option<usize> {
+    let (_, stopped) = status.split_once("|Stopped:")?;
+    let (_, all) = stopped.split(['|', '>']).next()?.split_once('/')?;
+    all.parse().ok()
+}

@@ -141,6 +141,30 @@ fn a_second_m3_lowers_a_pen_that_was_raised_by_itself() {
     assert_eq!(heights(&bench), [127, 0]);
 }
 
+/// The board refuses to write its flash while a step is due.
+#[test]
+fn coordinate_systems_are_kept_in_check_mode_once_the_machine_stands() {
+    switch_on(empty_flash(), |plotter| {
+        plotter.say("$J=G91 X5 F600");
+        // The check begins as soon as it may, while the last steps are still due.
+        while !plotter.heard().contains("[MSG:Enabled]") {
+            plotter.board.receive(b"$C\n");
+            while plotter.plotter.poll(plotter.board) {}
+            plotter.board.wait();
+        }
+        assert!(!plotter.plotter.machine().is_stopped());
+        plotter.board.receive(b"G10 L2 P1 X10 Y20\n$C\n");
+        for _ in 0..3000 {
+            while plotter.plotter.poll(plotter.board) {}
+            plotter.board.wait();
+        }
+        let heard = plotter.heard();
+        assert!(heard.starts_with("ok\n[MSG:Disabled]"), "{heard}");
+        let kept = plotter.say("$#");
+        assert!(kept.contains("[G54:10.000,20.000,0.000]"), "{kept}");
+    });
+}
+
 #[test]
 fn coordinate_systems_that_are_set_in_check_mode_are_kept() {
     let (flash, _) = switch_on(empty_flash(), |plotter| {
