@@ -1,7 +1,7 @@
 //! Jobs on the board in memory whose power fails, and the ink that they leave on the paper.
 
 use penup::boards::host::{CutArea, CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH, Stamped};
-use penup::machine::{EventRing, PulserState};
+use penup::machine::{Contacts, EventRing, PulserState};
 use penup::plotter::{Board, EMPTY_LOOKAHEAD, Memory, Plotter, start};
 use penup_client::emulator::{Machine, MachineEventKind};
 use penup_job::pins::PinChange;
@@ -81,6 +81,41 @@ impl Powered<'_, '_> {
         let passed = self.run(3_600_000);
         assert!(passed < 3_600_000, "the job does not end");
         passed
+    }
+
+    /// Homes the machine, whose pen was left at `at` when the power came, in steps from its
+    /// switches. Returns where it is homed, in steps from there.
+    ///
+    /// # Panics
+    /// Panics if the machine is not homed within a minute.
+    pub fn home(&mut self, at: Point) -> Point {
+        self.heard();
+        self.board.receive(b"$H\n");
+        let (mut machine, mut seen) = (Machine::default(), 0);
+        for _ in 0..60_000 {
+            let changes = self.board.trace().changes();
+            for change in &changes[seen..] {
+                machine.change(PinChange::from(change));
+            }
+            seen = changes.len();
+            let (x, y) = machine.position();
+            self.board.set_contacts(Contacts { x: at.0 + x <= 0, y: at.1 + y <= 0, stop: false });
+            while self.plotter.poll(self.board) {}
+            self.board.wait();
+            if self.heard().ends_with("ok\n") {
+                return machine.position();
+            }
+        }
+        panic!("the machine is not homed: {}", self.status());
+    }
+
+    /// Where the pen is, in steps from where it was when the power came.
+    pub fn position(&self) -> Point {
+        let mut machine = Machine::default();
+        for change in self.board.trace().changes() {
+            machine.change(PinChange::from(&change));
+        }
+        machine.position()
     }
 
     /// The status report.

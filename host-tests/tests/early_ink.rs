@@ -528,7 +528,10 @@ fn an_order_is_not_kept_behind_another_job() {
         assert_eq!(plotter.say("$page=59x59"), "ok\n");
         plotter.board.flash().expect("flash").budget = 0;
         let answer = plotter.say(plot);
-        assert!(answer.contains("$again will not draw this") && answer.ends_with("ok\n"), "{answer}");
+        assert!(
+            answer.contains("$again will not draw this") && answer.ends_with("ok\n"),
+            "{answer}"
+        );
         let flash = plotter.board.flash().expect("flash");
         (flash.budget, flash.is_cut) = (usize::MAX, false);
         plotter.finish();

@@ -249,6 +249,23 @@ fn homing_that_is_given_up_leaves_the_alarm_in_which_it_began() {
         plotter.send("\x18");
         plotter.run(1000);
         assert_eq!(plotter.plotter.machine().state(), State::Idle);
+        // Once x counts from its switch, and y from another place, nobody does.
+        let began = plotter.plotter.machine().position();
+        plotter.board.receive(b"$H\n");
+        for _ in 0..60_000 {
+            while plotter.plotter.poll(plotter.board) {}
+            let at = plotter.plotter.machine().position();
+            if at.y < began.y {
+                break;
+            }
+            let x = at.x <= began.x - 400;
+            plotter.board.set_contacts(Contacts { x, y: false, stop: false });
+            plotter.board.wait();
+        }
+        plotter.heard();
+        plotter.send("\x18");
+        plotter.run(1000);
+        assert_asks_for_homing(plotter);
     });
 }
 

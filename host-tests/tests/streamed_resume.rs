@@ -215,6 +215,39 @@ fn what_a_drawing_depends_on_must_be_as_it_was() {
     });
 }
 
+/// A drawing of which no stroke is drawn may begin anew at another origin. Then that counts.
+#[test]
+fn a_drawing_that_begins_anew_goes_on_at_the_origin_where_it_began() {
+    let options = ["$page=20x20", "$margin=4", "$22=1"];
+    let lines = job_lines("cube.obj", &[&QUICK_PEN[..], &options].concat());
+    let mut drawing = Drawing::of(&lines);
+    let job = drawing.from(0);
+    let mut random = Random::new(3);
+    let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+        plotter.order(&drawing.settings);
+        plotter.home((700, 300));
+        assert!(!send(plotter, &job, 0, 200, &mut random));
+    });
+    let (flash, _) = switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
+        plotter.heard();
+        assert!(plotter.say("$X").ends_with("ok\n"));
+        let [_, drawn, _, lost] = stopped(plotter).expect("it has stopped");
+        assert_eq!([drawn, lost], [0, 1]);
+        assert!(!send(plotter, &job, 0, 1800, &mut random));
+    });
+    switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
+        plotter.home((700, 300));
+        assert!(plotter.say("$stream").ends_with("error:169\n"));
+        // The user says that the pen is there.
+        assert!(plotter.say("$SLP").ends_with("ok\n"));
+        plotter.send("\x18");
+        plotter.run(100);
+        assert!(plotter.say("$X").ends_with("ok\n"));
+        let [_, drawn, _, lost] = stopped(plotter).expect("it goes on there");
+        assert!(drawn > 0 && lost == 1, "{drawn} {lost}");
+    });
+}
+
 /// The notes of an attempt that was given up before its first stroke are not those of a later one
 /// with another setting.
 #[test]

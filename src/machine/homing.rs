@@ -120,16 +120,16 @@ pub(super) struct Homing {
     pub(super) pressed_at: Option<PagePoint>,
     /// Whether the move of this phase has been planned to its end.
     pub(super) is_stopped: bool,
-    /// Whether the position was unknown when homing began.
-    pub(super) was_lost: bool,
+    /// Whether the position is unknown, as it was when homing began or because one axis is homed.
+    pub(super) is_lost: bool,
 }
 
 impl Homing {
     /// Returns the first phase of homing an axis, which depends on whether its switch is `pressed`
     /// already.
-    pub(super) const fn begin(axis: Axis, pressed: bool, was_lost: bool) -> Self {
+    pub(super) const fn begin(axis: Axis, pressed: bool, is_lost: bool) -> Self {
         let phase = if pressed { Phase::Leave } else { Phase::Seek };
-        Self { axis, phase, pressed_at: None, is_stopped: false, was_lost }
+        Self { axis, phase, pressed_at: None, is_stopped: false, is_lost }
     }
 
     /// Whether the axis moves slowly in this phase.
@@ -174,7 +174,8 @@ impl Homing {
             Phase::PullOff => {
                 return match self.axis {
                     _ if pressed => Err(SwitchFault),
-                    Axis::X => Ok(Some(Self::begin(Axis::Y, switches.y, self.was_lost))),
+                    // From here on x counts from its switch, but y does not yet.
+                    Axis::X => Ok(Some(Self::begin(Axis::Y, switches.y, true))),
                     Axis::Y => Ok(None),
                 };
             }
@@ -191,7 +192,7 @@ impl Machine<'_> {
     /// # Errors
     /// [`MachineError::State`] unless the machine is idle or in an alarm that can be ended.
     pub fn home(&mut self, switches: Switches) -> Result<(), MachineError> {
-        let was_lost = match self.activity {
+        let is_lost = match self.activity {
             Activity::Idle if self.is_stopped() => false,
             Activity::Alarm(alarm) => {
                 self.release_pins(alarm)?;
@@ -204,7 +205,7 @@ impl Machine<'_> {
             _ => return Err(self.refusal()),
         };
         self.forget_backlash();
-        self.begin_phase(Homing::begin(Axis::X, switches.x, was_lost));
+        self.begin_phase(Homing::begin(Axis::X, switches.x, is_lost));
         Ok(())
     }
 

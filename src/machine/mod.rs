@@ -275,10 +275,10 @@ impl<'m> Machine<'m> {
     }
 
     /// Slows down, raises the pen and cancels the job. The position stays known. This also ends a
-    /// feed hold, a jog and homing. Homing that began in an alarm stops at once and ends in
-    /// [`Alarm::NotHomed`], because the position is still unknown.
+    /// feed hold, a jog and homing. Homing that began in an alarm, or that has homed one axis, stops
+    /// at once and ends in [`Alarm::NotHomed`], because the position is unknown.
     pub fn abort(&mut self) {
-        if let Activity::Home(Homing { was_lost: true, .. }) = self.activity {
+        if let Activity::Home(Homing { is_lost: true, .. }) = self.activity {
             return self.alarm(Alarm::NotHomed);
         }
         if matches!(

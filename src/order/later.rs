@@ -172,6 +172,13 @@ fn improve_legs<I: Index>(
             *leg = if leg.reversed() { old.flipped() } else { *old };
         }
     }
+    // The machine raises the pen behind what is released, and counts what follows as another
+    // stroke. An order that goes on at the very point would count both as one.
+    let end = |leg: Leg<I>| Some(ends(drawing.segments.get(leg.segment())?, leg)[1]);
+    let [drawn_to, from] = [drawn.last().copied(), rest.first().map(|leg| leg.flipped())];
+    if drawn_to.and_then(end) == from.and_then(end) {
+        rest.copy_from_slice(before);
+    }
     Ok(())
 }
 

@@ -145,6 +145,8 @@ impl<I: Index> Plotter<'_, I> {
         }
         let tended = self.inner.tend_parts(board);
         if tended == PartsProgress::Aborted {
+            // What comes in the same turn must not find the drawing that is given up.
+            self.inner.end_parts();
             self.inner.machine.abort();
             self.reset(board);
         }

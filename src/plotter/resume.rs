@@ -58,8 +58,8 @@ enum Origin {
     /// The user has put the pen at the origin, or has drawn from where it was.
     #[default]
     ByHand,
-    /// The machine has been homed.
-    Homed,
+    /// The machine has been homed with settings of this checksum ([`with_feature`]).
+    Homed(u32),
     /// Nobody has told it since a start, an alarm or `$SLP`.
     Lost,
 }

@@ -242,7 +242,7 @@ impl<I: Index> Inner<'_, I> {
                 Ok(Progress::Done(Err(error.into())))
             }
             Some(Task::Home) if is_stopped => {
-                self.resumption.find_position();
+                self.resumption.find_position(self.machine.settings());
                 self.run_startup_lines(board);
                 Ok(Progress::Done(Ok(())))
             }

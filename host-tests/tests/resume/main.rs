@@ -2,11 +2,12 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod origin;
 mod refused;
 mod within_strokes;
 
 use penup::boards::host::{CutFlash, LAYOUT, Stamped};
-use penup::machine::{Contacts, State};
+use penup::machine::State;
 use penup::plotter::Board as _;
 use penup::storage::{LogProgress, NOTE_BYTES};
 use penup_host_tests::cut_jobs::{
@@ -14,7 +15,7 @@ use penup_host_tests::cut_jobs::{
 };
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::{Bench, job_lines};
-use penup_job::pins::{Machine, PinChange};
+use penup_job::pins::PinChange;
 
 /// A pen that takes little time, so that the tests do not either.
 const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];
@@ -422,104 +423,6 @@ fn a_job_that_is_given_up_or_stopped_in_an_emergency_can_go_on() {
             plotter.status().contains("WCO:0.000,0.000") || plotter.status().starts_with("<Run")
         );
     });
-}
-
-/// Where the pen is, in steps from where it was when the power came.
-fn position_of(plotter: &Powered<'_, '_>) -> Point {
-    let mut machine = Machine::default();
-    for change in plotter.board.trace().changes() {
-        machine.change(PinChange::from(&change));
-    }
-    machine.position()
-}
-
-/// Homes a machine whose pen was left at `at`, in steps from its switches, and returns where it is
-/// homed, in steps from there.
-fn home(plotter: &mut Powered<'_, '_>, at: Point) -> Point {
-    plotter.send("$H\n");
-    let (mut machine, mut seen) = (Machine::default(), 0);
-    for _ in 0..60_000 {
-        let changes = plotter.board.trace().changes();
-        for change in &changes[seen..] {
-            machine.change(change.into());
-        }
-        seen = changes.len();
-        let (x, y) = machine.position();
-        plotter.board.set_contacts(Contacts { x: at.0 + x <= 0, y: at.1 + y <= 0, stop: false });
-        plotter.plotter.poll(plotter.board);
-        plotter.board.wait();
-        if plotter.heard().ends_with("ok\n") {
-            return machine.position();
-        }
-    }
-    panic!("the machine is not homed: {}", plotter.status());
-}
-
-#[test]
-fn a_machine_with_limit_switches_is_homed_first() {
-    let lines = lattice("$hidden=erased");
-    let (whole, ..) = undisturbed(&lines);
-    let mut runs = vec![];
-    let mut flash = empty_flash();
-    for at in [(900, 400), (700, 300)] {
-        let mut homed = (0, 0);
-        let (kept, changes) = switch_on(flash, |plotter| {
-            plotter.heard();
-            if runs.is_empty() {
-                assert_eq!(plotter.say("$22=1"), "ok\n");
-                homed = home(plotter, at);
-                plotter.order(&lines);
-                draw_five_strokes(plotter);
-                return;
-            }
-            assert!(plotter.status().starts_with("<Alarm"));
-            assert!(plotter.say("$resume").ends_with("error:9\n"));
-            homed = home(plotter, at);
-            assert_eq!(plotter.say("$resume"), "ok\n");
-            plotter.finish();
-        });
-        flash = kept;
-        let mut strokes = strokes_of(changes.iter().map(PinChange::from));
-        for (x, y) in strokes.iter_mut().flatten() {
-            (*x, *y) = (*x - homed.0, *y - homed.1);
-        }
-        runs.push(strokes);
-    }
-    assert_one_drawing(&whole, &runs);
-}
-
-/// The origin that the user has set by hand is another one than that which homing finds, so the
-/// rest of the drawing would lie elsewhere on the sheet.
-#[test]
-fn a_job_that_began_at_an_origin_set_by_hand_does_not_go_on_from_a_homed_one() {
-    let mut lines = lattice("$hidden=erased");
-    let (whole, ..) = undisturbed(&lines);
-    lines.insert(0, "$22=1".to_owned());
-    let (flash, before) = cut_after_five_strokes(&lines);
-    let mut origin = (0, 0);
-    let (_, changes) = switch_on(flash, |plotter| {
-        home(plotter, (700, 300));
-        let said = plotter.say("$resume");
-        assert!(said.contains("$SLP") && said.ends_with("error:169\n"), "{said}");
-        assert!(plotter.say("$resume=origin").ends_with("error:169\n"));
-        assert!(plotter.status().contains("|Stopped:5/"), "{}", plotter.status());
-        // The user moves the pen to that origin, and does what the message says.
-        assert_eq!(plotter.say("$J=G91 X3 Y2 F2000"), "ok\n");
-        plotter.finish();
-        origin = position_of(plotter);
-        assert!(plotter.say("$SLP").ends_with("ok\n"));
-        plotter.send("\x18");
-        plotter.run(100);
-        assert!(plotter.say("$X").ends_with("ok\n"));
-        assert_eq!(plotter.say("$resume=origin"), "ok\n");
-        plotter.finish();
-        assert!(!plotter.status().contains("Stopped"), "{}", plotter.status());
-    });
-    let mut after = strokes_of(changes.iter().map(PinChange::from));
-    for (x, y) in after.iter_mut().flatten() {
-        (*x, *y) = (*x - origin.0, *y - origin.1);
-    }
-    assert_one_drawing(&whole, &[before, after]);
 }
 
 #[test]

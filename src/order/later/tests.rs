@@ -4,6 +4,7 @@ use super::*;
 use crate::drawing::PagePoint;
 use crate::order::TimeModel;
 use crate::order::first::tests::{CancelAfter, order_all, path, pen, polylines};
+use crate::order::{choose_first, first_legs, order_rest};
 use crate::stage::NeverCancel;
 use std::vec::Vec;
 
@@ -61,6 +62,69 @@ fn rounds_make_the_moves_shorter_and_each_segment_is_drawn_once() {
         let path = path(&segments, &tour);
         let lifts = path.windows(2).filter(|pair| pair[0][1] != pair[1][0]).count();
         assert_eq!((report.lifts as usize, report.components), (lifts, 600));
+    }
+}
+
+/// Pieces of six points with lines between most of them, so that strokes meet at points.
+fn pieces(count: u32, seed: u32) -> (Vec<PagePoint>, Vec<Segment<u16>>) {
+    let mut state = seed;
+    let mut below = |limit: i32| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((u64::from(state) * limit as u64) >> 32) as i32
+    };
+    let (mut points, mut segments) = (Vec::new(), Vec::new());
+    for _ in 0..count {
+        let corner = PagePoint { x: below(12_000), y: below(9_000) };
+        let begin = points.len() as u16;
+        for _ in 0..6 {
+            let [x, y] = [below(400), below(400)];
+            points.push(PagePoint { x: corner.x + x, y: corner.y + y });
+        }
+        for one in 0..6 {
+            for other in one + 1..6 {
+                if other == one + 1 || below(3) > 0 {
+                    segments.push(Segment::new(begin + one, begin + other));
+                }
+            }
+        }
+    }
+    (points, segments)
+}
+
+/// The machine counts what follows the released strokes as another stroke. If it began at the point
+/// where they end, the path would count both as one, and a job that goes on would leave one out.
+/// These drawings have orders of which that is true, and which are as short as any.
+#[test]
+fn what_is_released_never_goes_on_in_the_same_stroke() {
+    for (seed, count, lift_cost, milliseconds) in
+        [(4, 20, 0, 7999), (279, 80, 4000, 7999), (396, 80, 0, 1500)]
+    {
+        let (points, mut segments) = pieces(count, seed);
+        let options = Options { lift_cost, ..Options::default() };
+        let (cancel, time) = (&mut NeverCancel, pen(milliseconds));
+        let mut memory = std::vec![0; 1 << 18];
+        let scratch = Scratch::new(&mut memory);
+        let first = choose_first(&points, &mut segments, options, time, scratch, cancel);
+        let first = first.expect("room");
+        let mut tour = std::vec![Leg::new(0, false); segments.len()];
+        let (drawn, rest) = tour.split_at_mut(first.segments);
+        first_legs(drawn);
+        let drawing = Drawing { points: &points, segments: &segments };
+        let scratch = Scratch::new(&mut memory);
+        let report = order_rest(drawing, first, drawn, options, scratch, cancel, rest);
+        let (mut before, mut report) = (Report::default(), report.expect("an order"));
+        let mut released = Released::first(first.segments);
+        while let Some(more) = released.more(drawing, &tour, options, time, [before, report]) {
+            released = more;
+            let (drawn, rest) = tour.split_at_mut(released.legs);
+            let scratch = Scratch::new(&mut memory);
+            before = report;
+            report = improve_rest(drawing, drawn, report, options, scratch, cancel, rest)
+                .expect("an order");
+            assert_eq!(report, measure_all(drawing, drawn, rest, report));
+            let path = path(&segments, &tour);
+            assert_ne!(path[released.legs - 1][1], path[released.legs][0], "{seed}");
+        }
     }
 }
 

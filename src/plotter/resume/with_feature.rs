@@ -18,9 +18,8 @@ use crate::protocol::CommandError;
 use crate::stage::Cancel;
 use crate::storage::LogProgress;
 
-/// The settings that decide where ink falls, so that they must be the same in all parts of a
-/// drawing. Of the travel that is [`placed`].
-const PLACING: [Setting; 19] = [
+/// The settings that decide where a homed machine has its origin. Of the travel that is [`placed`].
+const ORIGIN: [Setting; 12] = [
     Setting::InvertDirections,
     Setting::HomingDirection,
     Setting::TravelX,
@@ -28,13 +27,17 @@ const PLACING: [Setting; 19] = [
     Setting::HomingPullOff,
     Setting::StepsPerMmX,
     Setting::StepsPerMmY,
-    Setting::PointDistance,
-    Setting::DotLength,
     Setting::Kinematics,
     Setting::AnchorWidth,
     Setting::AnchorLeft,
     Setting::AnchorHeight,
     Setting::HomedBelt,
+];
+/// The other settings that decide where ink falls. All of them must be the same in all parts of a
+/// drawing.
+const STROKES: [Setting; 7] = [
+    Setting::PointDistance,
+    Setting::DotLength,
     Setting::BacklashX,
     Setting::BacklashY,
     Setting::StrokeOverlap,
@@ -73,7 +76,7 @@ const MOST_AT_ONCE: u32 = 1 << 12;
 /// they are 0.
 const HEAD: usize = 8;
 /// Size of the notes in words: each setting takes two.
-const WORDS: usize = HEAD + 2 * PLACING.len();
+const WORDS: usize = HEAD + 2 * (ORIGIN.len() + STROKES.len());
 const _: () = assert!(WORDS * size_of::<u32>() <= crate::storage::NOTE_BYTES);
 
 /// The notes that are kept with the progress of a job.
@@ -128,9 +131,9 @@ fn begin_notes(
     origin: Origin,
 ) -> Notes {
     let [first, second, third] = more;
-    let is_homed = u32::from(origin == Origin::Homed);
+    let is_homed = u32::from(origin.is_homed());
     let head = [layout, version(), strokes, first, second, third, records::SOURCES, is_homed];
-    let settings = PLACING.into_iter().flat_map(|setting| {
+    let settings = ORIGIN.into_iter().chain(STROKES).flat_map(|setting| {
         [setting.info().number().into(), placed(settings, setting).to_bits().cast_unsigned()]
     });
     let mut notes: Notes = [[0; 4]; WORDS];
@@ -166,13 +169,20 @@ pub(in crate::plotter) struct KeptParts {
     pub drawn: Option<u32>,
 }
 
+/// The checksum of the settings that decide where a homed machine has its origin.
+#[inline(never)] // It is called in several places, and its loop is unrolled.
+fn origin_settings(settings: &Settings) -> u32 {
+    let mut digest = Crc32::new();
+    for setting in ORIGIN {
+        digest.update(&placed(settings, setting).to_bits().to_le_bytes());
+    }
+    digest.finalize()
+}
+
 impl Origin {
-    /// The origin of what is drawn now.
-    const fn taken_for_known(self) -> Self {
-        match self {
-            Self::Homed => Self::Homed,
-            Self::ByHand | Self::Lost => Self::ByHand,
-        }
+    /// Whether the machine has been homed.
+    const fn is_homed(self) -> bool {
+        matches!(self, Self::Homed(_))
     }
 }
 
@@ -203,10 +213,23 @@ impl Resumption {
         self.progress.is_some()
     }
 
+    /// How the plotter knows where the pen is. Where the settings have changed with which it was
+    /// homed, homing would find another origin, so that it does not.
+    fn origin(&self, settings: &Settings) -> Origin {
+        match self.origin {
+            Origin::Homed(with) if with != origin_settings(settings) => Origin::Lost,
+            origin => origin,
+        }
+    }
+
     /// What is known when a job begins: nothing but the origin. A user who draws where nobody has
     /// told the plotter where the pen is takes that place for known.
-    fn anew(self) -> Self {
-        Self { origin: self.origin.taken_for_known(), ..Self::default() }
+    fn anew(&self, settings: &Settings) -> Self {
+        let origin = match self.origin(settings) {
+            Origin::Lost => Origin::ByHand,
+            known => known,
+        };
+        Self { origin, ..Self::default() }
     }
 
     /// The position of the pen is not known any more.
@@ -214,9 +237,9 @@ impl Resumption {
         self.origin = Origin::Lost;
     }
 
-    /// The machine has been homed.
-    pub(in crate::plotter) fn find_position(&mut self) {
-        self.origin = Origin::Homed;
+    /// The machine has been homed with these settings.
+    pub(in crate::plotter) fn find_position(&mut self, settings: &Settings) {
+        self.origin = Origin::Homed(origin_settings(settings));
     }
 
     /// Reports a job that has stopped, if there is one.
@@ -279,7 +302,7 @@ impl<I: Index> Inner<'_, I> {
         if self.machine.state() != State::Run {
             return;
         }
-        self.resumption = self.resumption.anew();
+        self.resumption = self.resumption.anew(self.machine.settings());
         if !board.keeps_progress() {
             return;
         }
@@ -390,16 +413,17 @@ impl<I: Index> Inner<'_, I> {
             if !at_origin {
                 return Err(CommandError::NothingToResume);
             }
-            if self.resumption.origin != Origin::Lost {
+            if self.resumption.origin(self.machine.settings()) != Origin::Lost {
                 return Err(CommandError::PositionKnown);
             }
             self.machine.declare_origin()?;
             self.resumption.origin = Origin::ByHand;
             return Ok(StoppedJob::Sent);
         }
-        match (self.resumption.origin, at_origin) {
-            (Origin::Lost, false) => return Err(CommandError::PositionUnknown),
-            (Origin::ByHand | Origin::Homed, true) => return Err(CommandError::PositionKnown),
+        let is_lost = self.resumption.origin(self.machine.settings()) == Origin::Lost;
+        match (is_lost, at_origin) {
+            (true, false) => return Err(CommandError::PositionUnknown),
+            (false, true) => return Err(CommandError::PositionKnown),
             _ => {}
         }
         #[cfg(feature = "tiles")]
@@ -429,7 +453,7 @@ impl<I: Index> Inner<'_, I> {
             self.machine.declare_origin()?;
         }
         let progress = Some([noted.parts, all]);
-        self.resumption = Resumption { progress, ..self.resumption.anew() };
+        self.resumption = Resumption { progress, ..self.resumption.anew(self.machine.settings()) };
         Ok(StoppedJob::Loaded(noted))
     }
 
@@ -490,7 +514,7 @@ impl<I: Index> Inner<'_, I> {
         if board.note_progress(u32::MAX).is_err() {
             refuse(board);
         }
-        self.resumption = self.resumption.anew();
+        self.resumption = self.resumption.anew(self.machine.settings());
         Reply(board).line(format_args!("[MSG:nothing is left to draw: the drawing is complete]"));
         Ok(())
     }
@@ -506,7 +530,7 @@ impl<I: Index> Inner<'_, I> {
         kept: Option<KeptParts>,
         board: &mut B,
     ) {
-        self.resumption = self.resumption.anew();
+        self.resumption = self.resumption.anew(self.machine.settings());
         if !board.keeps_progress() {
             return;
         }
@@ -550,7 +574,8 @@ impl<I: Index> Inner<'_, I> {
         if is_computed && !is_empty && model != self.model.checksum() {
             return Err(CommandError::OtherModel);
         }
-        if self.resumption.origin == Origin::Homed && word(notes, 7) == 0 {
+        let is_homed = self.resumption.origin(self.machine.settings()).is_homed();
+        if is_homed && word(notes, 7) == 0 {
             return Err(CommandError::OtherOrigin);
         }
         Ok(())
@@ -604,7 +629,7 @@ impl<I: Index> Inner<'_, I> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(in crate::plotter) fn keep_streamed<B: Board>(&mut self, id: u32, board: &mut B) {
         let stopped = self.resumption.progress;
-        self.resumption = self.resumption.anew();
+        self.resumption = self.resumption.anew(self.machine.settings());
         if self.machine.state() != State::Run || !board.keeps_progress() {
             return;
         }
@@ -616,6 +641,8 @@ impl<I: Index> Inner<'_, I> {
             && is_streamed(&notes)
             && word(&notes, 4) == id
             && self.check_notes(&notes).is_ok()
+            // All of it may be drawn anew, from another origin.
+            && (drawn > 0 || self.resumption.origin.is_homed() == (word(&notes, 7) != 0))
         {
             self.machine.log_strokes(0);
             self.resumption = Resumption {
@@ -667,7 +694,8 @@ impl<I: Index> Inner<'_, I> {
         };
         self.check_notes(&notes)?;
         let id = word(&notes, 4);
-        let is_lost = u8::from(self.resumption.origin == Origin::Lost);
+        let origin = self.resumption.origin(self.machine.settings());
+        let is_lost = u8::from(origin == Origin::Lost);
         Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost}]"));
         Ok(true)
     }
@@ -793,11 +821,11 @@ mod tests {
             (1 | IS_ESTIMATE, 10, 11),
             (IS_ESTIMATE, 25, 26),
         ] {
-            let notes = begin_notes(&settings, LAYOUT, 10, [known, 7, 8], Origin::Homed);
+            let notes = begin_notes(&settings, LAYOUT, 10, [known, 7, 8], Origin::Homed(0));
             assert_eq!(strokes_without_order(&notes, done), all, "{known}: {done}");
         }
         // In other notes the word is something else.
-        let notes = begin_notes(&settings, STREAMED, 10, [3, 7, 8], Origin::Homed);
+        let notes = begin_notes(&settings, STREAMED, 10, [3, 7, 8], Origin::Homed(0));
         assert_eq!(strokes_without_order(&notes, 10), 10);
     }
 }

@@ -2,7 +2,7 @@
 
 use super::Resumption;
 use crate::index::Index;
-use crate::machine::State;
+use crate::machine::{Settings, State};
 use crate::plotter::{Board, Inner};
 #[cfg(feature = "stream")]
 use crate::protocol::CommandError;
@@ -17,7 +17,7 @@ impl Resumption {
     pub(in crate::plotter) const fn lose_position(&mut self) {}
 
     /// The machine has been homed.
-    pub(in crate::plotter) const fn find_position(&mut self) {}
+    pub(in crate::plotter) const fn find_position(&mut self, _: &Settings) {}
 
     /// Reports a job that has stopped: there is none.
     pub(in crate::plotter) const fn report<B: Board>(&self, _: State, _: &mut B) {}

@@ -208,7 +208,7 @@ impl<I: Index> Inner<'_, I> {
 
     /// Forgets the drawing: the machine reads no more of it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn end_parts(&mut self) {
+    pub(in crate::plotter) fn end_parts(&mut self) {
         self.parts.end();
         self.streamed = Streamed::default();
     }
