@@ -13,7 +13,7 @@ mod hpgl;
 mod scene;
 mod sender;
 mod session;
-mod stored;
+pub mod stored;
 pub mod usb;
 
 pub use drawing::fuzz as drawing;

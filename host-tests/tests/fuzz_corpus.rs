@@ -3,14 +3,20 @@
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
 use penup_host_tests::fuzz_targets::TARGETS;
+use penup_host_tests::fuzz_targets::stored::{KeptJob, interrupted_jobs};
 use penup_host_tests::random::Random;
 use std::path::PathBuf;
 
 /// The number of random inputs for each target.
 const INPUTS: u32 = 60;
 
+/// The folder of the inputs for a target.
+fn folder(target: &str) -> PathBuf {
+    PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target)
+}
+
 fn corpus(target: &str) -> Vec<Vec<u8>> {
-    let folder = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus").join(target);
+    let folder = folder(target);
     let mut files: Vec<PathBuf> = std::fs::read_dir(&folder)
         .unwrap_or_else(|error| panic!("{}: {error}", folder.display()))
         .map(|file| file.expect("a file").path())
@@ -49,5 +55,32 @@ fn damaged_and_joined_inputs_break_no_promise() {
             }
             target(&input);
         }
+    }
+}
+
+/// A layout that changes has another mark, and a record with the old one is refused at once: then
+/// no input that is kept reaches the code that goes on.
+#[test]
+fn a_stopped_job_of_each_kind_is_kept_in_its_present_layout() {
+    let jobs = interrupted_jobs();
+    if std::env::var_os("PENUP_WRITE_INPUTS").is_some() {
+        for (name, job) in &jobs {
+            let file = folder("stored").join(name);
+            std::fs::write(file, job.input()).expect("an input can be written");
+        }
+    }
+    let kept: Vec<KeptJob> =
+        corpus("stored").iter().filter_map(|input| KeptJob::from_input(input)).collect();
+    for (index, (name, job)) in jobs.iter().enumerate() {
+        assert!(jobs[..index].iter().all(|(_, other)| !other.is_like(job)), "{name}: as another");
+        let mut alike = kept.iter().filter(|kept| kept.is_like(job));
+        assert!(job.clone().goes_on(), "{name}: the target makes another job of it");
+        assert!(
+            alike.any(|kept| kept.clone().goes_on()),
+            "{name}: fuzz/corpus/stored has no such job with the present marks {:?} with which a \
+             plotter goes on; write one anew with \
+             PENUP_WRITE_INPUTS=1 cargo test -p penup-host-tests --test fuzz_corpus",
+            job.marks()
+        );
     }
 }

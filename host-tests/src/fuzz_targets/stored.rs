@@ -1,6 +1,12 @@
 //! Records in flash that another version wrote, or that no version wrote.
 
-use crate::cut_jobs::{empty_flash, switch_on};
+mod interrupted;
+mod kept_job;
+
+pub use interrupted::interrupted_jobs;
+pub use kept_job::KeptJob;
+
+use crate::cut_jobs::{Powered, empty_flash, switch_on};
 use crate::whole_jobs::job_lines;
 use penup::boards::host::{CutFlash, HostBoard, LAYOUT, PORTS, QUEUE_LENGTH};
 use penup::machine::{Contacts, EventRing, PulserState, Settings, Value};
@@ -17,11 +23,15 @@ const SETTING_BYTES: usize = 6;
 /// the number of settings; they follow, and the rest is the job.
 ///
 /// Then starts a plotter whose flash holds that job and how far it has come, and one whose flash
-/// holds a sound job that has stopped, but for some bytes, and goes on with each.
+/// holds a sound job that has stopped, but for some bytes, and goes on with each. If the settings
+/// can be the progress of a [`KeptJob`] instead, goes on with that job, too.
 pub fn fuzz(input: &[u8]) {
     again(input);
     resume_job(input);
     resume_image(input);
+    if let Some(kept) = KeptJob::from_input(input) {
+        kept.switch_on(try_to_go_on);
+    }
 }
 
 /// A flash that holds a job, which was cut after some strokes.
@@ -85,12 +95,15 @@ fn resume_image(input: &[u8]) {
 
 /// Starts a plotter with this flash, and goes on with the job that it holds.
 fn go_on(flash: CutFlash) {
-    switch_on(flash, |plotter| {
-        plotter.send("$5=0\n$X\n$resume\n$resume=origin\n?");
-        plotter.run(2000);
-        plotter.board.receive(&[0x18]);
-        assert!(plotter.run(20_000) < 20_000, "the machine does not stop");
-    });
+    switch_on(flash, try_to_go_on);
+}
+
+/// Goes on with the job that the plotter holds, and gives it up.
+fn try_to_go_on(plotter: &mut Powered<'_, '_>) {
+    plotter.send("$5=0\n$X\n$resume\n$resume=origin\n?");
+    plotter.run(2000);
+    plotter.board.receive(&[0x18]);
+    assert!(plotter.run(20_000) < 20_000, "the machine does not stop");
 }
 
 /// Draws a job from the input again.
