@@ -275,8 +275,8 @@ impl<'m> Machine<'m> {
     }
 
     /// Slows down, raises the pen and cancels the job. The position stays known. This also ends a
-    /// feed hold, a jog and homing. Homing that began in an alarm, or that has homed one axis, stops
-    /// at once and ends in [`Alarm::NotHomed`], because the position is unknown.
+    /// feed hold, a jog and homing. Homing that began in an alarm, or that has homed one axis,
+    /// stops at once and ends in [`Alarm::NotHomed`], because the position is unknown.
     pub fn abort(&mut self) {
         if let Activity::Home(Homing { is_lost: true, .. }) = self.activity {
             return self.alarm(Alarm::NotHomed);

@@ -1,5 +1,5 @@
-//! From where a job that goes on counts its coordinates: from switches, or from where the user has put
-//! the pen.
+//! From where a job that goes on counts its coordinates: from switches, or from where the user has
+//! put the pen.
 
 use super::{cut_after_five_strokes, draw_five_strokes, lattice, undisturbed};
 use penup_host_tests::cut_jobs::{Powered, assert_one_drawing, empty_flash, strokes_of, switch_on};
