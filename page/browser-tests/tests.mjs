@@ -303,6 +303,12 @@ test("a serial port that reads in parts and damages bytes draws the same", async
   assert.deepEqual(inkOf(picture), inkOf(expected.svg));
   const counts = await page.evaluate(() => window.fakeSerial.counts);
   assert.ok(counts.damaged > 5 && counts.parts > 100 && counts.errors > 0, JSON.stringify(counts));
+  // Homing ends an alarm, and nothing else by hand does.
+  const locked = await page.evaluate(() => {
+    window.penup.plotting.enter("alarm");
+    return ["$H", "M5"].map((it) => document.querySelector(`[data-command="${it}"]`).disabled);
+  });
+  assert.deepEqual(locked, [false, true]);
   assert.deepEqual(problems, []);
 });
 

@@ -15,8 +15,8 @@ use crate::sheet::Shared;
 use crate::source::Source;
 use penup_job::Job;
 use penup_job::protocol::{
-    ABORT, AS_SET, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, LAST_NUMBER, PEN_DOWN, PEN_UP, RESUME,
-    ReplyReader, SLOWER, STATUS_QUERY, UNLOCK, numbered,
+    ABORT, AS_SET, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, HOME, LAST_NUMBER, PEN_DOWN, PEN_UP,
+    RESUME, ReplyReader, SLOWER, STATUS_QUERY, STREAM, UNLOCK, numbered,
 };
 use penup_job::results::JobReport;
 use penup_job::twin;
@@ -59,6 +59,9 @@ pub struct Session {
     last_query: f64,
     messages: Vec<String>,
     delivery: Option<Delivery>,
+    /// What is delivered next: what goes on with a job, once it is known that no computer has sent
+    /// it, or the command that homes, once the plotter counts lines anew.
+    next: Option<&'static str>,
     /// The number of the last accepted line.
     number: i32,
     /// The drawing that waits until the plotter is ready, and the checksums it must have.
@@ -104,6 +107,7 @@ impl Session {
             last_query: 0.0,
             messages: Vec::new(),
             delivery: None,
+            next: None,
             number: 0,
             job: None,
             expected: None,
@@ -131,7 +135,7 @@ impl Session {
 
     /// The line is closed: what was begun is lost to this session.
     pub fn close(&mut self) {
-        (self.delivery, self.job) = (None, None);
+        (self.delivery, self.job, self.next) = (None, None, None);
         self.out.clear();
         self.enter(Phase::Closed);
     }
@@ -184,12 +188,14 @@ impl Session {
     }
 
     /// Goes on with the job that a loss of power or a reset has stopped. The machine is homed
-    /// first, unless the user has put the pen at the origin.
+    /// first, unless the user has put the pen at the origin. Of a job that a computer sent while it
+    /// was drawn the plotter keeps no strokes, so it is asked first whether it is one.
     ///
     /// # Errors
     /// A sentence for the user: the session is doing something else.
     pub fn go_on(&mut self, is_at_origin: bool) -> Result<(), String> {
-        self.begin_lines(vec![if is_at_origin { GO_ON_AT_ORIGIN } else { GO_ON }.to_owned()])?;
+        self.begin_lines(vec![STREAM.to_owned()])?;
+        self.next = Some(if is_at_origin { GO_ON_AT_ORIGIN } else { GO_ON });
         self.is_given_up = false;
         self.enter(Phase::Starting);
         Ok(())
@@ -214,8 +220,7 @@ impl Session {
     /// Gives the drawing up: the machine stops with the pen up.
     pub fn give_up(&mut self) {
         self.is_given_up = true;
-        self.job = None;
-        self.delivery = None;
+        (self.delivery, self.job, self.next) = (None, None, None);
         self.out.push(ABORT);
         self.enter(Phase::Greeting);
     }
@@ -227,9 +232,16 @@ impl Session {
     pub fn command(&mut self, text: &str) -> Result<(), String> {
         if text == UNLOCK && self.phase == Phase::Alarm {
             // Once lines have had numbers, the plotter refuses those that have none.
+            (self.delivery, self.next) = (None, None);
             self.begin_numbers();
             self.out.extend(format!("{}\n", numbered(Some(1), UNLOCK)).bytes());
             self.enter(Phase::Finding);
+            return Ok(());
+        }
+        if text == HOME && self.phase == Phase::Alarm {
+            (self.delivery, self.next) = (None, Some(HOME));
+            self.begin_numbers();
+            self.enter(Phase::Alarm);
             return Ok(());
         }
         self.begin_lines(vec![text.to_owned()])?;
@@ -320,7 +332,7 @@ impl Session {
 
     /// Ends what was begun with a sentence for the user.
     fn fail(&mut self, text: String) {
-        (self.delivery, self.job) = (None, None);
+        (self.delivery, self.job, self.next) = (None, None, None);
         self.messages.clear();
         self.events.push(Event::Failed { text });
     }
@@ -333,6 +345,7 @@ impl Session {
         match self.phase {
             Phase::Greeting => self.out.push(ABORT),
             Phase::Numbering => self.begin_numbers(),
+            _ if self.next.is_some() && self.delivery.is_none() => self.begin_numbers(),
             _ => return,
         }
         self.repeated = self.now;
@@ -371,6 +384,17 @@ impl Session {
         let lines: Vec<_> = lines.into_iter().map(JobLine::command).collect();
         self.deliver(Rc::new(lines));
         Ok(())
+    }
+
+    /// Delivers what comes next, if there is something, to a plotter that counts lines anew.
+    fn begin_next(&mut self) {
+        let Some(next) = self.next.take() else { return };
+        self.number = 0;
+        // An alarm may have left coordinates relative.
+        let behind = (next == HOME).then_some(ABSOLUTE);
+        let mut lines = vec![JobLine::command(next)];
+        lines.extend(behind.map(JobLine::command));
+        self.deliver(Rc::new(lines));
     }
 
     fn begin_job(&mut self) {

@@ -2,6 +2,7 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use penup::checksum::CRC_16;
 use penup_page::{Board, Session, Sheet};
 use serde_json::Value;
 
@@ -339,12 +340,89 @@ fn a_test_square_is_a_square_where_the_pen_stands() {
     assert!(said.contains("beyond the travel") && said.contains("Unlock"), "{said}");
     while pipe.until("phase")["name"] != "alarm" {}
     assert!(pipe.session.command("M5").is_err(), "it is locked");
+    // Homing would end the alarm, but it is off.
+    pipe.session.command("$H").expect("sent");
+    let refused = pipe.until("failed");
+    assert!(refused["text"].as_str().is_some_and(|text| text.contains("homing is off")));
+    (0..100).for_each(|_| pipe.step());
+    assert!(pipe.events.iter().all(|event| event["kind"] == "status"), "{:?}", pipe.events);
     pipe.session.command("$X").expect("sent");
     until_ready(&mut pipe);
     assert!(modes(&mut pipe).contains("G90"));
-    // This board keeps no job.
+    // This board keeps no job, and knows of none that a computer sends.
     pipe.session.go_on(false).expect("sent");
-    pipe.until("failed");
+    let refused = pipe.until("failed");
+    assert!(refused["text"].as_str().is_some_and(|it| it.starts_with("Resume: ")), "{refused}");
+    (0..100).for_each(|_| pipe.step());
+    pipe.session.plot("notched.obj", NOTCHED.to_vec(), false, OPTIONS).expect("sent");
+    pipe.until("drawn");
+}
+
+/// A reply with its checksum.
+fn checked(reply: &str) -> String {
+    format!("{reply}*{:04X}\r\n", CRC_16.checksum(reply.as_bytes()))
+}
+
+/// A plotter whose job has stopped that a computer sent while it was drawn.
+fn of_a_computer(_: &mut u64, to_plotter: bool, bytes: Vec<u8>) -> Vec<u8> {
+    let text = String::from_utf8_lossy(&bytes);
+    assert!(!to_plotter || !text.contains("$resume"), "it would be refused, or do nothing");
+    if to_plotter || !text.contains(&checked("error:3 N1")) {
+        return bytes;
+    }
+    let said = ["ok N1", "Line: 1"].map(checked).concat();
+    format!("[STOPPED:7,12,100,1]\r\n{said}").into_bytes()
+}
+
+#[test]
+fn a_job_that_a_computer_sent_is_left_to_it() {
+    for is_at_origin in [false, true] {
+        let mut pipe = Pipe::new(of_a_computer);
+        while pipe.until("phase")["name"] != "ready" {}
+        pipe.session.go_on(is_at_origin).expect("sent");
+        let failed = pipe.until("failed");
+        let text = failed["text"].as_str().expect("a sentence");
+        let says = text.contains("A computer sent this drawing");
+        assert!(says && text.contains("`penup plot FILE --port DEVICE --resume`"), "{text}");
+        (0..100).for_each(|_| pipe.step());
+        assert!(pipe.events.iter().all(|event| event["kind"] != "failed"), "{:?}", pipe.events);
+    }
+}
+
+/// A plotter that is locked when the session finds it is homed without being unlocked first.
+#[test]
+fn homing_ends_an_alarm() {
+    let mut session = Session::new(5000.0);
+    session.connect(0.0);
+    let mut now = 0.0;
+    // What the session sends, and the names of its phases, once it has received this.
+    let mut hear = |session: &mut Session, said: &str| {
+        now += 10.0;
+        session.receive(said.as_bytes(), now);
+        session.tick(now);
+        let events: Vec<Value> = serde_json::from_str(&session.take_events()).expect("events");
+        let phases = events.into_iter().filter(|event| event["kind"] == "phase");
+        let names: Vec<String> = phases.map(|event| event["name"].to_string()).collect();
+        (String::from_utf8(session.take_out()).expect("text"), names)
+    };
+    let alarm = "<Alarm|MPos:0.000,0.000|Alarm:11>\r\n";
+    assert_eq!(hear(&mut session, alarm).1, ["\"finding\"", "\"alarm\""]);
+    session.command("$H").expect("sent");
+    // The first answer is lost.
+    assert!(hear(&mut session, alarm).0.starts_with("\nN0 M110*"));
+    let again = (0..150).map(|_| hear(&mut session, alarm).0).collect::<String>();
+    assert_eq!(again.matches("N0 M110*").count(), 1, "{again}");
+    let sent = hear(&mut session, &checked("ok N0")).0;
+    assert!(sent.contains("N1 $H*") && sent.contains("N2 G90*"), "{sent}");
+    assert_eq!(hear(&mut session, alarm).1, [""; 0]);
+    let homing = hear(&mut session, "<Home|MPos:0.000,0.000>\r\n");
+    assert_eq!(homing.1, ["\"ready\""]);
+    assert!(session.command("M5").is_err(), "it homes");
+    let ends = ["ok N1", "ok N2", "Line: 2"].map(checked).concat();
+    assert_eq!(hear(&mut session, &ends).1, [""; 0]);
+    session.command("M5").expect("sent");
+    let sent = hear(&mut session, "<Idle|MPos:0.000,0.000>\r\n").0;
+    assert!(sent.contains("N3 M5*"), "{sent}");
 }
 
 /// The seek to a switch that is not there takes 25 s at the speed set, and no line is read then.
@@ -359,4 +437,13 @@ fn a_plotter_that_finds_its_switches_is_waited_for() {
     let failed = pipe.until("failed");
     assert!(pipe.now - began > 20_000.0, "{failed} after {} ms", pipe.now - began);
     assert!(failed["text"].as_str().is_some_and(|text| text.contains("switch")), "{failed}");
+    // The alarm leaves homing possible.
+    while pipe.until("phase")["name"] != "alarm" {}
+    pipe.events.clear();
+    let began = pipe.now;
+    pipe.session.command("$H").expect("sent");
+    pipe.until_state("Home");
+    let failed = pipe.until("failed");
+    assert!(pipe.now - began > 20_000.0, "{failed} after {} ms", pipe.now - began);
+    assert!(failed["text"].as_str().is_some_and(|text| text.contains("press Home")), "{failed}");
 }

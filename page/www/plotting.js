@@ -474,7 +474,9 @@ export class Plotting {
     if (this.phase !== "ready") this.offer(null);
     $("plotter").disabled = busy;
     for (const button of document.querySelectorAll("[data-command], [data-jog], [data-hand]")) {
-      button.disabled = busy || (this.isFar && this.phase !== "ready");
+      // Homing ends an alarm, too.
+      const isCure = this.phase === "alarm" && button.dataset.command === "$H";
+      button.disabled = busy || (this.isFar && this.phase !== "ready" && !isCure);
     }
   }
 

@@ -6,6 +6,7 @@ use crate::delivery::Outcome;
 use crate::event::Event;
 use crate::phase::Phase;
 use crate::words::{alarm, refusal};
+use penup::protocol::CommandError;
 use penup_job::protocol::{ABORT, MODEL, PLOT, Reply, Status, is_penup};
 use penup_job::results::JobReport;
 use penup_readers::lines::JobLine;
@@ -15,6 +16,9 @@ use std::rc::Rc;
 const MOST_QUESTIONS: u32 = 10;
 /// The least number of reports in succession by which a job has stopped before its end.
 const LEAST_STOPS: u32 = 5;
+/// The number of the error by which `$stream` says that there is no job that a computer sends. The
+/// library of the page has no such jobs, so it does not know it.
+const NO_STREAM: u16 = 181;
 
 impl Session {
     pub(super) fn take(&mut self, reply: &Reply, raw: &str) {
@@ -23,7 +27,9 @@ impl Session {
             Reply::Greeting(text) => return self.greeted(text),
             Reply::Message(text) => {
                 self.messages.push(text.clone());
-                if matches!(self.phase, Phase::Drawing | Phase::Starting | Phase::Ready) {
+                let is_note = matches!(self.phase, Phase::Drawing | Phase::Starting | Phase::Ready);
+                // The refusal of a question before what comes next is none.
+                if is_note && self.next.is_none() {
                     self.events.push(Event::Note { text: text.clone() });
                 }
             }
@@ -39,6 +45,7 @@ impl Session {
                 }
                 self.begin_job();
             }
+            Reply::Done(0) if self.delivery.is_none() => self.begin_next(),
             Reply::Other(line) => {
                 self.report = JobReport::parse(self.strokes, line).or(self.report.take());
                 if self.phase == Phase::Commanding {
@@ -66,10 +73,30 @@ impl Session {
         }
         match outcome {
             Outcome::More => return,
+            Outcome::Done if self.next.is_some() => {
+                self.fail(
+                    "A computer sent this drawing while it was drawn, and the plotter keeps no \
+                     strokes of it. Disconnect this page, and type `penup plot FILE --port DEVICE \
+                     --resume` on a computer, with the same file and options: it draws the rest."
+                        .to_owned(),
+                );
+                return self.enter(Phase::Ready);
+            }
             Outcome::Done => {}
+            Outcome::Refused(_, error) if self.next.is_some() && has_no_stream(error) => {
+                self.delivery = None;
+                self.enter(self.phase);
+                return self.begin_numbers();
+            }
             Outcome::Refused(line, error) => {
+                // The user knows nothing of the question before what comes next.
+                let line = line.filter(|_| self.next.is_none());
                 let text = refusal(line.as_ref(), error, &self.messages);
                 self.fail(text);
+                if self.phase == Phase::Alarm {
+                    // It stays locked; what ends that numbers lines anew.
+                    return;
+                }
                 // Until lines are numbered anew, the plotter repeats the refusal.
                 self.enter(Phase::Numbering);
                 return self.begin_numbers();
@@ -217,7 +244,15 @@ impl Session {
                 self.out.push(ABORT);
                 self.enter(Phase::Greeting);
             }
-            Phase::Alarm if status.state != "Alarm" => self.enter(Phase::Finding),
+            // It homes. The user knows this as something that the machine does when it is ready.
+            Phase::Alarm if status.state == "Home" && self.delivery.is_some() => {
+                self.enter(Phase::Ready);
+                self.enter(Phase::Commanding);
+            }
+            Phase::Alarm if status.state != "Alarm" && self.delivery.is_none() => {
+                self.next = None;
+                self.enter(Phase::Finding);
+            }
             Phase::Drawing if is_stopped => self.has_stopped(),
             Phase::Drawing if status.is_idle() => {
                 (self.report, self.questions) = (None, 0);
@@ -242,6 +277,12 @@ impl Session {
             self.events.push(Event::Pen { pen });
         }
     }
+}
+
+/// Whether a plotter that refuses `$stream` with this error has no job that a computer sends.
+fn has_no_stream(error: u16) -> bool {
+    let unknown = [CommandError::UnknownSystemCommand, CommandError::UnknownCommand];
+    error == NO_STREAM || unknown.iter().any(|unknown| unknown.number() == error)
 }
 
 /// The text of a field of a status report.
