@@ -1,4 +1,7 @@
 //! Runs the commands of the command line.
+//!
+//! The file is longer than 500 lines, because it has a function for each command that is no order
+//! to the machine.
 
 use crate::cli::page;
 use crate::cli::{

@@ -7,6 +7,8 @@
 //! Between two operations, the start shows the state that the operations before have brought about:
 //! what the board says and answers. A start from within an operation must show the state before it
 //! or the one behind it, and nothing else. What the states must be is checked by each scenario.
+//!
+//! The file is longer than 500 lines, because recording, cutting and judging work on one record.
 
 mod power_cut;
 mod scenarios;

@@ -196,6 +196,24 @@ fn no_line_of_the_source_has_more_than_100_columns() {
     assert!(long.is_empty(), "more than 100 columns:\n{long}");
 }
 
+/// A long file of Rust has more than one purpose, unless its head gives a reason.
+#[test]
+fn a_file_of_more_than_500_lines_says_why() {
+    let mut sources = Vec::new();
+    sources_below(&root(), &mut sources);
+    sources.retain(|source| source.extension().is_some_and(|extension| extension == "rs"));
+    let mut long = String::new();
+    for source in sources {
+        let text = std::fs::read_to_string(&source).expect("a source in UTF-8");
+        let head: String = text.lines().take_while(|line| line.starts_with("//!")).collect();
+        let gives_reason = ["longer than", "some 500 lines"].iter().any(|it| head.contains(it));
+        if text.lines().count() > 500 && !gives_reason {
+            long += &format!("{}\n", source.display());
+        }
+    }
+    assert!(long.is_empty(), "more than 500 lines, and the head gives no reason:\n{long}");
+}
+
 #[test]
 fn a_bar_that_is_not_escaped_shifts_the_cells_and_is_found() {
     let heading = "| unit | least | default |\n|---|---|---|\n";

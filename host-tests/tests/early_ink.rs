@@ -1,6 +1,9 @@
 //! Tests jobs whose pen begins while the order of the other strokes is computed: what is drawn does
 //! not depend on how fast the plotter computes, and it can be held, given up, and go on after a
 //! loss of power at any time.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 

@@ -1,4 +1,7 @@
 //! Tests of the machine over the serial line: G-code, jogging, homing, contacts, real-time bytes.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 

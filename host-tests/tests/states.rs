@@ -1,5 +1,8 @@
 //! What real-time bytes and commands do in the states in which they were once lost: between the
 //! moves of a program, in a dwell, in homing, and in sleep.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 

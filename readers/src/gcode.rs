@@ -10,6 +10,9 @@
 //! A move in the coordinates of the machine (`G53`) goes to a place that only the machine knows, as
 //! to where it parks. It is not drawn; along z it lifts the pen. Ink that would begin at such a
 //! place is refused.
+//!
+//! The file is longer than 500 lines, because all words of a line are read together: each depends
+//! on the modes that the others set.
 
 mod extruder;
 mod moves;

@@ -1,4 +1,7 @@
 //! Tests of the interpreter and of the session: bytes in, actions and answers out.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 use super::{
     Action, Beginning, DAMAGED, Dialect, Interpreter, Point, RECEIVED_BYTES, Rectangle, Session,

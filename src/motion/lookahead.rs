@@ -1,5 +1,8 @@
 //! The blocks that are known but not yet begun, and the speed with which the first of them may be
 //! entered.
+//!
+//! The file is longer than 500 lines, because most of it are the short questions and orders of the
+//! planner about one list of blocks.
 
 use super::speed_limit::{CornerLimit, FeedOverride, SpeedLimit};
 use super::{Limits, PathLength};

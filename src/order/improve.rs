@@ -20,6 +20,9 @@
 //! counted work ([`TimeModel::units_per_second`]), not kick by kick: most kicks gain nothing, and
 //! hundreds of them are needed to see a rate. A further first tour is made only if it takes so
 //! little work that it may pay, too.
+//!
+//! The file is longer than 500 lines, because all these searches change one tour and share its
+//! budget.
 
 #[cfg(feature = "threads")]
 mod subproblems;

@@ -1,4 +1,7 @@
 //! The commands for the machine, with the plotter's own library at a serial port.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 mod going_on;
 mod library;

@@ -1,4 +1,7 @@
 //! The program as a user runs it.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 

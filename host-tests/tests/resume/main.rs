@@ -1,4 +1,7 @@
 //! Jobs that go on after a loss of power, judged by the ink that the pins leave.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 

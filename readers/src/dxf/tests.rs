@@ -1,4 +1,7 @@
 //! Tests of what DXF files draw.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 use super::Dxf;
 use crate::SourceFile;

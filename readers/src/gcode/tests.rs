@@ -1,4 +1,7 @@
 //! Tests of reading G-code.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 use crate::arrange::Arrangement;
 use crate::format::{Body, Contents, Format};

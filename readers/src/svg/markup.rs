@@ -2,6 +2,8 @@
 //!
 //! `usvg` keeps nothing of an element but its `id`. So every group, shape and text without one is
 //! given an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
+//!
+//! The file is longer than 500 lines, because most of it are short questions about elements.
 
 use super::axidraw::Control;
 use super::flatten::Arcs;
