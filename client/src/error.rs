@@ -296,6 +296,13 @@ pub enum Error {
         /// The number of all strokes; 0 if it is not known.
         all: u64,
     },
+    /// The drawing whose rest was to be sent is no longer drawn.
+    #[error(
+        "the drawing that the plotter drew has ended, or was given up, before its rest could be \
+         sent\nLook after it: `penup status` says whether a job has stopped, and the same command \
+         with --resume goes on with that"
+    )]
+    EndedMeanwhile,
     /// The serial line corrupts so many bytes that a line of the job never arrives intact.
     #[error(
         "the line to the plotter damages too many bytes: {times} times a line did not arrive \
@@ -475,6 +482,7 @@ impl Error {
             | Self::Alarm { .. }
             | Self::Restarted
             | Self::JobStopped { .. }
+            | Self::EndedMeanwhile
             | Self::Damaged { .. }
             | Self::OtherContents
             | Self::Held

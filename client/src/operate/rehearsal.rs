@@ -1,6 +1,6 @@
 //! Asks a plotter for all that decides whether a drawing fits, before its first line is sent.
 
-use super::settings::{agreed, read};
+use super::settings::read;
 use crate::compute::{Capacity, Known};
 use crate::error::Error;
 use crate::machine_settings::simulated;
@@ -13,7 +13,7 @@ use penup_job::protocol::{BUILD, MODEL, Reply};
 /// # Errors
 /// As [`Sender::stream`].
 pub fn limits(sender: &mut Sender<'_>) -> Result<Known, Error> {
-    let (capacity, kept) = agreed(sender, |sender| {
+    let (capacity, kept) = sender.agreed(|sender| {
         let replies = sender.ask(MODEL)?;
         Ok(capacity_in(&replies).map(|capacity| (capacity, kept_in(&replies))))
     })?;

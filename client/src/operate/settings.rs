@@ -17,9 +17,6 @@ use serde_json::{Map, Value, json};
 use std::path::Path;
 use std::sync::atomic::AtomicBool;
 
-/// How often the settings are read while no two answers agree.
-const MOST_READINGS: u32 = 10;
-
 /// How far a value that is shown with three decimals may be from what it was set to. Older firmware
 /// shows so many, and every one rounds to 2^-16.
 const SHOWN: f64 = 0.0006;
@@ -173,7 +170,7 @@ fn is_of(now: &AssignedSetting, wanted: &AssignedSetting) -> bool {
 
 /// Reads all settings.
 pub(crate) fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Error> {
-    agreed(sender, |sender| {
+    sender.agreed(|sender| {
         let replies = sender.ask(SETTINGS)?;
         let settings: Vec<_> = replies.iter().filter_map(setting_in).collect();
         Ok(Some(settings).filter(|settings| !settings.is_empty()))
@@ -196,28 +193,13 @@ fn setting_in(reply: &Reply) -> Option<AssignedSetting> {
 
 /// The version of the firmware and the board that it runs on.
 fn firmware(sender: &mut Sender<'_>) -> Result<String, Error> {
-    agreed(sender, |sender| {
+    sender.agreed(|sender| {
         let version = |reply: &Reply| match reply {
             Reply::Other(line) => Some(line.strip_prefix("[VER:")?.strip_suffix(']')?.to_owned()),
             _ => None,
         };
         Ok(sender.ask(BUILD)?.iter().find_map(version))
     })
-}
-
-/// Asks until two answers in a row are the same.
-pub(super) fn agreed<T: PartialEq>(
-    sender: &mut Sender<'_>,
-    mut ask: impl FnMut(&mut Sender<'_>) -> Result<Option<T>, Error>,
-) -> Result<T, Error> {
-    let mut last = None;
-    for _ in 0..MOST_READINGS {
-        match ask(sender)? {
-            Some(answer) if last.as_ref() == Some(&answer) => return Ok(answer),
-            answer => last = answer,
-        }
-    }
-    Err(Error::Damaged { line: None, times: MOST_READINGS })
 }
 
 #[cfg(test)]

@@ -12,6 +12,9 @@ use std::sync::atomic::AtomicBool;
 /// How often a byte is sent that the plotter does not obey.
 const MOST_ORDERS: u32 = 5;
 
+/// How often something is asked until two answers in a row are the same.
+const MOST_READINGS: u32 = 10;
+
 impl<'a> Sender<'a> {
     /// Joins a plotter, whatever it does, and returns its status. Nothing changes on the plotter.
     ///
@@ -164,6 +167,24 @@ impl<'a> Sender<'a> {
             self.begin_numbers(None)?;
         }
         asked.map(|()| replies)
+    }
+
+    /// Asks until two answers in a row are the same: they have no checksum.
+    ///
+    /// # Errors
+    /// The answers do not arrive, or differ again and again, or `ask` fails.
+    pub fn agreed<T: PartialEq>(
+        &mut self,
+        mut ask: impl FnMut(&mut Self) -> Result<Option<T>, Error>,
+    ) -> Result<T, Error> {
+        let mut last = None;
+        for _ in 0..MOST_READINGS {
+            match ask(self)? {
+                Some(answer) if last.as_ref() == Some(&answer) => return Ok(answer),
+                answer => last = answer,
+            }
+        }
+        Err(Error::Damaged { line: None, times: MOST_READINGS })
     }
 
     /// Waits until the machine has done all moves, after which it must be ready for others.

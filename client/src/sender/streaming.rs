@@ -18,6 +18,8 @@ pub struct Taken {
     pub id: u32,
     /// The number of targets of the drawing that have come.
     pub targets: u32,
+    /// The number of all targets of the drawing.
+    pub all: u32,
     /// The number of strokes that are drawn in all, if the plotter has said so.
     pub strokes: Option<u32>,
 }
@@ -100,7 +102,7 @@ impl<'a> Sender<'a> {
     /// does something else. Nothing changes on the plotter but the numbers of lines.
     ///
     /// # Errors
-    /// As [`Sender::open`].
+    /// The drawing ends, or is given up, before the answer is known, or as [`Sender::open`].
     pub fn rejoin(
         link: &'a mut dyn Link,
         timeouts: Timeouts,
@@ -111,35 +113,29 @@ impl<'a> Sender<'a> {
         if status.stream.is_none() {
             return Ok(None);
         }
-        if !sender.begin_numbers_beside_strokes()? {
-            return Ok(None);
-        }
-        for _ in 0..super::MOST_QUESTIONS {
-            let replies = match sender.ask(STREAM) {
-                Ok(replies) => replies,
-                // The drawing has ended in the meantime.
-                Err(Error::Refused { .. }) => return Ok(None),
-                Err(error) => return Err(error),
-            };
-            if let Some(taken) = replies.iter().find_map(taken_in) {
-                let strokes = status.strokes.and_then(|(_, all)| u32::try_from(all).ok());
-                return Ok(Some((sender, Taken { strokes, ..taken })));
-            }
-        }
-        Ok(None)
+        sender.begin_numbers_beside_strokes()?;
+        let asked = sender.agreed(|sender| Ok(sender.ask(STREAM)?.iter().find_map(taken_in)));
+        let taken = asked.map_err(|error| match error {
+            Error::Refused { .. } => Error::EndedMeanwhile,
+            error => error,
+        })?;
+        let strokes = status.strokes.and_then(|(_, all)| u32::try_from(all).ok());
+        Ok(Some((sender, Taken { strokes, ..taken })))
     }
 
-    /// Begins the numbers of lines anew while strokes are drawn. Returns false if their drawing has
-    /// ended meanwhile.
-    fn begin_numbers_beside_strokes(&mut self) -> Result<bool, Error> {
+    /// Begins the numbers of lines anew while strokes are drawn.
+    ///
+    /// # Errors
+    /// Their drawing ends meanwhile, or as [`Sender::open`].
+    fn begin_numbers_beside_strokes(&mut self) -> Result<(), Error> {
         loop {
             if self.wait_for_room()?.stream.is_none() {
-                return Ok(false);
+                return Err(Error::EndedMeanwhile);
             }
             match self.begin_numbers(None) {
                 // The plotter still had lines, which have filled its memory again.
                 Err(Error::LostLine { .. }) if is_full(&self.find_state()?) => {}
-                begun => return begun.map(|()| true),
+                begun => return begun,
             }
         }
     }
@@ -189,20 +185,12 @@ impl<'a> Sender<'a> {
     /// # Errors
     /// What it depends on has changed, or as [`Sender::ask`].
     pub fn stopped_drawing(&mut self) -> Result<Option<Stopped>, Error> {
-        for _ in 0..super::MOST_QUESTIONS {
-            match self.ask(STREAM) {
-                Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
-                    return Ok(None);
-                }
-                answered => {
-                    let stopped = answered?.iter().find_map(stopped_in);
-                    if stopped.is_some() {
-                        return Ok(stopped);
-                    }
-                }
+        match self.agreed(|sender| Ok(sender.ask(STREAM)?.iter().find_map(stopped_in))) {
+            Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
+                Ok(None)
             }
+            asked => asked.map(Some),
         }
-        Ok(None)
     }
 
     /// Sends a drawing while it is drawn, and waits until the machine is idle again.
@@ -241,8 +229,8 @@ fn taken_in(reply: &Reply) -> Option<Taken> {
     let Reply::Other(line) = reply else { return None };
     let mut numbers = line.strip_prefix("[STREAM:")?.strip_suffix(']')?.split(',');
     let mut next = || numbers.next()?.parse::<u32>().ok();
-    let (id, targets, _) = (next()?, next()?, next()?);
-    Some(Taken { id, targets, strokes: None })
+    let (id, targets, all) = (next()?, next()?, next()?);
+    Some(Taken { id, targets, all, strokes: None })
 }
 
 #[cfg(test)]
@@ -250,12 +238,14 @@ mod tests {
     use super::*;
     use crate::link::Answer;
     use crate::preview::InMemory;
-    use penup::board_table::LM3S6965;
-    use penup_job::protocol::HOLD;
+    use penup::board_table::{LM3S6965, PICO};
+    use penup::boards::host::{CutFlash, LAYOUT};
+    use penup_job::protocol::{ABORT, HOLD};
     use penup_job::room::Room;
     use penup_readers::lines::{JobLine, Lines as _};
     use std::collections::VecDeque;
     use std::io;
+    use std::sync::atomic::Ordering;
     use std::time::{Duration, Instant};
 
     /// A plotter in memory whose line breaks off for three seconds behind this line.
@@ -404,6 +394,8 @@ mod tests {
         began: Instant,
         is_client_here: bool,
         has_held: bool,
+        /// Whether somebody gives the drawing up while the next client waits.
+        is_given_up: bool,
     }
 
     impl Link for Holding {
@@ -429,6 +421,9 @@ mod tests {
         }
 
         fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {
+            if !self.is_client_here && self.is_given_up {
+                self.plotter.send(&[ABORT])?;
+            }
             Ok(if self.is_client_here || first { Answer::NotYet } else { Answer::Yes })
         }
 
@@ -437,9 +432,8 @@ mod tests {
         }
     }
 
-    /// A plotter whose memory is full reads no line before it has drawn more.
-    #[test]
-    fn a_drawing_is_joined_that_holds_with_a_full_memory() {
+    /// A drawing that holds with a full memory, and whose client has gone.
+    fn held_with_a_full_memory() -> (Holding, StreamedJob) {
         let mut lines: Vec<String> =
             (0..6000).map(|n| format!("v {} {} 0", 10 + n % 100, 10 + n / 50)).collect();
         lines.extend((1..6000).map(|n| format!("l {n} {}", n + 1)));
@@ -447,11 +441,12 @@ mod tests {
         let room = Room::for_job(&lines);
         let mut host = InMemory::<u32>::new(room, Settings::default());
         assert!(host.take(&lines), "all lines are accepted");
-        let (mut job, _) = host.streamed(Form::Strokes, 0).expect("a drawing");
+        let (job, _) = host.streamed(Form::Strokes, 0).expect("a drawing");
         let room = Room::of_board(&LM3S6965);
         let plotter = InMemory::<u16>::new(room, Settings::default());
         let began = plotter.now();
-        let mut link = Holding { plotter, began, is_client_here: true, has_held: false };
+        let mut link =
+            Holding { plotter, began, is_client_here: true, has_held: false, is_given_up: false };
         let interrupt = AtomicBool::new(false);
         let mut sender =
             Sender::open(&mut link, Timeouts::default(), &interrupt).expect("a plotter");
@@ -459,9 +454,126 @@ mod tests {
         assert!(matches!(error, Error::Link(_)), "{error}");
         drop(sender);
         link.is_client_here = false;
+        (link, job)
+    }
+
+    /// A plotter whose memory is full reads no line before it has drawn more.
+    #[test]
+    fn a_drawing_is_joined_that_holds_with_a_full_memory() {
+        let (mut link, mut job) = held_with_a_full_memory();
+        let interrupt = AtomicBool::new(false);
         let joined = Sender::rejoin(&mut link, Timeouts::default(), &interrupt);
         let (mut sender, taken) = joined.expect("it answers").expect("it waits for strokes");
         assert!(taken.id == job.id() && job.skip(taken.targets), "{taken:?}");
         sender.draw_streamed(&job, &mut Quiet).expect("it is drawn");
+    }
+
+    /// The caller would take that for a plotter that draws nothing, and draw all over it.
+    #[test]
+    fn a_drawing_that_is_given_up_while_a_client_waits_is_no_idle_plotter() {
+        let (mut link, _) = held_with_a_full_memory();
+        link.is_given_up = true;
+        let interrupt = AtomicBool::new(false);
+        let joined = Sender::rejoin(&mut link, Timeouts::default(), &interrupt);
+        let error = joined.err().expect("the drawing is no more");
+        assert!(error.to_string().contains("has ended, or was given up"), "{error}");
+        assert_eq!(error.exit_code(), 5);
+    }
+
+    /// A plotter with flash, whose client goes when it is told to, and whose line may damage the
+    /// first answer to `$stream`.
+    struct Wire<'w> {
+        plotter: InMemory<u16>,
+        goes: &'w AtomicBool,
+        damages: bool,
+        began: Instant,
+        /// How long the plotter has been listened to, a tenth of a second each time.
+        clock: Duration,
+    }
+
+    impl Link for Wire<'_> {
+        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.plotter.send(bytes)
+        }
+
+        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+            if self.goes.load(Ordering::Relaxed) {
+                return Err(io::ErrorKind::BrokenPipe.into());
+            }
+            let count = self.plotter.receive(buffer, timeout)?;
+            self.clock += Duration::from_millis(100);
+            let heard = &mut buffer[..count];
+            let begin = heard.windows(3).position(|part| part == b"[ST").filter(|_| self.damages);
+            if let Some(begin) = begin
+                && let Some(comma) = heard[begin..].iter().position(|byte| *byte == b',')
+                && let Some(digit) = heard.get_mut(begin + comma + 1)
+            {
+                *digit = if *digit == b'9' { b'1' } else { *digit + 1 };
+                self.damages = false;
+            }
+            Ok(count)
+        }
+
+        fn change_pen(&mut self, _: u8) -> io::Result<bool> {
+            Ok(true)
+        }
+
+        fn now(&self) -> Instant {
+            self.began + self.clock
+        }
+    }
+
+    /// Sets a switch once so many strokes are drawn.
+    struct AtStroke<'s>(u64, &'s AtomicBool);
+
+    impl Progress for AtStroke<'_> {
+        fn lines_sent(&mut self, _: usize, _: usize) {}
+        fn drawn(&mut self, status: &Status) {
+            let is_there = status.strokes.is_some_and(|(done, _)| done >= self.0);
+            self.1.fetch_or(is_there && status.stream.is_some(), Ordering::Relaxed);
+        }
+        fn state(&mut self, _: &str) {}
+    }
+
+    #[test]
+    fn a_damaged_answer_about_a_drawing_is_not_believed() {
+        let mut lines: Vec<String> =
+            (0..80).map(|n| format!("v {} {} 0", 10 + n % 2 * 90, 10 + n / 2)).collect();
+        lines.extend((0..40).map(|n| format!("l {} {}", 2 * n + 1, 2 * n + 2)));
+        let lines: Vec<_> = lines.iter().map(JobLine::command).collect();
+        let mut host = InMemory::<u32>::new(Room::for_job(&lines), Settings::default());
+        assert!(host.take(&lines), "all lines are accepted");
+        let (job, _) = host.streamed(Form::Strokes, 0).expect("a drawing");
+        let flash = CutFlash::new(LAYOUT.end() as usize);
+        let plotter = InMemory::with_flash(Room::of_board(&PICO), flash);
+        let (goes, interrupt) = (AtomicBool::new(false), AtomicBool::new(false));
+        let (began, clock) = (Instant::now(), Duration::ZERO);
+        let mut wire = Wire { plotter, goes: &goes, damages: false, began, clock };
+        let timeouts = Timeouts::default();
+        let mut sender = Sender::open(&mut wire, timeouts, &interrupt).expect("a plotter");
+        sender.draw_streamed(&job, &mut AtStroke(2, &goes)).expect_err("the client goes");
+        drop(sender);
+        goes.store(false, Ordering::Relaxed);
+        wire.damages = true;
+        let joined = Sender::rejoin(&mut wire, timeouts, &interrupt);
+        let (mut sender, taken) = joined.expect("it answers").expect("it draws");
+        assert_eq!((taken.id, taken.targets), (job.id(), job.targets()));
+        let mut rest = job;
+        assert!(rest.skip(taken.targets));
+        sender.draw_streamed(&rest, &mut AtStroke(5, &interrupt)).expect_err("interrupted");
+        drop(sender);
+        interrupt.store(false, Ordering::Relaxed);
+        // The pen rises.
+        for _ in 0..50 {
+            wire.receive(&mut [0; 256], Duration::ZERO).expect("memory");
+        }
+        let mut sender = Sender::open(&mut wire, timeouts, &interrupt).expect("a plotter");
+        let stopped = sender.stopped_drawing().expect("an answer").expect("it has stopped");
+        drop(sender);
+        wire.damages = true;
+        let mut sender = Sender::open(&mut wire, timeouts, &interrupt).expect("a plotter");
+        let told = sender.stopped_drawing().expect("an answer").expect("it has stopped");
+        assert_eq!(told, stopped);
+        assert!((4..40).contains(&told.drawn) && told.all == 40, "{told:?}");
     }
 }
