@@ -16,6 +16,7 @@
 mod delivery;
 mod drawing;
 mod orders;
+mod refusals;
 mod timeouts;
 mod streaming;
 

@@ -67,9 +67,12 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
     let mut progress = progress(args.plotter.format.json, is_quiet);
     let mut sender = Sender::open(&mut link, Timeouts::default(), interrupt)?;
     if sender.stopped_drawing()?.is_some() {
-        let reason = "a computer sent this drawing while it was drawn: name its file, with the \
-                      same options, in `penup plot FILE --port DEVICE --resume`";
-        return Err(Error::NotResumed { reason: reason.to_owned() });
+        let option = if args.at_origin { " --at-origin" } else { "" };
+        let reason = format!(
+            "a computer sent this drawing while it was drawn: name its file, with the same \
+             options, in `penup plot FILE --port DEVICE --resume{option}`"
+        );
+        return Err(Error::NotResumed { reason });
     }
     let mut drawn = sender.go_on(args.at_origin, progress.as_mut());
     let knows = CommandError::PositionKnown.number();

@@ -1,6 +1,7 @@
 //! Sends a drawing that this computer has computed, while it is drawn.
 
 use super::drawing::{FollowedDrawing, Numbers};
+use super::refusals::for_sent_drawing;
 use super::{Sender, Timeouts};
 use crate::error::Error;
 use crate::link::Link;
@@ -186,8 +187,12 @@ impl<'a> Sender<'a> {
     /// What it depends on has changed, or as [`Sender::ask`].
     pub fn stopped_drawing(&mut self) -> Result<Option<Stopped>, Error> {
         match self.agreed(|sender| Ok(sender.ask(STREAM)?.iter().find_map(stopped_in))) {
-            Err(Error::Refused { number, .. }) if number == CommandError::NoStream.number() => {
-                Ok(None)
+            Err(Error::Refused { number, messages, line }) => {
+                match for_sent_drawing(number, &messages) {
+                    _ if number == CommandError::NoStream.number() => Ok(None),
+                    Some(reason) => Err(Error::NotResumed { reason }),
+                    None => Err(Error::Refused { number, messages, line }),
+                }
             }
             asked => asked.map(Some),
         }

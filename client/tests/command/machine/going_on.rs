@@ -247,3 +247,43 @@ fn a_drawing_goes_on_at_the_stroke_that_is_told() {
     let (code, _, noted) = plot("2");
     assert_ne!(code, Some(0), "there is nothing behind the last stroke: {noted}");
 }
+
+/// Starts to plot rows with these options, and stops the client by Ctrl-C once some are drawn.
+/// Returns what it has noted.
+fn interrupted(plotter: &Library, folder: &Path, options: &[&str]) -> String {
+    plotter.slow.store(true, Ordering::Relaxed);
+    let mut client = plotter.plot_rows(folder, options);
+    match options.contains(&"host") {
+        true => wait_for_strokes(plotter, &mut client),
+        false => plotter.wait_for_drawing(&mut client),
+    }
+    plotter.slow.store(false, Ordering::Relaxed);
+    std::thread::sleep(Duration::from_millis(700));
+    let sent = Command::new("kill").args(["-INT", &client.id().to_string()]).status();
+    assert!(sent.expect("kill runs").success());
+    let (code, _, noted) = ended(client);
+    assert_eq!(code, Some(130), "{noted}");
+    noted
+}
+
+/// Waits until most strokes of the rows have come from this client.
+fn wait_for_strokes(plotter: &Library, client: &mut Child) {
+    while plotter.heard.load(Ordering::Relaxed) < 1000 {
+        assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+#[test]
+fn a_setting_that_has_changed_since_a_drawing_stopped_is_named() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    interrupted(&plotter, folder.path(), &["--compute", "host"]);
+    assert_eq!(plotter.run(folder.path(), &["set", "3=1"]).0, Some(0));
+    let mut client = plotter.rows(folder.path(), &["--resume"]);
+    let (code, _, error) = ended(client.stderr(Stdio::piped()).spawn().expect("it runs"));
+    assert_eq!(code, Some(1), "{error}");
+    assert!(error.contains("setting 3 of the machine to 0"), "{error}");
+    assert!(error.contains("`penup plot FILE --port DEVICE`"), "{error}");
+    assert!(!error.contains("penup again"), "{error}");
+}
