@@ -261,16 +261,10 @@ pub struct PlotArgs {
         help_heading = "Plotter"
     )]
     pub compute: Compute,
-    /// Leave out so many strokes, which were drawn before; this computer computes the drawing then
-    #[arg(
-        long,
-        value_name = "STROKES",
-        default_value = "0",
-        hide_default_value = true,
-        allow_hyphen_values = true,
-        help_heading = "Plotter"
-    )]
-    pub from: u32,
+    /// Leave out so many strokes, which were drawn before; this computer computes the drawing then.
+    /// 0 draws all of a drawing that the plotter has stopped
+    #[arg(long, value_name = "STROKES", allow_hyphen_values = true, help_heading = "Plotter")]
+    pub from: Option<u32>,
     /// Begin closed lines at random points, so that the marks of the pen do not stand in a row;
     /// this computer then computes the drawing. Else they begin where the moves between lines
     /// become short
@@ -300,6 +294,13 @@ pub struct PlotArgs {
     /// How long a plotter that is gone is waited for.
     #[command(flatten)]
     pub rejoin: RejoinArgs,
+}
+
+impl PlotArgs {
+    /// How many strokes are left out at the beginning.
+    pub fn left_out(&self) -> u32 {
+        self.from.unwrap_or(0)
+    }
 }
 
 /// How often everything is drawn.

@@ -142,6 +142,21 @@ pub enum Error {
         /// The reason, and what to do.
         reason: String,
     },
+    /// The plotter has stopped this drawing, and would draw it over what is drawn of it.
+    #[error(
+        "the plotter has stopped this drawing after {}: {}, or --from 0 to draw all of it anew",
+        strokes_drawn(*done, *all),
+        if *is_repeated { "say --resume in place of --multipass to go on with it" }
+        else { "add --resume to go on with it" }
+    )]
+    StoppedBefore {
+        /// The number of strokes that are drawn.
+        done: u64,
+        /// The number of all strokes.
+        all: u64,
+        /// Whether several passes were asked for.
+        is_repeated: bool,
+    },
     /// The pen cannot be lowered where it stands.
     #[error("cannot lower the pen: {reason}")]
     NotLowered {
@@ -295,6 +310,16 @@ pub enum Error {
         done: u64,
         /// The number of all strokes; 0 if it is not known.
         all: u64,
+    },
+    /// A pass was drawn to its end whose beginning another program has sent.
+    #[error(
+        "one of the {passes} passes is drawn to its end, and this program cannot tell which: draw \
+         those that are missing by --multipass N in place of --multipass {passes}, without --from; \
+         they are {} at most", passes - 1
+    )]
+    PassesLeft {
+        /// The number of all passes.
+        passes: u32,
     },
     /// The drawing whose rest was to be sent is no longer drawn.
     #[error(
@@ -483,6 +508,7 @@ impl Error {
             | Self::Restarted
             | Self::JobStopped { .. }
             | Self::EndedMeanwhile
+            | Self::PassesLeft { .. }
             | Self::Damaged { .. }
             | Self::OtherContents
             | Self::Held
@@ -498,6 +524,7 @@ impl Error {
             | Self::TooLarge { .. }
             | Self::NotStreamed { .. }
             | Self::NotResumed { .. }
+            | Self::StoppedBefore { .. }
             | Self::NoSuchMachine(_)
             | Self::MotionOfOtherMachine
             | Self::Board { .. }

@@ -1,5 +1,9 @@
 //! The command `plot`: who computes the drawing, and how it is sent.
 
+mod advice;
+
+pub use advice::KNOWS_PLACE;
+
 use crate::cli::PlotArgs;
 use crate::compute::{self, Capacity, Compute, Known};
 use crate::error::Error;
@@ -17,11 +21,12 @@ use crate::progress::{Bar, Progress};
 use crate::run::{FileJob, Outputs, note, read, summary, write_pictures};
 use crate::sender::{Sender, Stopped, Timeouts};
 use crate::workspace;
+use advice::{Progressed, Sending, StrokeCounter, advice, passes_left};
 use penup::index::Index;
 use penup::machine::{self, MachineError, Setting};
 use penup::protocol::CommandError;
 use penup_job::picture::Picture;
-use penup_job::protocol::{GO_ON_AT_ORIGIN, Status};
+use penup_job::protocol::GO_ON_AT_ORIGIN;
 use penup_job::results::{JobReport, counted_strokes};
 use penup_job::room::Room;
 use penup_job::streamed::{Form, StreamedJob};
@@ -65,21 +70,20 @@ fn plot_file(
         }
         let plot = Plot { args, file, page: settings.page, quiet };
         let rejoined = plot.rejoin(&job, &mut link, interrupt, &mut bar)?;
-        let (report, passes) = match rejoined {
+        let passes = args.passes.multipass;
+        let report = match rejoined {
             // Nobody knows which pass it was.
-            Some(report) => (report, 1),
+            Some(_) if passes > 1 => return Err(Error::PassesLeft { passes }),
+            Some(report) => report,
             None => {
                 let mut sender = Sender::open(&mut link, Timeouts::default(), interrupt)?;
                 let drawn = operate::limits(&mut sender)
                     .and_then(|known| plot.draw(job, &mut sender, &known, &mut bar));
                 sender.end();
-                (drawn?, args.passes.multipass)
+                drawn?
             }
         };
         drop(bar);
-        if passes < args.passes.multipass {
-            plot.note(&["this pass is drawn to its end; begin the others anew".to_owned()]);
-        }
         let text = report.as_ref().map(|report| format!(": {report}")).unwrap_or_default();
         let json = json!({ "file": file.display().to_string(), "drawn": report, "passes": passes });
         let times = if passes > 1 { format!(" {passes} times") } else { String::new() };
@@ -161,7 +165,8 @@ impl Plot<'_> {
         if self.args.resume {
             return self.go_on(job, sender, known, progress);
         }
-        let compute = match self.args.from > 0 || self.args.reloop {
+        let left_out = self.args.left_out();
+        let compute = match left_out > 0 || self.args.reloop {
             true if self.args.compute == Compute::Board => {
                 let reason = "--from and --reloop need this computer: leave out --compute board";
                 return Err(Error::NotStreamed { reason: reason.to_owned() });
@@ -183,7 +188,10 @@ impl Plot<'_> {
         drop(job);
         host.set_reloops(self.args.reloop);
         let form = sender.form(&known.settings.unwrap_or_default())?;
-        let (streamed, report) = host.streamed(form, self.args.from)?;
+        let (streamed, report) = host.streamed(form, left_out)?;
+        if self.args.from.is_none() && form == Form::Strokes {
+            fail_if_stopped_before(sender, &mut host, &streamed, passes)?;
+        }
         self.note(&host.left_out());
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
         self.note(&[format!(
@@ -191,12 +199,14 @@ impl Plot<'_> {
             counted_strokes(strokes.into()),
             streamed.bytes() as f64 / f64::from(points.max(1))
         )]);
-        self.send(sender, &streamed, self.args.from, passes, progress)?;
+        let sending = Sending { form, left_out, begin: left_out, passes: Some(passes) };
+        self.send(sender, &streamed, sending, progress)?;
         // Strokes that were left out once are drawn from then on.
         let mut whole = if passes > 1 { host.streamed(form, 0)?.0 } else { streamed };
         whole.ask_for_first_pen();
         for left in (1..passes).rev() {
-            self.send(sender, &whole, 0, left, progress)?;
+            let sending = Sending { left_out: 0, begin: 0, passes: Some(left), ..sending };
+            self.send(sender, &whole, sending, progress)?;
         }
         Ok(report)
     }
@@ -221,14 +231,9 @@ impl Plot<'_> {
         };
         drop(job);
         host.set_reloops(self.args.reloop);
-        // The drawing may have begun behind its first strokes, by --from.
-        let (mut whole, report) = host.streamed(Form::Strokes, 0)?;
+        let (whole, report) = host.streamed(Form::Strokes, 0)?;
         self.note(&host.left_out());
-        let begin = whole.size().strokes.checked_sub(stopped.all);
-        if let Some(begin) = begin.filter(|begin| *begin > 0) {
-            whole = host.streamed(Form::Strokes, begin)?.0;
-        }
-        let Some(begin) = begin.filter(|_| whole.id() == stopped.id) else {
+        let Some(begin) = begin_of(&stopped, &mut host, &whole)? else {
             return Err(refused(
                 "another drawing has stopped: name the same file with the same options, and set \
                  the machine as it was",
@@ -245,37 +250,29 @@ impl Plot<'_> {
         } else if self.args.at_origin {
             self.note(&[KNOWS_PLACE.to_owned()]);
         }
-        let mut rest = host.streamed(Form::Strokes, begin + stopped.drawn)?.0;
+        let left_out = begin + stopped.drawn;
+        let mut rest = host.streamed(Form::Strokes, left_out)?.0;
         rest.set_id(stopped.id);
         let Stopped { drawn, all, .. } = stopped;
         self.note(&[format!("{drawn} of {all} strokes are drawn: the rest is sent")]);
-        self.send(sender, &rest, begin, 1, progress)?;
+        let sending = Sending { form: Form::Strokes, left_out, begin, passes: Some(1) };
+        self.send(sender, &rest, sending, progress)?;
         Ok(report)
     }
 
-    /// Sends strokes while they are drawn, from this stroke of the drawing, in the first of these
-    /// passes that are left.
+    /// Sends strokes while they are drawn. If that breaks off, the user is told how to go on.
     fn send(
         &self,
         sender: &mut Sender<'_>,
         streamed: &StreamedJob,
-        from: u32,
-        passes: u32,
+        sending: Sending,
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
-        let mut followed = StrokeCounter { progress, begun: 0 };
+        let mut followed = StrokeCounter::new(progress, sending.form);
         let sent = sender.draw_streamed(streamed, &mut followed);
         if let Err(error) = &sent {
-            let is_repeated = self.args.passes.multipass > 1;
-            let passes = is_repeated.then_some(passes);
-            let go_on = match (is_lost(error, streamed.form()), self.args.resume) {
-                (true, _) => Some(TAKE_UP.to_owned()),
-                (false, _) if followed.begun == 0 => None,
-                (false, true) => Some(GO_ON_AGAIN.to_owned()),
-                // The last stroke that was begun may not be whole.
-                (false, false) => Some(go_on_from(u64::from(from) + followed.begun - 1, passes)),
-            };
-            self.note(go_on.as_slice());
+            let so_far = Progressed { begun: followed.begun, arrival: sender.arrival() };
+            self.note(advice(self.args, &sending, so_far, error).as_slice());
         }
         sent
     }
@@ -300,25 +297,75 @@ impl Plot<'_> {
         if !host.take(job) {
             return Err(busy());
         }
-        let (mut streamed, report) = host.streamed(Form::Strokes, self.args.from)?;
-        let size = streamed.size().strokes;
-        let drawn = taken.strokes.and_then(|all| size.checked_sub(all));
-        if let Some(drawn) = drawn.filter(|drawn| *drawn > 0) {
-            // The rest of a drawing that had stopped has the number of the whole.
-            let id = streamed.id();
-            streamed = host.streamed(Form::Strokes, self.args.from + drawn)?.0;
-            streamed.set_id(id);
+        // A later pass begins at the first stroke.
+        let first = self.args.left_out();
+        let begins = [Some(first), Some(0).filter(|_| first > 0)];
+        for begin in begins.into_iter().flatten() {
+            let (mut streamed, report) = host.streamed(Form::Strokes, begin)?;
+            let size = streamed.size().strokes;
+            let drawn = taken.strokes.and_then(|all| size.checked_sub(all)).unwrap_or(0);
+            if (1..size).contains(&drawn) {
+                // The rest of a drawing that had stopped has the number of the whole.
+                let id = streamed.id();
+                streamed = host.streamed(Form::Strokes, begin + drawn)?.0;
+                streamed.set_id(id);
+            }
+            // The number of strokes is that of a report without a checksum: the targets prove it.
+            let is_same = streamed.id() == taken.id && streamed.targets() == taken.all;
+            if !is_same || !streamed.skip(taken.targets) {
+                continue;
+            }
+            let left = streamed.targets() - taken.targets;
+            self.note(&[format!(
+                "the plotter draws this already: the last {left} points are sent"
+            )]);
+            let passes = Some(1).filter(|_| self.args.passes.multipass == 1);
+            let left_out = begin + drawn;
+            let sending = Sending { form: Form::Strokes, left_out, begin, passes };
+            let sent = self.send(&mut sender, &streamed, sending, progress);
+            sender.end();
+            return sent.map(|()| Some(report));
         }
-        // The number of strokes is that of a report without a checksum: the targets prove it.
-        let is_same = streamed.id() == taken.id && streamed.targets() == taken.all;
-        if !is_same || !streamed.skip(taken.targets) {
-            return Err(busy());
-        }
-        let left = streamed.targets() - taken.targets;
-        self.note(&[format!("the plotter draws this already: the last {left} points are sent")]);
-        let sent = self.send(&mut sender, &streamed, self.args.from, 1, progress);
-        sender.end();
-        sent.map(|()| Some(report))
+        Err(busy())
+    }
+}
+
+/// The number of strokes of the whole drawing that come before those by which the plotter knows the
+/// drawing that has stopped: it may have begun behind its first strokes, by --from. `None` if that
+/// is another drawing.
+fn begin_of(
+    stopped: &Stopped,
+    host: &mut InMemory<u32>,
+    whole: &StreamedJob,
+) -> Result<Option<u32>, Error> {
+    let id = match whole.size().strokes.checked_sub(stopped.all) {
+        None => return Ok(None),
+        Some(0) => whole.id(),
+        Some(begin) => host.streamed(Form::Strokes, begin)?.0.id(),
+    };
+    Ok(whole.size().strokes.checked_sub(stopped.all).filter(|_| id == stopped.id))
+}
+
+/// Fails if the plotter has stopped this drawing and would draw it over what is drawn of it.
+fn fail_if_stopped_before(
+    sender: &mut Sender<'_>,
+    host: &mut InMemory<u32>,
+    whole: &StreamedJob,
+    passes: u32,
+) -> Result<(), Error> {
+    let stopped = match sender.stopped_drawing() {
+        // What that drawing depends on has changed, so it is another one.
+        Err(Error::NotResumed { .. }) => return Ok(()),
+        stopped => stopped?.filter(|stopped| stopped.drawn > 0),
+    };
+    let Some(stopped) = stopped else { return Ok(()) };
+    match begin_of(&stopped, host, whole)? {
+        None => Ok(()),
+        Some(_) => Err(Error::StoppedBefore {
+            done: stopped.drawn.into(),
+            all: stopped.all.into(),
+            is_repeated: passes > 1,
+        }),
     }
 }
 
@@ -333,63 +380,6 @@ fn beyond(page: Page, settings: &machine::Settings) -> Option<String> {
             page.width, page.height
         )
     })
-}
-
-/// What the user is told who says that the pen is at the origin although its place is known.
-pub const KNOWS_PLACE: &str =
-    "the plotter knows where the pen is, so the drawing goes on from there, without --at-origin";
-
-/// What the user is told who goes on with a drawing once more.
-const GO_ON_AGAIN: &str = "to go on at the stroke that was begun last, do the same again";
-
-/// What the user is told when the plotter is gone and waits for more strokes.
-const TAKE_UP: &str = "the plotter draws what it has, and then waits for the rest with the pen up: \
-                       once it answers, do the same again, or with --resume if its power was gone";
-
-/// Whether the error leaves a plotter behind that waits for the rest of a drawing in this form.
-fn is_lost(error: &Error, form: Form) -> bool {
-    form == Form::Strokes && matches!(error, Error::Link(_) | Error::Silent { .. })
-}
-
-/// What the user is told who leaves out strokes that are drawn, in the first of these passes that
-/// are left.
-fn go_on_from(left_out: u64, passes: Option<u32>) -> String {
-    let options = match passes {
-        None => {
-            format!(
-                "add --from {left_out}, or --resume if the plotter has flash for how far it comes"
-            )
-        }
-        Some(passes) => {
-            format!("say --from {left_out} --multipass {passes} in place of those options")
-        }
-    };
-    format!("to go on at the stroke that was begun last, {options}")
-}
-
-/// Passes reports of progress on, and notes how many strokes were begun.
-struct StrokeCounter<'p> {
-    progress: &'p mut dyn Progress,
-    begun: u64,
-}
-
-impl Progress for StrokeCounter<'_> {
-    fn lines_sent(&mut self, done: usize, all: usize) {
-        self.progress.lines_sent(done, all);
-    }
-
-    fn drawn(&mut self, status: &Status) {
-        self.begun = status.strokes.map_or(self.begun, |(done, _)| done);
-        self.progress.drawn(status);
-    }
-
-    fn state(&mut self, state: &str) {
-        self.progress.state(state);
-    }
-
-    fn note(&mut self, note: &str) {
-        self.progress.note(note);
-    }
 }
 
 /// Says which keys act from now on.
@@ -443,23 +433,12 @@ fn draw_by(
     progress: &mut dyn Progress,
 ) -> Result<Option<JobReport>, Error> {
     sender.stream(job, progress)?;
-    for _ in 0..passes {
-        sender.plot(progress)?;
+    for left in (0..passes).rev() {
+        let drawn = sender.plot(progress);
+        if drawn.is_err() && left > 0 {
+            progress.note(&passes_left(left));
+        }
+        drawn?;
     }
     sender.report()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::go_on_from;
-
-    #[test]
-    fn the_passes_that_are_left_are_named() {
-        assert!(
-            go_on_from(4, None).ends_with(
-                "add --from 4, or --resume if the plotter has flash for how far it comes"
-            )
-        );
-        assert!(go_on_from(4, Some(2)).contains("say --from 4 --multipass 2 in place"));
-    }
 }

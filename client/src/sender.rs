@@ -20,7 +20,7 @@ mod refusals;
 mod timeouts;
 mod streaming;
 
-pub use streaming::{Stopped, Taken};
+pub use streaming::{Arrival, Stopped, Taken};
 pub use timeouts::Timeouts;
 
 use crate::error::Error;
@@ -74,6 +74,8 @@ pub struct Sender<'a> {
     allows_alarm: bool,
     /// What the user beside the plotter has asked for and has not been done yet.
     requests: VecDeque<UserRequest>,
+    /// How much has arrived of the drawing that was sent last while it was drawn.
+    arrival: Arrival,
 }
 
 /// Computes the line to cite in an error; it is called only if there is an error.
@@ -117,6 +119,7 @@ impl<'a> Sender<'a> {
             last_status: Status::default(),
             allows_alarm: false,
             requests: VecDeque::new(),
+            arrival: Arrival::Part,
         }
     }
 

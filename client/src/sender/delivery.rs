@@ -2,7 +2,7 @@
 
 use super::Sender;
 use super::drawing::Numbers;
-use super::streaming::Streaming;
+use super::streaming::{Arrival, Streaming};
 use crate::error::Error;
 use crate::progress::Progress;
 use penup_job::protocol::{LAST_NUMBER, RECEIVE_WINDOW, RESUME, Reply, Status, numbered};
@@ -105,6 +105,7 @@ impl Sender<'_> {
         let end = delivery.base.saturating_add(i32::try_from(lines.count()).unwrap_or(i32::MAX));
         while self.done < end {
             self.fill_queue(&mut delivery)?;
+            self.note_arrival(&mut delivery, end);
             self.stop_if_interrupted()?;
             if let Some(streaming) = &mut delivery.streaming {
                 self.obey(&mut streaming.followed, Numbers::InUse, progress)?;
@@ -157,7 +158,20 @@ impl Sender<'_> {
                 return Err(Error::LostLine { line: delivery.line(oldest).map(Box::new) });
             }
         }
+        self.note_arrival(&mut delivery, end);
         self.confirm(lines, delivery.base)
+    }
+
+    /// Notes how much of a drawing has arrived whose last line has the number `end`.
+    fn note_arrival(&self, delivery: &mut Delivery<'_, '_>, end: i32) {
+        let sent = delivery.sent;
+        if let Some(streaming) = &mut delivery.streaming {
+            streaming.arrival = match self.done == end {
+                true => Arrival::All,
+                false if sent == end => Arrival::PerhapsAll,
+                false => Arrival::Part,
+            };
+        }
     }
 
     /// Sends as many lines as fit into the plotter's receive queue.

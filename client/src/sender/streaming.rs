@@ -38,6 +38,18 @@ pub struct Stopped {
     pub is_lost: bool,
 }
 
+/// How much of a drawing has arrived that is sent while it is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Arrival {
+    /// Lines are left that were not sent.
+    #[default]
+    Part,
+    /// All lines were sent, and the last ones were not answered.
+    PerhapsAll,
+    /// The plotter has taken all lines.
+    All,
+}
+
 /// The greatest number of lines of G-code that a plotter has taken and not carried out: it plans 15
 /// moves ahead, and reads some lines beyond them.
 const MOST_PLANNED: usize = 20;
@@ -53,6 +65,16 @@ pub(super) struct Streaming<'j> {
     pub pens_in: usize,
     /// Whether the machine has been seen to wait for the next one.
     pub waited: bool,
+    /// How much of the drawing has arrived.
+    pub arrival: Arrival,
+}
+
+impl<'j> Streaming<'j> {
+    /// The state before the first line.
+    pub fn of(job: &'j StreamedJob) -> Self {
+        let followed = FollowedDrawing::default();
+        Self { job, followed, pens_in: 0, waited: false, arrival: Arrival::Part }
+    }
 }
 
 impl Streaming<'_> {
@@ -198,6 +220,11 @@ impl<'a> Sender<'a> {
         }
     }
 
+    /// How much has arrived of the drawing that was sent last.
+    pub fn arrival(&self) -> Arrival {
+        self.arrival
+    }
+
     /// Sends a drawing while it is drawn, and waits until the machine is idle again.
     ///
     /// # Errors
@@ -208,9 +235,10 @@ impl<'a> Sender<'a> {
         progress: &mut dyn Progress,
     ) -> Result<(), Error> {
         self.strokes = job.size().strokes.into();
-        let mut streaming =
-            Streaming { job, followed: FollowedDrawing::default(), pens_in: 0, waited: false };
-        self.deliver_as(job, Some(&mut streaming), progress, &mut |_| {})?;
+        let mut streaming = Streaming::of(job);
+        let delivered = self.deliver_as(job, Some(&mut streaming), progress, &mut |_| {});
+        self.arrival = streaming.arrival;
+        delivered?;
         match job.form() {
             Form::Strokes => self.watch(progress)?,
             // The plotter knows only of what it has not drawn yet, and not of the pens.
@@ -226,7 +254,7 @@ fn stopped_in(reply: &Reply) -> Option<Stopped> {
     let mut numbers = line.strip_prefix("[STOPPED:")?.strip_suffix(']')?.split(',');
     let mut next = || numbers.next()?.parse::<u32>().ok();
     let (id, drawn, all, lost) = (next()?, next()?, next()?, next()?);
-    Some(Stopped { id, drawn, all, is_lost: lost != 0 })
+    Some(Stopped { id, drawn, all, is_lost: lost != 0 }).filter(|_| drawn < all)
 }
 
 /// The answer to `$stream`: `[STREAM:id,taken,all]`.
@@ -372,12 +400,7 @@ mod tests {
         lines.extend((1..200).map(|n| format!("l {n} {}", n + 1)));
         lines.extend((0..50).map(|n| format!("l {} {}", 201 + 2 * n, 202 + 2 * n)));
         let job = gcode(&lines.iter().map(String::as_str).collect::<Vec<_>>());
-        let mut streaming = Streaming {
-            job: &job,
-            followed: FollowedDrawing::default(),
-            pens_in: 0,
-            waited: false,
-        };
+        let mut streaming = Streaming::of(&job);
         let mut begun = 0;
         let mut counts = Vec::new();
         let mut is_down = false;

@@ -62,6 +62,10 @@ fn a_drawing_that_is_sent_goes_on_after_a_loss_of_power() {
     };
     let (code, error) = go_on(&["--resume"]);
     assert_eq!((code, error.contains("--at-origin")), (Some(1), true), "{error}");
+    // What is drawn is not drawn over without a word.
+    let (code, error) = go_on(&["--compute", "host"]);
+    let advice = "add --resume to go on with it, or --from 0 to draw all of it anew";
+    assert_eq!((code, error.contains(advice)), (Some(1), true), "{error}");
     let (code, error) = go_on(&["--resume", "--at-origin", "--scale", "0.9"]);
     assert_eq!((code, error.contains("another drawing")), (Some(1), true), "{error}");
     let (code, error) = go_on(&["--resume", "--at-origin"]);
@@ -272,6 +276,26 @@ fn wait_for_strokes(plotter: &Library, client: &mut Child) {
         assert_eq!(client.try_wait().expect("a state"), None, "it ended before the drawing");
         std::thread::sleep(Duration::from_millis(5));
     }
+}
+
+#[test]
+fn passes_that_are_left_are_told() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let noted = interrupted(&plotter, folder.path(), &["--multipass", "3"]);
+    assert!(noted.contains("--multipass 2"), "{noted}");
+    // It is unknown which pass it was.
+    let plotter = Library::new();
+    let options = ["--compute", "host", "--multipass", "3"];
+    let mut client = plotter.plot_rows(folder.path(), &options);
+    wait_for_strokes(&plotter, &mut client);
+    std::thread::sleep(Duration::from_millis(500));
+    client.kill().expect("killed");
+    client.wait().expect("it ends");
+    let (code, said, noted) = ended(plotter.plot_rows(folder.path(), &options));
+    assert_eq!((code, said.as_str()), (Some(5), ""), "{noted}");
+    assert!(noted.contains("in place of --multipass 3"), "{noted}");
+    assert_eq!(plotter.json(folder.path(), &["status"]).1["state"], "Idle");
 }
 
 #[test]
