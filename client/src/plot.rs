@@ -2,7 +2,7 @@
 
 mod advice;
 
-pub use advice::KNOWS_PLACE;
+pub use advice::{KNOWS_PLACE, is_at_origin};
 
 use crate::cli::PlotArgs;
 use crate::compute::{self, Capacity, Compute, Known};
@@ -245,7 +245,9 @@ impl Plot<'_> {
                  pen at the origin by hand and add --at-origin",
             ));
         }
-        if stopped.is_lost {
+        // The same command may have gone on before, and was interrupted before the pen moved. Else
+        // the plotter refuses to believe that the pen is at the origin, and says why.
+        if stopped.is_lost || self.args.at_origin && !is_at_origin(&sender.status()?) {
             sender.ask(GO_ON_AT_ORIGIN)?;
         } else if self.args.at_origin {
             self.note(&[KNOWS_PLACE.to_owned()]);

@@ -431,3 +431,14 @@ fn after_a_refused_line_the_next_one_is_carried_out() {
     sender.ask("$101=80").expect("taken");
     assert_eq!(plotter.lines, ["$100=0", "$101=80"]);
 }
+
+/// A refusal to go on at the origin is no reason not to go on from where the pen is.
+#[test]
+fn a_job_goes_on_after_a_refusal() {
+    let mut plotter = FakePlotter::new(Fault::ErrorAt(1, 168));
+    let interrupt = AtomicBool::new(false);
+    let mut sender = Sender::open(&mut plotter, TIMEOUTS, &interrupt).expect("a plotter");
+    let error = sender.go_on(true, &mut Quiet).expect_err("it knows where the pen is");
+    assert!(matches!(error, Error::Refused { number: 168, .. }), "{error}");
+    sender.go_on(false, &mut Quiet).expect("it goes on");
+}

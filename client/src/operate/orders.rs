@@ -10,7 +10,7 @@ use crate::cli::{
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::outcome::Outcome;
-use crate::plot::KNOWS_PLACE;
+use crate::plot::{KNOWS_PLACE, is_at_origin};
 use crate::progress::{Bar, Progress};
 use crate::sender::{Sender, Timeouts};
 use penup::protocol::CommandError;
@@ -76,8 +76,9 @@ pub fn resume(args: &ResumeArgs, is_quiet: bool, interrupt: &AtomicBool) -> Resu
     }
     let mut drawn = sender.go_on(args.at_origin, progress.as_mut());
     let knows = CommandError::PositionKnown.number();
-    if matches!(drawn, Err(Error::Refused { number, .. }) if number == knows && args.at_origin) {
-        // The same command has gone on before, and was interrupted.
+    let is_known = matches!(drawn, Err(Error::Refused { number, .. }) if number == knows);
+    if is_known && args.at_origin && is_at_origin(&sender.status()?) {
+        // The same command has gone on before, and was interrupted before the pen moved.
         let _ = writeln!(io::stderr(), "penup: note: {KNOWS_PLACE}");
         drawn = sender.go_on(false, progress.as_mut());
     }

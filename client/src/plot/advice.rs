@@ -11,6 +11,12 @@ use penup_job::streamed::Form;
 pub const KNOWS_PLACE: &str =
     "the plotter knows where the pen is, so the drawing goes on from there, without --at-origin";
 
+/// Whether the machine stands at the origin of its page, as far as it knows.
+pub fn is_at_origin(status: &Status) -> bool {
+    let mut numbers = status.position.split(',').map(str::parse::<f64>);
+    !status.position.is_empty() && numbers.all(|number| number.is_ok_and(|number| number == 0.0))
+}
+
 /// A drawing, or the rest of one, that was being sent while it was drawn.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sending {
@@ -299,6 +305,15 @@ mod tests {
                 counter.drawn(&status);
             }
             assert_eq!(counter.begun, begun, "{report}");
+        }
+    }
+
+    #[test]
+    fn the_origin_is_known_by_its_coordinates() {
+        let at = |position: &str| Status { position: position.to_owned(), ..Status::default() };
+        assert!(is_at_origin(&at("0.000,0.000")) && is_at_origin(&at("-0.000,0.000,0.000")));
+        for other in ["", "0.000,1.000", "0.000,nan", "0.000,"] {
+            assert!(!is_at_origin(&at(other)), "{other}");
         }
     }
 }

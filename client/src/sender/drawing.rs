@@ -112,7 +112,12 @@ impl Sender<'_> {
     /// idle.
     fn draw_kept(&mut self, command: &str, progress: &mut dyn Progress) -> Result<(), Error> {
         let lines = [JobLine::command(command)];
-        self.deliver(&lines, &mut Quiet)?;
+        let begun = self.deliver(&lines, &mut Quiet);
+        if let Err(Error::Refused { .. }) = begun {
+            // The plotter tells this refusal until the numbers begin anew.
+            self.begin_numbers(None)?;
+        }
+        begun?;
         let base = self.done - 1;
         self.follow_drawing(Some(&lines), None, progress)?;
         self.confirm(&lines, base)?;

@@ -278,6 +278,29 @@ fn wait_for_strokes(plotter: &Library, client: &mut Child) {
     }
 }
 
+/// The user says where the pen is, and the plotter believes that it is elsewhere.
+#[test]
+fn a_pen_at_the_origin_is_not_believed_to_be_elsewhere() {
+    for computer in ["board", "host"] {
+        let folder = tempfile::tempdir().expect("a folder");
+        let plotter = Library::new();
+        interrupted(&plotter, folder.path(), &["--compute", computer]);
+        let go_on = |options: &[&str]| match computer {
+            "board" => plotter.run(folder.path(), &[&["resume"], options].concat()),
+            _ => {
+                let options = [&["--resume"], options].concat();
+                let mut client = plotter.rows(folder.path(), &options);
+                ended(client.stderr(Stdio::piped()).spawn().expect("the program runs"))
+            }
+        };
+        let (code, _, error) = go_on(&["--at-origin"]);
+        assert_eq!(code, Some(4), "{computer}: {error}");
+        assert!(error.contains("leave out --at-origin; if the pen was moved by hand"), "{error}");
+        let (code, _, error) = go_on(&[]);
+        assert_eq!(code, Some(0), "{computer}: {error}");
+    }
+}
+
 #[test]
 fn passes_that_are_left_are_told() {
     let folder = tempfile::tempdir().expect("a folder");
