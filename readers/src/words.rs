@@ -46,6 +46,13 @@ pub const MOSTLY_FLAT: &str =
 pub const PROBABLY_Y_UP: &str =
     "the program that wrote it usually has y up: if the model lies on its side, add --y-up";
 
+/// The refusals whose messages tell what the text for this program cannot: the setting that has
+/// changed, and its value.
+const TOLD_BY_MESSAGES: [u16; 1] = [OTHER_SETTING];
+
+/// A setting has changed since the job began.
+const OTHER_SETTING: u16 = 166;
+
 /// What the library says of `error:number`. `None` if it has no such error.
 ///
 /// ```
@@ -64,15 +71,18 @@ pub fn error_entry(number: u16) -> Option<ErrorEntry> {
 pub fn explained(number: u16, messages: &[String]) -> String {
     let entry = error_entry(number);
     if let Some(sentence) = entry.and_then(|entry| entry.for_client.get()) {
-        return format!("{sentence} (error {number})");
+        let told = if TOLD_BY_MESSAGES.contains(&number) { messages } else { &[] };
+        return format!("{} (error {number})", with_messages(sentence, told));
     }
     let unknown = "a reason that this client does not know";
-    let mut reason = entry.map_or(unknown, |entry| entry.meaning.get()).to_owned();
-    for message in messages {
-        reason.push_str(": ");
-        reason.push_str(&for_client(message));
-    }
-    format!("{reason} (error {number})")
+    let meaning = entry.map_or(unknown, |entry| entry.meaning.get());
+    format!("{} (error {number})", with_messages(meaning, messages))
+}
+
+/// The reason with the messages that the plotter sent before it refused.
+fn with_messages(reason: &str, messages: &[String]) -> String {
+    let messages = messages.iter().map(|message| for_client(message));
+    std::iter::once(reason.to_owned()).chain(messages).collect::<Vec<_>>().join(": ")
 }
 
 /// Describes a line that was sent by the option that it came from.
@@ -132,6 +142,10 @@ fn split_after(text: &str, or: impl Fn(char) -> bool) -> (&str, &str) {
 /// Writes an option of the client with its value.
 fn named(name: &str, value: Option<&str>) -> String {
     match (form(name), value) {
+        // Of the words that have a value, only those for settings do not say it.
+        (Some(Form::Words(words)), Some(value)) if name.parse::<u16>().is_ok() => {
+            format!("{words} to {value}")
+        }
         (Some(Form::Words(words)), _) => words.to_owned(),
         (Some(Form::Switch), Some("off")) => format!("no --{name}"),
         (Some(Form::Switch), _) | (Some(Form::Value), None) => format!("--{name}"),

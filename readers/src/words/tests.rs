@@ -47,3 +47,12 @@ fn switches_and_unknown_words_are_for_client() {
     );
     assert_eq!(as_option("$999=1"), "setting 999 of the machine to 1");
 }
+
+#[test]
+fn a_setting_that_has_changed_is_named_with_its_value() {
+    let message = "$100 has changed since the job began: set $100=80.000, or begin anew by $again";
+    let reason = explained(166, &[message.to_owned()]);
+    assert!(reason.contains("(setting 100 of the machine) to 80.000, or begin anew"), "{reason}");
+    let message = message.replace("100", "3");
+    assert!(explained(166, &[message]).contains("setting 3 of the machine to 80.000"));
+}
