@@ -97,7 +97,7 @@ impl Drawing {
             match (drawn, was_cut, cuts) {
                 // A cut may also come when all is drawn.
                 (Ok(()), ..) => return Ok(runs),
-                (Err(_), true, true) => {}
+                (Err(reason), true, true) => eprintln!("run {}: {reason}", runs.len()),
                 (drawn, ..) => {
                     let run = runs.len();
                     return Err(format!("in run {run}, cut: {was_cut}: {drawn:?}").into());
