@@ -492,7 +492,7 @@ fn the_console_sends_lines_and_prints_the_answers() {
     assert_eq!(said.matches("error:").count(), 2, "{said}");
     assert!(said.contains("|MPos:"), "{said}");
     let (_, status) = plotter.json(folder.path(), &["status"]);
-    assert_eq!(status["position_mm"][0], 5.0);
+    assert_eq!(status["position_mm"][0], 5.0, "{status}");
 }
 
 #[test]
