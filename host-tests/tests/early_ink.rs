@@ -491,18 +491,26 @@ fn a_job_without_an_order_does_not_go_on_with_other_sources() {
     }
 }
 
+/// Draws a job whose power fails before its order is kept. Returns the strokes of the undisturbed
+/// job, the flash as it is then, and the strokes that were drawn.
+fn cut_before_its_order(lines: &[String]) -> (Run, CutFlash, Run) {
+    let (whole, bytes) = undisturbed(lines, MILLISECOND);
+    // One page for each stroke comes at the end, and before them those of the order.
+    let budget = bytes - 256 * (whole.len() + 2);
+    let flash = CutFlash { budget, ..empty_flash() };
+    let (flash, changes) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
+        plotter.order(lines);
+        plotter.run(10_000);
+    });
+    (whole, flash, drawn(&changes))
+}
+
 /// A job that was cut before its order was kept can be drawn anew without its model.
 #[test]
 fn a_job_without_an_order_is_drawn_again() {
     let lines = lattice();
-    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
-    let budget = bytes - 256 * (whole.len() + 2);
-    let flash = CutFlash { budget, ..empty_flash() };
-    let (flash, changes) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
-        plotter.order(&lines);
-        plotter.run(10_000);
-    });
-    assert!(drawn(&changes).len() < whole.len());
+    let (whole, flash, before) = cut_before_its_order(&lines);
+    assert!(before.len() < whole.len());
     for _ in 0..2 {
         let (_, changes) =
             switch_on_early::<16384>(flash.clone().powered(), Some(MILLISECOND), |plotter| {
@@ -518,13 +526,7 @@ fn a_job_without_an_order_is_drawn_again() {
 #[test]
 fn an_order_is_not_kept_behind_another_job() {
     let lines = lattice();
-    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
-    let budget = bytes - 256 * (whole.len() + 2);
-    let flash = CutFlash { budget, ..empty_flash() };
-    let (flash, before) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
-        plotter.order(&lines);
-        plotter.run(10_000);
-    });
+    let (whole, flash, before) = cut_before_its_order(&lines);
     let (plot, model) = lines.split_last().expect("a job");
     let (flash, _) = switch_on_early::<16384>(flash.powered(), Some(MILLISECOND), |plotter| {
         plotter.order(model);
@@ -544,20 +546,14 @@ fn an_order_is_not_kept_behind_another_job() {
         assert!(go_on(plotter));
         plotter.finish();
     });
-    assert_one_drawing(&whole, &[drawn(&before), drawn(&after)]);
+    assert_one_drawing(&whole, &[before, drawn(&after)]);
 }
 
 /// The number of strokes is an estimate as long as the order is not known.
 #[test]
 fn a_resumed_job_tells_its_strokes_once_its_order_is_known() {
     let lines = lattice();
-    let (whole, bytes) = undisturbed(&lines, MILLISECOND);
-    let budget = bytes - 256 * (whole.len() + 2);
-    let flash = CutFlash { budget, ..empty_flash() };
-    let (flash, _) = switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
-        plotter.order(&lines);
-        plotter.run(10_000);
-    });
+    let (whole, flash, _) = cut_before_its_order(&lines);
     switch_on_early::<16384>(flash.powered(), Some(MILLISECOND), |plotter| {
         let estimate = plotter.status();
         assert_ne!(strokes_stopped(&estimate), Some(whole.len()), "{estimate}");

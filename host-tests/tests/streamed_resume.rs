@@ -215,13 +215,18 @@ fn what_a_drawing_depends_on_must_be_as_it_was() {
     });
 }
 
+/// A small drawing with these settings, and all of its strokes.
+fn small(settings: &[&str]) -> (Drawing, StreamedJob) {
+    let options = [&QUICK_PEN[..], &["$page=20x20", "$margin=4"], settings].concat();
+    let mut drawing = Drawing::of(&job_lines("cube.obj", &options));
+    let job = drawing.from(0);
+    (drawing, job)
+}
+
 /// A drawing of which no stroke is drawn may begin anew at another origin. Then that counts.
 #[test]
 fn a_drawing_that_begins_anew_goes_on_at_the_origin_where_it_began() {
-    let options = ["$page=20x20", "$margin=4", "$22=1"];
-    let lines = job_lines("cube.obj", &[&QUICK_PEN[..], &options].concat());
-    let mut drawing = Drawing::of(&lines);
-    let job = drawing.from(0);
+    let (drawing, job) = small(&["$22=1"]);
     let mut random = Random::new(3);
     let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
         plotter.order(&drawing.settings);
@@ -252,10 +257,7 @@ fn a_drawing_that_begins_anew_goes_on_at_the_origin_where_it_began() {
 /// with another setting.
 #[test]
 fn a_drawing_that_begins_anew_goes_on_with_the_settings_that_it_began_with() {
-    let options = ["$page=20x20", "$margin=4"];
-    let lines = job_lines("cube.obj", &[&QUICK_PEN[..], &options].concat());
-    let mut drawing = Drawing::of(&lines);
-    let job = drawing.from(0);
+    let (drawing, job) = small(&[]);
     let mut random = Random::new(3);
     let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
         plotter.order(&drawing.settings);

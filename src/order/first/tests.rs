@@ -19,17 +19,22 @@ impl Cancel for CancelAfter {
     }
 }
 
+/// Random numbers, each from 0 to below a limit.
+pub(crate) fn random(seed: u32) -> impl FnMut(i32) -> i32 {
+    let mut state = seed;
+    move |limit| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((u64::from(state) * limit as u64) >> 32) as i32
+    }
+}
+
 /// Polylines of one to four segments at random places, drawn by pens 0 to `pens` - 1.
 pub(crate) fn polylines<I: Index>(
     count: u32,
     pens: u8,
     seed: u32,
 ) -> (Vec<PagePoint>, Vec<Segment<I>>) {
-    let mut state = seed;
-    let mut below = |limit: i32| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        ((u64::from(state) * limit as u64) >> 32) as i32
-    };
+    let mut below = random(seed);
     let (mut points, mut segments) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let mut at = PagePoint { x: below(20_000), y: below(14_000) };

@@ -3,7 +3,7 @@
 use super::*;
 use crate::drawing::PagePoint;
 use crate::order::TimeModel;
-use crate::order::first::tests::{CancelAfter, order_all, path, pen, polylines};
+use crate::order::first::tests::{CancelAfter, order_all, path, pen, polylines, random};
 use crate::order::{choose_first, first_legs, order_rest};
 use crate::stage::NeverCancel;
 use std::vec::Vec;
@@ -67,11 +67,7 @@ fn rounds_make_the_moves_shorter_and_each_segment_is_drawn_once() {
 
 /// Pieces of six points with lines between most of them, so that strokes meet at points.
 fn pieces(count: u32, seed: u32) -> (Vec<PagePoint>, Vec<Segment<u16>>) {
-    let mut state = seed;
-    let mut below = |limit: i32| {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        ((u64::from(state) * limit as u64) >> 32) as i32
-    };
+    let mut below = random(seed);
     let (mut points, mut segments) = (Vec::new(), Vec::new());
     for _ in 0..count {
         let corner = PagePoint { x: below(12_000), y: below(9_000) };

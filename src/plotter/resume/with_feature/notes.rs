@@ -129,6 +129,11 @@ pub(super) fn is_streamed(notes: &Notes) -> bool {
     word(notes, 0) == STREAMED
 }
 
+/// Whether the machine had been homed when the job began.
+pub(super) fn began_homed(notes: &Notes) -> bool {
+    word(notes, 7) != 0
+}
+
 /// Whether the notes are those of a drawing in parts.
 #[cfg(feature = "tiles")]
 pub(super) fn is_in_parts(notes: &Notes) -> bool {
@@ -213,7 +218,7 @@ impl<I: Index> Inner<'_, I> {
             return Err(CommandError::OtherModel);
         }
         let is_homed = self.resumption.origin(self.machine.settings()).is_homed();
-        if is_homed && word(notes, 7) == 0 {
+        if is_homed && !began_homed(notes) {
             return Err(CommandError::OtherOrigin);
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! Jobs that a computer sends while they are drawn: how far they come.
 
 use super::super::{Origin, Resumption};
-use super::notes::{STREAMED, begin_notes, is_streamed, read, word};
+use super::notes::{STREAMED, began_homed, begin_notes, is_streamed, read, word};
 use super::refuse;
 use crate::index::Index;
 use crate::machine::State;
@@ -31,7 +31,7 @@ impl<I: Index> Inner<'_, I> {
             && word(&notes, 4) == id
             && self.check_notes(&notes).is_ok()
             // All of it may be drawn anew, from another origin.
-            && (drawn > 0 || self.resumption.origin.is_homed() == (word(&notes, 7) != 0))
+            && (drawn > 0 || self.resumption.origin.is_homed() == began_homed(&notes))
         {
             self.machine.log_strokes(0);
             self.resumption = Resumption {
