@@ -50,6 +50,9 @@ pub mod fuzz_targets;
 pub mod gear_train;
 pub mod spiral;
 pub mod step_edges;
+/// How the Pico divides waits: the very file of the firmware.
+#[path = "../../src/boards/pico/steps/waits.rs"]
+pub mod pico_waits;
 pub mod usb_controller;
 pub mod usb_firmware;
 pub mod usb_host;

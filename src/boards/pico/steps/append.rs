@@ -7,8 +7,9 @@ use penup::motion::{EventKind, EventQueue, StepDistances, StepEvent, StepTrain};
 use super::engine::{LEVELS, PEN_TICKS, PULSE_TICKS, PULSES, TARGETS, WAIT_TICKS, target};
 use super::feed::{FEEDING, WRITTEN};
 use super::heights::z_axis_levels;
+use super::waits::parts;
 use super::word_ring::{GROUP, LENGTHS, WORDS, lengths, pack, row, slot, sum};
-use super::{BRAKED_TICKS, STATE, Steps, WAIT_WORDS};
+use super::{BRAKED_TICKS, STATE, Steps};
 use crate::boards::pico::words;
 
 impl EventQueue for Steps {
@@ -96,19 +97,12 @@ impl EventQueue for Steps {
 impl Steps {
     /// Appends a word that takes `beyond` ticks besides its count, followed by waits, so that it
     /// takes `ticks` in all.
-    fn put_wait(&mut self, word: u32, beyond: u32, mut ticks: u32) {
+    fn put_wait(&mut self, word: u32, beyond: u32, ticks: u32) {
         let step = StepDistances::default();
-        if ticks <= BRAKED_TICKS {
-            self.put(word, ticks.saturating_sub(beyond), step);
-            return;
-        }
-        let part = (ticks / WAIT_WORDS).max(BRAKED_TICKS);
-        self.put(word, part - beyond, step);
-        ticks -= part;
-        while ticks > 0 {
-            let part = if ticks < 2 * part { ticks } else { part };
-            self.put(self.levels | target::WAIT, part - WAIT_TICKS, step);
-            ticks -= part;
+        let mut parts = parts(ticks, BRAKED_TICKS);
+        self.put(word, parts.next().unwrap_or(0).saturating_sub(beyond), step);
+        for part in parts {
+            self.put(self.levels | target::WAIT, part.saturating_sub(WAIT_TICKS), step);
         }
     }
 

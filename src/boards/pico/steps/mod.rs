@@ -24,6 +24,7 @@ mod append;
 mod engine;
 mod feed;
 mod heights;
+mod waits;
 mod word_ring;
 
 use core::sync::atomic::{Ordering, compiler_fence};
@@ -45,6 +46,7 @@ use engine::{
 };
 use feed::{ABANDONED, BRAKE, FEEDING, HANDED_OVER, WRITTEN, taken};
 use heights::{HEIGHT_QUEUE, HEIGHTS_DUE, drain_heights};
+use waits::WAIT_WORDS;
 use word_ring::{WORDS, row, slot};
 
 pub(super) use target::PULSE;
@@ -58,10 +60,6 @@ const _: () = assert!(STOPPING_STEPS == PICO.memory.steps);
 /// The duration, 2 ms, after which a block ends. A longer block would fix the times of its steps
 /// too early, when more steps may still come.
 const BRAKED_TICKS: u32 = TICKS_PER_SECOND / 500;
-/// The greatest number of words of a wait. Each word lasts 2 ms if that is enough, for the same
-/// reason.
-const WAIT_WORDS: u32 = 64;
-
 /// The state that the state machine's progress is reported to, for the main loop.
 pub static STATE: PulserState = PulserState::new();
 
