@@ -302,7 +302,7 @@ pub enum Error {
     /// A job that was followed has stopped before its end.
     #[error(
         "the job has stopped after {}: it was given up, or the plotter was reset or lost its \
-         power\n`penup resume` goes on with it",
+         power\n`penup resume` goes on with it, or says which command does",
         strokes_drawn(*done, *all)
     )]
     JobStopped {

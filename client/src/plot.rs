@@ -190,7 +190,8 @@ impl Plot<'_> {
         let form = sender.form(&known.settings.unwrap_or_default())?;
         let (streamed, report) = host.streamed(form, left_out)?;
         if self.args.from.is_none() && form == Form::Strokes {
-            fail_if_stopped_before(sender, &mut host, &streamed, passes)?;
+            let reason = fail_if_stopped_before(sender, &mut host, &streamed, passes)?;
+            self.note(&reason.into_iter().collect::<Vec<_>>());
         }
         self.note(&host.left_out());
         let (strokes, points) = (streamed.size().strokes, streamed.targets());
@@ -348,21 +349,27 @@ fn begin_of(
     Ok(whole.size().strokes.checked_sub(stopped.all).filter(|_| id == stopped.id))
 }
 
-/// Fails if the plotter has stopped this drawing and would draw it over what is drawn of it.
+/// Fails if the plotter has stopped this drawing and would draw it over what is drawn of it. If it
+/// has stopped a drawing that cannot go on, returns what to tell about it: the plotter does not say
+/// which drawing that is.
 fn fail_if_stopped_before(
     sender: &mut Sender<'_>,
     host: &mut InMemory<u32>,
     whole: &StreamedJob,
     passes: u32,
-) -> Result<(), Error> {
+) -> Result<Option<String>, Error> {
     let stopped = match sender.stopped_drawing() {
-        // What that drawing depends on has changed, so it is another one.
-        Err(Error::NotResumed { .. }) => return Ok(()),
+        Err(Error::NotResumed { reason }) => {
+            return Ok(Some(format!(
+                "this plot begins anew; the plotter has stopped a drawing before, which cannot go \
+                 on now: {reason}"
+            )));
+        }
         stopped => stopped?.filter(|stopped| stopped.drawn > 0),
     };
-    let Some(stopped) = stopped else { return Ok(()) };
+    let Some(stopped) = stopped else { return Ok(None) };
     match begin_of(&stopped, host, whole)? {
-        None => Ok(()),
+        None => Ok(None),
         Some(_) => Err(Error::StoppedBefore {
             done: stopped.drawn.into(),
             all: stopped.all.into(),

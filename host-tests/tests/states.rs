@@ -370,7 +370,7 @@ fn a_pen_that_is_raised_by_the_greater_height_is_raised_whatever_happens() {
     bench.board.receive(b"\xFD");
     bench.work(20);
     assert_eq!(heights(&bench), [127, 0, 127]);
-    bench.say("$X\nG1 X50\n");
+    bench.say("$X\nM3\nG1 X50\n");
     bench.work(600);
     bench.board.set_contacts(Contacts { stop: true, ..Contacts::default() });
     bench.work(20);

@@ -5,6 +5,7 @@
 //! reports alarms.
 
 use super::overrides::OverrideChange;
+use super::program::StoredPosition;
 use super::program::{Context, Flow, MachineAction, MachinePosition, Parameter, Program};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
@@ -145,6 +146,13 @@ impl<I: Index> Inner<'_, I> {
                 board.step_now();
                 Reply(board).line(format_args!("ALARM:{}", AlarmEntry::of(alarm).number));
             }
+        }
+        if let State::Alarm(_) | State::Sleep = self.machine.state() {
+            // What comes behind it draws only where it lowers the pen, which is raised.
+            let mut program = self.program;
+            program.raise_pen();
+            self.note_shift(&program);
+            self.program = program;
         }
         let pen = self.machine.pen_wanted();
         if pen != self.pen_reported {
@@ -332,6 +340,7 @@ impl<I: Index> Inner<'_, I> {
         if line.words().next().is_none() {
             if line.is_mark() {
                 self.end_program(board);
+                self.program.forget_raised_pen(self.machine.settings());
             }
             if !line.text().is_empty() {
                 self.program.begin_line();
@@ -382,6 +391,11 @@ impl<I: Index> Inner<'_, I> {
             }
             MachineAction::Dwell(_) => {}
             MachineAction::Set(parameter, position) => {
+                if parameter == Parameter::Stored(StoredPosition::Park) {
+                    // What it would be refused for later must not leave the line's modes behind.
+                    Setting::ParkX.info().check(position[0])?;
+                    Setting::ParkY.info().check(position[1])?;
+                }
                 self.task = Some(Task::Keep(parameter, position));
             }
             MachineAction::Position => self.report_position(board),

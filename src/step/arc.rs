@@ -24,7 +24,8 @@ pub enum ArcError {
     /// The centre lies more than 2^22 steps from an end, or so far away that steps of different
     /// lengths in x and y cannot be told apart.
     TooWide,
-    /// The distances of the two ends from the centre differ by more than two steps.
+    /// The distances of the two ends from the centre differ by more than two steps, and by more
+    /// than a thousandth of the radius, which Grbl takes, too.
     EndOffCircle,
 }
 
@@ -140,7 +141,8 @@ impl Arc {
             return Err(ArcError::NoRadius);
         }
         let two_steps = 2 * u64::from(weights[0].max(weights[1]));
-        if first.isqrt().abs_diff(last.isqrt()) > two_steps {
+        let (from_center, to_center) = (first.isqrt(), last.isqrt());
+        if from_center.abs_diff(to_center) > two_steps.max(from_center / 1000) {
             return Err(ArcError::EndOffCircle);
         }
         let mut arc = Self {

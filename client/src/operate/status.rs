@@ -68,7 +68,8 @@ pub(super) fn described(status: &Status) -> String {
     }
     if let Some((done, all)) = status.stopped {
         lines.push(format!(
-            "a job has stopped after {}: `penup resume` goes on with it",
+            "a job has stopped after {}: `penup resume` goes on with it, or says which \
+             command does",
             strokes_drawn(done, all)
         ));
     }

@@ -28,7 +28,7 @@ impl SettingInfo {
     ///
     /// # Errors
     /// [`SettingError::OutOfRange`], [`SettingError::Negative`] or [`SettingError::NotWhole`].
-    fn check(&self, value: Value) -> Result<(), SettingError> {
+    pub(crate) fn check(&self, value: Value) -> Result<(), SettingError> {
         if value < 0 && self.least >= 0 {
             return Err(SettingError::Negative(self.setting));
         }

@@ -1,16 +1,16 @@
 //! The arcs of G2 and G3.
 
 use super::block::Block;
-use super::{Program, steps_at};
+use super::{Program, steps_at, to_steps_within};
 use crate::array::MapEach;
-use crate::drawing::StepsPerMillimetre;
+use crate::drawing::{PagePoint, StepsPerMillimetre};
 use crate::fixed::{Millimetres, divide_rounding, half, product};
 use crate::protocol::{BlockError, CommandError};
-use crate::step::{Arc, Turn};
+use crate::step::{Arc, ArcError, Turn};
 
 impl Program {
     /// The arc from one position of the machine to another that the words of the block give; `None`
-    /// if it is shorter than a step.
+    /// if it is shorter than a step, or so wide that it is straight.
     ///
     /// # Errors
     /// [`CommandError::Block`] if words are missing, [`CommandError::Arc`] if there is no such arc.
@@ -41,7 +41,7 @@ impl Program {
             Some(radius) => {
                 let radius = self.length(radius)?;
                 if from == to {
-                    return Err(CommandError::Arc(crate::step::ArcError::NoRadius));
+                    return Err(CommandError::Arc(ArcError::NoRadius));
                 }
                 center_of_radius(from, to, radius, turn).ok_or(BlockError::ArcRadius)?
             }
@@ -58,13 +58,30 @@ impl Program {
         };
         let ends = [from, to];
         let is_short = from != to && is_short(center, ends, turn);
-        let [center, from, to] = [center, from, to].map_each(|point| steps_at(point, steps));
+        let [from, to] = ends.map_each(|point| steps_at(point, steps));
+        // A centre may lie far beyond every page.
+        let [x, y] = [0, 1].map_each(|axis| to_steps_within(FAR, center[axis], steps[axis]));
+        let center = PagePoint { x, y };
         // Ends that only the steps make the same are not those of a whole circle.
         if from == to && is_short {
             return Ok(None);
         }
-        Arc::scaled(steps, center, from, to, turn).map(Some).map_err(CommandError::Arc)
+        match Arc::scaled(steps, center, from, to, turn) {
+            // Its line is off the arc by less than half a step.
+            Err(ArcError::TooWide) if is_short && is_near(from, to) => Ok(None),
+            arc => arc.map(Some).map_err(CommandError::Arc),
+        }
     }
+}
+
+/// A number of steps that lies beyond every centre that an arc can have, though not by much: sums
+/// of two fit in 32 bits.
+const FAR: i32 = 1 << 24;
+
+/// Whether the ends of an arc lie so close together that it is straight if its radius is 2^22
+/// steps or more: its height over its chord c is c² / 8 r.
+fn is_near(from: PagePoint, to: PagePoint) -> bool {
+    from.x.abs_diff(to.x).max(from.y.abs_diff(to.y)) < 1 << 11
 }
 
 /// Whether an arc whose ends lie close together is the short one of the two between them, and not

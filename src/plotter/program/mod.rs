@@ -302,7 +302,12 @@ impl Program {
         jog.relative = block.relative.unwrap_or(jog.relative);
         let [x, y, z] = jog.destination(&block, context)?;
         let point = steps_at([x, y], context.settings.page_steps());
-        Ok((Self { at: [x, y, z], move_feed: jog.feed, ..self }, point))
+        let mut jogged = Self { at: [x, y, z], move_feed: jog.feed, ..self };
+        if block.has(b'Z') {
+            // A person who moves Z by hand means to lift the pen: a jog never lowers it.
+            jogged.leave_height();
+        }
+        Ok((jogged, point))
     }
 
     /// Sets the modes of the line, and what its M3 to M9, S and T say.
@@ -317,6 +322,8 @@ impl Program {
             Some(_) => self.coolant = [false; 2],
             None => {}
         }
+        // A dot that M3 asked for is still to be drawn, unless it came with S0.
+        let waited = block.spindle == Some(5) && self.take_dot() && !self.is_off_by_speed();
         if let Some(Ok(tool)) = block.number(b'T').map(Decimal::to_whole) {
             self.tool = tool.clamp(0, 255) as u8;
         }
@@ -327,9 +334,7 @@ impl Program {
             self.take_speed(clamped(speed), servo, settings);
         }
         if let Some(spindle) = block.spindle {
-            // A dot that M3 asked for is still to be drawn.
-            let waited = spindle == 5 && self.take_dot();
-            self.turn(spindle);
+            self.turn(spindle, PenRule::of(settings));
             self.set_dot(waited);
         }
         self.settle_speed(block.has(b'S') || block.spindle.is_some(), settings);
@@ -415,7 +420,10 @@ impl Program {
         self.motion = Motion::Line;
         self.plane = Plane(0);
         self.relative = false;
-        self.inverse_time = false;
+        if core::mem::take(&mut self.inverse_time) {
+            // F is no speed then.
+            self.feed = NO_FEED;
+        }
         self.system = 0;
         self.coolant = [false; 2];
     }
@@ -471,9 +479,14 @@ fn clamped(number: Decimal) -> Millimetres {
 /// The length in steps from the page's origin, clamped to a value that still lies beyond every
 /// page.
 pub fn to_steps(length: Millimetres, per_mm: Millimetres) -> i32 {
+    to_steps_within(2 * PAGE_LIMIT, length, per_mm)
+}
+
+/// The length in steps from the page's origin, clamped to ± `limit`.
+fn to_steps_within(limit: i32, length: Millimetres, per_mm: Millimetres) -> i32 {
     let exact = i64::from(length.to_bits()) * i64::from(per_mm.to_bits());
     let steps = divide_rounding(exact.into(), 1 << 32);
-    steps.clamp((-2 * PAGE_LIMIT).into(), (2 * PAGE_LIMIT).into()) as i32
+    steps.clamp((-limit).into(), limit.into()) as i32
 }
 
 /// A position in steps.

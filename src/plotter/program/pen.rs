@@ -93,14 +93,15 @@ impl Program {
     }
 
     /// Notes M3, M4 or M5.
-    pub(super) fn turn(&mut self, spindle: u8) {
+    pub(super) fn turn(&mut self, spindle: u8, rule: PenRule) {
         self.spindle = spindle;
         let is_on = spindle != 5;
         self.pen.has_on |= is_on;
         self.pen.has_off |= !is_on;
         // Somebody who types M3 alone wants to see the pen go down. In a program it may be a
         // spindle, which Z will tell.
-        self.pen.waits = is_on && self.pen.lines > 1 && self.pen.z_is_down.is_none();
+        self.pen.waits =
+            is_on && rule == PenRule::Auto && self.pen.lines > 1 && self.pen.z_is_down.is_none();
         self.pen.s_is_down &= is_on;
     }
 
@@ -141,9 +142,14 @@ impl Program {
         self.spindle != 5
     }
 
+    /// Whether S is 0, so that M3 does not put the pen down.
+    pub(super) fn is_off_by_speed(&self) -> bool {
+        self.pen.has_speed && self.speed == 0
+    }
+
     /// Whether the pen is down while the machine is at rest.
     pub(super) fn is_down_at_rest(&self, rule: PenRule) -> bool {
-        let is_on = self.is_on() && !(self.pen.has_speed && self.speed == 0);
+        let is_on = self.is_on() && !self.is_off_by_speed();
         match rule {
             PenRule::Auto => {
                 let by_spindle = if self.pen.has_on {
@@ -197,8 +203,8 @@ impl Program {
         self.pen.waits |= waits;
     }
 
-    /// Ends the program, whose modes stay. What it has shown of the pen is forgotten, unless the
-    /// pen is down. Returns what the user is to be told.
+    /// Ends the program, whose modes stay, as does what it has shown of the pen: a sender may only
+    /// have made a pause. Returns what the user is to be told.
     pub(in crate::plotter) fn end(&mut self, settings: &Settings) -> Option<&'static str> {
         let rule = PenRule::of(settings);
         let pen = &self.pen;
@@ -239,8 +245,6 @@ impl Program {
         } else {
             None
         };
-        let stays = self.is_down_at_rest(rule);
-        let kept = if stays { self.pen } else { PenState::default() };
         self.pen = PenState {
             lines: 0,
             inked: 0,
@@ -248,14 +252,31 @@ impl Program {
             varies: false,
             first_is_dry: false,
             waits: false,
-            ..kept
+            ..self.pen
         };
         note
     }
 
+    /// Forgets what the program has shown of the pen, unless M3 is in force or the pen is down.
+    pub(in crate::plotter) fn forget_raised_pen(&mut self, settings: &Settings) {
+        if !self.is_on() && !self.is_down_at_rest(PenRule::of(settings)) {
+            self.pen = PenState::default();
+        }
+    }
+
+    /// Raises the pen, as M5 and Z do, because the machine has raised it in an alarm or in sleep.
+    /// The next program draws only where it puts the pen down.
+    pub(in crate::plotter) fn raise_pen(&mut self) {
+        self.spindle = 5;
+        self.draws = false;
+        self.pen.s_is_down = false;
+        self.pen.waits = false;
+        self.leave_height();
+    }
+
     /// Raises the pen and forgets what the program has shown of it.
     pub(in crate::plotter) fn forget_pen(&mut self) {
-        self.spindle = 5;
+        self.raise_pen();
         self.pen = PenState::default();
     }
 }

@@ -32,11 +32,10 @@ fn a_job_goes_on_after_a_loss_of_power() {
     assert!(run(&["resume"]).2.contains("nothing to resume"));
 }
 
-#[test]
-fn a_drawing_that_is_sent_goes_on_after_a_loss_of_power() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let plotter = Library::new();
-    let mut client = plotter.plot_rows(folder.path(), &["--compute", "host"]);
+/// Sends rows that this computer orders until a loss of power stops them. Returns how many are
+/// drawn.
+fn cut_rows(plotter: &Library, folder: &Path) -> u64 {
+    let mut client = plotter.plot_rows(folder, &["--compute", "host"]);
     plotter.slow.store(true, Ordering::Relaxed);
     while plotter.heard.load(Ordering::Relaxed) < 700 {
         std::thread::sleep(Duration::from_millis(5));
@@ -47,19 +46,29 @@ fn a_drawing_that_is_sent_goes_on_after_a_loss_of_power() {
     plotter.slow.store(false, Ordering::Relaxed);
     client.kill().expect("killed");
     client.wait().expect("it ends");
-    while plotter.strokes(folder.path()) < 3 {}
+    while plotter.strokes(folder) < 3 {}
     plotter.cut.store(true, Ordering::Relaxed);
     while plotter.cut.load(Ordering::Relaxed) {}
-    let (code, stopped) = plotter.json(folder.path(), &["status"]);
-    let drawn = stopped["stopped"]["done"].as_u64().expect("a number");
+    let (code, stopped) = plotter.json(folder, &["status"]);
     assert_eq!((code, &stopped["stopped"]["all"]), (Some(0), &120.into()));
+    stopped["stopped"]["done"].as_u64().expect("a number")
+}
+
+/// Plots the rows with these options. Returns the exit status and what it says about it.
+fn plot_rows(plotter: &Library, folder: &Path, options: &[&str]) -> (Option<i32>, String) {
+    let output = plotter.rows(folder, options).stderr(Stdio::piped()).output();
+    let output = output.expect("the program runs");
+    (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+#[test]
+fn a_drawing_that_is_sent_goes_on_after_a_loss_of_power() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let drawn = cut_rows(&plotter, folder.path());
     let (code, _, error) = plotter.run(folder.path(), &["resume", "--at-origin"]);
     assert_eq!((code, error.contains("--resume")), (Some(1), true), "{error}");
-    let go_on = |options: &[&str]| {
-        let output = plotter.rows(folder.path(), options).stderr(Stdio::piped()).output();
-        let output = output.expect("the program runs");
-        (output.status.code(), String::from_utf8_lossy(&output.stderr).into_owned())
-    };
+    let go_on = |options: &[&str]| plot_rows(&plotter, folder.path(), options);
     let (code, error) = go_on(&["--resume"]);
     assert_eq!((code, error.contains("--at-origin")), (Some(1), true), "{error}");
     // What is drawn is not drawn over without a word.
@@ -77,6 +86,22 @@ fn a_drawing_that_is_sent_goes_on_after_a_loss_of_power() {
     assert_eq!(ended["stopped"], serde_json::Value::Null);
     let (code, error) = go_on(&["--resume"]);
     assert_eq!((code, error.contains("no drawing has stopped")), (Some(1), true), "{error}");
+}
+
+/// A setting has changed, so that the drawing cannot go on: that is said before it begins anew.
+#[test]
+fn a_drawing_that_cannot_go_on_is_named_when_another_one_begins() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    cut_rows(&plotter, folder.path());
+    let (code, _, error) = plotter.run(folder.path(), &["set", "100=81"]);
+    assert_eq!(code, Some(0), "{error}");
+    let (code, _, error) = plotter.run(folder.path(), &["unlock"]);
+    assert_eq!(code, Some(0), "{error}");
+    let (code, noted) = plot_rows(&plotter, folder.path(), &["--compute", "host"]);
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("has stopped a drawing before, which cannot go on now: "), "{noted}");
+    assert!(noted.contains("set it back, or begin anew"), "{noted}");
 }
 
 #[test]
