@@ -214,6 +214,11 @@ impl Machine<'_> {
             if queue.room() < Runner::ROOM || self.is_far_enough(ahead) {
                 return;
             }
+            // Where nothing follows for now, the pen would be raised behind the line.
+            #[cfg(feature = "spread-backlash")]
+            if self.owes_backlash() && self.runner.has_run_all() {
+                self.push_backlash_due();
+            }
             match self.runner.produce(queue) {
                 Ok(RunnerProgress::More) => {}
                 Ok(progress) => {

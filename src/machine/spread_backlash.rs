@@ -313,13 +313,18 @@ impl Machine<'_> {
         Some(segmenter.position >= length)
     }
 
+    /// Whether steps are left to take up at the end of the line so far.
+    pub(super) fn owes_backlash(&self) -> bool {
+        self.spread_backlash.due != [0; 2] && self.runner.is_in_line()
+    }
+
     /// Appends the steps that are left to take up where a line has ended. They draw the part by
     /// which the pen lags behind. There must be room. Returns whether anything was appended.
     pub(super) fn push_backlash_due(&mut self) -> bool {
         let mut spread = self.spread_backlash;
         let due = core::mem::take(&mut spread.due);
         spread.left = PathLength::ZERO;
-        if due == [0; 2] || !self.runner.is_in_line() {
+        if !self.owes_backlash() {
             return false;
         }
         let page = self.runner.page_end();

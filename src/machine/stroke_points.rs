@@ -114,6 +114,12 @@ impl Machine<'_> {
     #[inline(never)]
     fn plan_rest(&mut self, queue: &mut dyn EventQueue) -> bool {
         if self.rest == StrokeRest::Due && self.segmenter.is_none() {
+            // The pen rests where the stroke goes on after a loss of power.
+            #[cfg(feature = "spread-backlash")]
+            if self.owes_backlash() && !self.push_backlash_due() {
+                // There is no room yet.
+                return false;
+            }
             self.runner.end_path();
             self.rest = StrokeRest::Ended;
         }

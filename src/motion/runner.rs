@@ -316,7 +316,7 @@ impl<'m> Runner<'m> {
     }
 
     /// Whether all blocks are carried out. The pen is still where the last one left it.
-    #[cfg(feature = "resume")]
+    #[cfg(any(feature = "resume", feature = "spread-backlash"))]
     pub fn has_run_all(&self) -> bool {
         self.course.is_none() && self.lookahead.is_empty()
     }

@@ -3,8 +3,8 @@
 use crate::fixtures::{is_ready, point, with};
 use penup::boards::host::{Change, Stamped};
 use penup::drawing::{LineType, PagePoint};
-use penup::machine::{Alarm, Setting, SettingError, Settings, State, Target};
-use penup::machine::{TargetList, Value};
+use penup::machine::{Alarm, JobSize, Path, PendingTarget, Setting, SettingError, Settings, State};
+use penup::machine::{Target, TargetList, Value};
 use penup::motion::LimitsError;
 use penup_host_tests::event_checker::{Backlash, backlash_steps};
 use penup_host_tests::pin_machine::{self, Turn};
@@ -293,4 +293,83 @@ fn belts_take_backlash_up_at_rest_only() {
     assert_eq!(settings.set(Setting::Kinematics, Value::from_num(2)), refused);
     let mut settings = crate::fixtures::polargraph();
     assert_eq!(settings.set(Setting::BacklashDistance, Value::ONE), refused);
+}
+
+/// A path whose targets all come but the last ones, which are late. The machine waits for them.
+struct Late {
+    targets: Vec<Target>,
+    next: usize,
+    /// The number of targets that have come.
+    come: usize,
+}
+
+impl Path for Late {
+    fn next_target(&mut self) -> Option<Target> {
+        let target = *self.targets[..self.come].get(self.next)?;
+        self.next += 1;
+        Some(target)
+    }
+
+    fn rewind(&mut self) {
+        self.next = 0;
+    }
+
+    fn late(&self) -> Option<PendingTarget> {
+        let is_late = self.next == self.come && self.come < self.targets.len();
+        is_late.then_some(PendingTarget { within_stroke: true })
+    }
+}
+
+/// A line to the right, and 2 mm of the way back, within which half the backlash is taken up.
+fn short_way_back() -> [Target; 3] {
+    let target = |x, ink: Option<LineType>| Target { point: point(x, 800), ink };
+    [target(800, None), target(4000, Some(LineType::Full)), target(3840, Some(LineType::Full))]
+}
+
+#[test]
+fn a_line_whose_next_moves_are_late_is_drawn_to_its_end() {
+    let settings = settings(0.5, 5.0);
+    for sent_alone in [true, false] {
+        let mut path = Late { targets: short_way_back().to_vec(), next: 0, come: 3 };
+        path.targets.push(Target { point: point(3840, 1600), ink: Some(LineType::Full) });
+        let (mut sent, mut waited) = (0, 0);
+        let mut seen = Vec::new();
+        let trace = pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+            let machine = turn.machine;
+            seen.push((turn.now, turn.motors, machine.position()));
+            let begins = turn.now == 0;
+            if sent_alone && sent < 3 {
+                machine.draw_to(path.targets[sent], None).expect("room");
+                sent += 1;
+            } else if begins {
+                let [least, greatest] = [point(800, 800), point(4000, 1600)];
+                let size = JobSize { strokes: 1, ..JobSize::default() };
+                machine.start_streamed(size, [least, greatest]).expect("within the travel");
+            }
+            if sent_alone {
+                machine.fill(&mut TargetList::new(&[]), queue);
+            } else {
+                machine.fill(&mut path, queue);
+            }
+            waited = if machine.is_stopped() && !begins { waited + 1 } else { 0 };
+            waited < 100
+        });
+        let inked = follow(&trace, &settings, &seen);
+        assert_eq!(inked.end, point(3840, 800), "{sent_alone}");
+        let (_, motors, position) = seen.last().expect("a turn");
+        assert_eq!(*position, point(3840, 800));
+        // All 40 steps of the backlash are taken up.
+        assert_eq!(*motors, point(3800, 800), "{sent_alone}");
+        assert!(inked.points.contains(&point(3840, 800)), "{sent_alone}");
+    }
+}
+
+#[test]
+fn a_rest_within_a_stroke_is_at_the_end_of_the_line() {
+    let targets = zigzags();
+    let mut settings = settings(0.3, 5.0);
+    settings.set(Setting::PointDistance, Value::from_num(0.001)).expect("valid");
+    let inked = draw(settings, &targets, &mut |turn| turn.now == 0 || !is_ready(turn.machine));
+    let [_, missed] = deviation(&inked, &targets);
+    assert!(missed < 1.5 / STEPS_PER_MM, "{missed}");
 }
