@@ -261,10 +261,7 @@ impl Machine<'_> {
                     }
                     match next {
                         Some(next) => self.begin_phase(next),
-                        None => {
-                            self.end_homing();
-                            self.activity = Activity::Idle;
-                        }
+                        None => self.end_motion(Activity::Idle),
                     }
                 }
                 Err(SwitchFault) => self.alarm(Alarm::HomingFailed(homing.axis)),
@@ -272,10 +269,15 @@ impl Machine<'_> {
         }
     }
 
-    /// Ends homing, if it is in progress, and restores the normal limits.
-    pub(super) fn end_homing(&mut self) {
-        if let Activity::Home(_) = self.activity {
+    /// Goes on with the activity `next`, now that no motion is planned any more. The limits of
+    /// homing, which also hold while it is given up, and the speeds of a jog, which has no override,
+    /// end here: other ones in mid motion would not fit its speed.
+    pub(super) fn end_motion(&mut self, next: Activity) {
+        let before = core::mem::replace(&mut self.activity, next);
+        if let Activity::Home(_) | Activity::Abort = before {
             self.take_settings();
+        } else {
+            self.apply_override();
         }
     }
 

@@ -168,8 +168,6 @@ impl Machine<'_> {
         }
         self.steady = Steady::default();
         self.activity = Activity::Run(source);
-        // Jogs have no override.
-        self.apply_override();
     }
 
     /// Keeps the queue of step events filled. It reads targets while there is room for more planned
@@ -295,7 +293,7 @@ impl Machine<'_> {
                     _ => self.planned_position(),
                 };
                 self.forget_path(page);
-                self.activity = Activity::Idle;
+                self.end_motion(Activity::Idle);
             }
         }
     }

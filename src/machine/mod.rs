@@ -285,7 +285,6 @@ impl<'m> Machine<'m> {
             self.activity,
             Activity::Run(_) | Activity::Hold { .. } | Activity::Jog | Activity::Home(_)
         ) {
-            self.end_homing();
             self.segmenter = None;
             self.limit_log();
             self.runner.stop();
@@ -301,11 +300,10 @@ impl<'m> Machine<'m> {
             self.forget_what_needs_current();
         }
         self.end_log();
-        self.end_homing();
         self.segmenter = None;
         self.forget_path(self.planned_position());
         self.runner.forget_pen();
-        self.activity = Activity::Alarm(alarm);
+        self.end_motion(Activity::Alarm(alarm));
     }
 
     /// Switches the motors off. [`Machine::wake`] and [`Machine::unlock`] end this state.

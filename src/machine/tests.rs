@@ -452,4 +452,12 @@ fn jogs_have_no_override() {
     let moved = speed(&times_of_steps(&mut machine));
     assert!((moved / 180.0 - 1.0).abs() < 0.01, "{moved}");
     assert_eq!(machine.percent(), 30);
+    // A program that pauses before its first move goes on with the override.
+    machine.jog(PagePoint { x: 3000, y: 0 }, feed).expect("idle");
+    times_of_steps(&mut machine);
+    machine.pause().expect("idle");
+    machine.draw_to(Target { point: PagePoint { x: 4000, y: 0 }, ink: None }, feed).expect("held");
+    machine.resume();
+    let moved = speed(&times_of_steps(&mut machine));
+    assert!((moved / 180.0 - 1.0).abs() < 0.01, "{moved}");
 }

@@ -1,6 +1,7 @@
 //! Homing and limit switches.
 
 use crate::fixtures::{point, polargraph, to, with_backlash};
+use penup::boards::host::{Change, Stamped};
 use penup::drawing::PagePoint;
 use penup::machine::{Alarm, Axis, Setting, Settings, State, Switches, TargetList, Value};
 use penup_host_tests::event_checker::{self, Backlash};
@@ -138,4 +139,102 @@ fn a_polargraph_is_homed_belt_by_belt() {
     });
     // A pull-off of 2 mm.
     assert!(belts.x.abs_diff(19_280) <= 1 && belts.y.abs_diff(19_280) <= 1, "{belts:?}");
+}
+
+/// Jogs to the right, and gives homing up on its way back.
+fn jog_then_home_and_abort(settings: Settings) -> Vec<Stamped> {
+    let (mut jogged, mut homes, mut aborted, mut waited) = (false, false, false, 0);
+    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        let machine = turn.machine;
+        let open = Switches::default();
+        machine.watch(open);
+        if turn.now == 0 {
+            machine.unlock().expect("an alarm");
+            machine.jog(point(24_000, 0), None).expect("idle");
+            jogged = true;
+        } else if jogged && !homes && machine.state() == State::Idle && machine.is_stopped() {
+            machine.home(open).expect("idle");
+            homes = true;
+        } else if homes && !aborted && turn.pins.x < 12_000 {
+            machine.abort();
+            assert_eq!(machine.state(), State::Abort);
+            aborted = true;
+        }
+        machine.fill(&mut TargetList::new(&[]), queue);
+        let is_over = aborted && machine.state() == State::Idle && machine.is_stopped();
+        waited += u32::from(is_over);
+        waited < 2
+    })
+}
+
+#[test]
+fn homing_that_is_given_up_slows_down_as_fast_as_it_may() {
+    for changes in [
+        &[(Setting::Shaper, 1.0), (Setting::ShakeX, 10.0), (Setting::ShakeY, 10.0)][..],
+        &[(Setting::Jerk, 2.0)],
+    ] {
+        let mut settings = crate::fixtures::with(&[
+            (Setting::Homing, 1.0),
+            (Setting::HomingSeek, 6000.0),
+            (Setting::MaxRateX, 6000.0),
+            (Setting::MaxRateY, 6000.0),
+            (Setting::TravelX, 4000.0),
+            (Setting::ShapingDeviation, 0.0),
+        ]);
+        for (setting, value) in changes {
+            settings.set(*setting, Value::from_num(*value)).expect("valid");
+        }
+        let trace = jog_then_home_and_abort(settings);
+        event_checker::check_pins(&trace, &settings);
+        // The times of the steps back, in seconds.
+        let mut up = true;
+        let mut times = Vec::new();
+        for stamped in &trace {
+            match stamped.change {
+                Change::UpX(is_up) => up = is_up,
+                Change::StepX(true) if !up => times.push(stamped.time as f64 / 25e6),
+                _ => {}
+            }
+        }
+        // The mean speeds over 20 steps each, which are 0.25 mm.
+        let speeds: Vec<f64> = times
+            .chunks(20)
+            .zip(times.chunks(20).skip(1))
+            .map(|(one, next)| 0.25 / (next[0] - one[0]))
+            .collect();
+        assert!(speeds.iter().any(|speed| *speed > 99.0), "the speed of homing");
+        for pair in speeds.windows(2) {
+            // From the middle of the one to that of the other.
+            let seconds = 0.125 / pair[0] + 0.125 / pair[1];
+            assert!((pair[1] - pair[0]).abs() <= 1.2 * 800.0 * seconds + 0.5, "{pair:?} mm/s");
+        }
+    }
+}
+
+#[test]
+fn a_program_that_pauses_behind_homing_has_the_override() {
+    let settings = crate::fixtures::with(&[(Setting::Homing, 1.0)]);
+    let (mut is_homed, mut fastest) = (false, Value::ZERO);
+    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        let machine = turn.machine;
+        let switches = corner(point(200 + turn.pins.x, 200 + turn.pins.y), turn.now);
+        if turn.now == 0 {
+            machine.set_override(50);
+            machine.home(switches).expect("ready");
+        }
+        machine.watch(switches);
+        if !is_homed && machine.state() == State::Idle {
+            is_homed = true;
+            machine.pause().expect("idle");
+            machine.draw_to(to(8000, 0), None).expect("room");
+            machine.resume();
+        }
+        machine.fill(&mut TargetList::new(&[]), queue);
+        if is_homed {
+            fastest = fastest.max(machine.speed());
+        }
+        !is_homed || machine.state() == State::Run
+    });
+    // Half of the speed with the pen up.
+    assert!((fastest - Value::from_num(3000)).abs() < 1, "{fastest}");
 }
