@@ -36,6 +36,21 @@ pub struct MotionSettings {
     pub queue_steps: u32,
 }
 
+impl MotionSettings {
+    /// The greatest speed along the path, in mm/min, for which the width of the pulses is sure to
+    /// leave room.
+    pub fn greatest_pulsed(&self) -> Millimetres {
+        let interval = u64::from(2 * self.pulse_ticks.max(1));
+        let steps = u64::from(self.motor_steps_per_mm.min(MOST_STEPS).to_bits().unsigned_abs());
+        // The dividend is below 2^63.
+        let bits = ((60 * u64::from(TICKS_PER_SECOND)) << 32).checked_div(interval * steps);
+        let bits = bits.unwrap_or(0);
+        // The length of a step is rounded down, by less than this part of it.
+        let bits = bits - (bits >> 16);
+        Millimetres::from_bits(i32::try_from(bits).unwrap_or(i32::MAX))
+    }
+}
+
 /// The settings that motion cannot honour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -248,13 +263,20 @@ impl Limits {
         self.enough_path = PathLength::from_bits(needed.saturating_add(needed / 4));
     }
 
+    /// The same limits for the brake of motion that is shaped, whatever the speed of motion that is
+    /// not.
+    #[cfg(feature = "input-shaping")]
+    pub fn with_shaping(self, shaping: Option<Shaping>) -> Self {
+        Self { shaping, ..self }
+    }
+
     /// The same limits for motion that is shaped.
     ///
     /// # Errors
     /// [`LimitsError::ShapedSteps`] if that would be too many steps a second.
     #[cfg(feature = "input-shaping")]
     pub fn shaped(self, shaping: Option<Shaping>) -> Result<Self, LimitsError> {
-        let shaped = Self { shaping, ..self };
+        let shaped = self.with_shaping(shaping);
         let asked = self.step_rate(self.draw_speed.max(self.travel_speed));
         // Changes of direction come between the steps at any speed, and leave room for that.
         let pulses = TICKS_PER_SECOND.checked_div(2 * self.least_interval()).unwrap_or(u32::MAX);

@@ -40,9 +40,11 @@ impl Settings {
 
     /// Returns the limits for homing. They differ from [`Settings::limits`] in two ways: the speed
     /// with the pen up is that of the setting `travel`, and the jerk is not limited nor motion
-    /// shaped, because the machine must brake soon at a switch.
+    /// shaped, because the machine must brake soon at a switch. A speed for which the width of the
+    /// pulses leaves no room becomes the greatest for which it does.
     pub(in crate::machine) fn limits_at(&self, travel: Setting, queue: u32) -> Limits {
-        self.limits_with(self.get(travel), Value::ZERO, queue)
+        let fastest = self.motion_settings().greatest_pulsed();
+        self.limits_with(self.get(travel).min(fastest), Value::ZERO, queue)
     }
 
     /// The limits with this speed with the pen up and this jerk.
@@ -50,7 +52,8 @@ impl Settings {
         let travel_mm_per_min = travel.min(self.axes_rate());
         let settings = self.motion_settings();
         let settings = MotionSettings { travel_mm_per_min, jerk_m_per_s3, queue_steps, ..settings };
-        // `set` refuses whatever the motion planner would refuse, so the default is never used.
+        // `set` refuses whatever the motion planner would refuse, and homing is never faster than
+        // the pulses allow, so the default is never used.
         Limits::new(&settings).unwrap_or_default()
     }
 
@@ -58,13 +61,15 @@ impl Settings {
     /// second value is the greatest speed in mm/min if the settings ask for more than the queue can
     /// hold.
     pub(in crate::machine) fn brake(&self, queue: u32) -> (BrakeRule, Option<Value>) {
-        let speeds =
-            [Setting::DrawSpeed, Setting::TravelSpeed, Setting::HomingSeek, Setting::HomingFeed];
-        let asked = speeds.into_iter().map(|speed| self.get(speed)).fold(Value::ZERO, Value::max);
+        let greatest = |speeds: [Setting; 2]| self.get(speeds[0]).max(self.get(speeds[1]));
+        let homing = greatest([Setting::HomingSeek, Setting::HomingFeed])
+            .min(self.motion_settings().greatest_pulsed());
+        let asked = greatest([Setting::DrawSpeed, Setting::TravelSpeed]).max(homing);
         let asked = asked.min(self.axes_rate());
         let limits = self.limits_with(asked, Value::ZERO, queue);
+        // Homing may be faster than what is shaped.
         #[cfg(feature = "input-shaping")]
-        let limits = limits.shaped(self.shaping().unwrap_or_default()).unwrap_or(limits);
+        let limits = limits.with_shaping(self.shaping().unwrap_or_default());
         let held = limits.greatest_rate();
         // A speed is rounded by less than that.
         let is_less = asked - held > const { Value::lit("0.001") };
@@ -110,6 +115,12 @@ impl Settings {
     /// Returns the greatest speed that both axes allow, in mm/min.
     fn axes_rate(&self) -> Value {
         self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
+    }
+
+    /// The speed along the path that one of the settings of speed asks for, in mm/min, as far as both
+    /// axes allow it.
+    pub(in crate::machine) fn path_speed(&self, speed: Setting) -> Value {
+        self.get(speed).min(self.axes_rate())
     }
 
     /// The greatest acceleration along the path in mm/s², and the junction deviation in mm. Shaped
@@ -170,8 +181,8 @@ impl Settings {
         MotionSettings {
             steps_per_mm: steps,
             motor_steps_per_mm: steps[0].max(steps[1]).saturating_mul(motor_ratio),
-            draw_mm_per_min: self.get(Setting::DrawSpeed).min(self.axes_rate()),
-            travel_mm_per_min: self.get(Setting::TravelSpeed).min(self.axes_rate()),
+            draw_mm_per_min: self.path_speed(Setting::DrawSpeed),
+            travel_mm_per_min: self.path_speed(Setting::TravelSpeed),
             acceleration_mm_per_s2,
             jerk_m_per_s3: self.get(Setting::Jerk),
             junction_deviation_mm,
@@ -179,6 +190,72 @@ impl Settings {
             pulse_ticks: self.microseconds_as_ticks(Setting::StepPulse),
             direction_setup_ticks: self.microseconds_as_ticks(Setting::DirectionSetup),
             queue_steps: u32::MAX,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with(values: &[(Setting, f64)]) -> Settings {
+        let mut settings = Settings::default();
+        for &(setting, value) in values {
+            settings.set(setting, Value::from_num(value)).expect("a valid setting");
+        }
+        settings
+    }
+
+    #[test]
+    fn homing_faster_than_the_pulses_allow_is_as_fast_as_they_do() {
+        for pulse in [0.2, 1.0, 2.0, 7.3, 10.0, 33.3, 500.0] {
+            for steps in [2.0, 80.0, 333.3, 3200.0, 4000.0] {
+                for kinematics in [0.0, 1.0] {
+                    let settings = with(&[
+                        (Setting::DrawSpeed, 1.0),
+                        (Setting::TravelSpeed, 1.0),
+                        (Setting::MaxRateX, 32_767.0),
+                        (Setting::MaxRateY, 32_767.0),
+                        (Setting::Kinematics, kinematics),
+                        (Setting::StepsPerMmX, steps),
+                        (Setting::StepsPerMmY, steps),
+                        (Setting::StepPulse, pulse),
+                        (Setting::HomingSeek, 32_000.0),
+                    ]);
+                    let ratio = if kinematics > 0.0 { std::f64::consts::SQRT_2 } else { 1.0 };
+                    let ticks = f64::from(2 * settings.microseconds_as_ticks(Setting::StepPulse));
+                    let possible = 60.0 * 25e6 / ticks / (steps * ratio).min(4000.0);
+                    let expected = possible.min(32_000.0);
+                    let limits = settings.limits_at(Setting::HomingSeek, u32::MAX);
+                    let speed = limits.greatest_rate().to_num::<f64>();
+                    assert!((speed / expected - 1.0).abs() < 1e-4, "{speed}, not {expected}");
+                    let length = settings.limits(u32::MAX).length(1 << 12, 0);
+                    assert_eq!(limits.length(1 << 12, 0), length, "the steps of the settings");
+                    assert_eq!(settings.brake(u32::MAX).1, None);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn the_speed_of_homing_does_not_replace_the_rule_by_which_all_motion_brakes() {
+        for (pulse, steps, speed) in [(20.0, 320.0, 3000.0), (10.0, 3200.0, 900.0)] {
+            let mut settings = with(&[
+                (Setting::DrawSpeed, speed),
+                (Setting::TravelSpeed, speed),
+                (Setting::StepPulse, pulse),
+                (Setting::StepsPerMmX, steps),
+                (Setting::StepsPerMmY, steps),
+                (Setting::HomingSeek, 6000.0),
+            ]);
+            let (rule, _) = settings.brake(1000);
+            assert_ne!(rule, Limits::default().brake(1, 1000));
+            let fits = settings.motion_settings().greatest_pulsed();
+            settings.set(Setting::HomingSeek, fits).expect("a valid setting");
+            let motion = settings.motion_settings();
+            let limits = Limits::new(&MotionSettings { travel_mm_per_min: fits, ..motion });
+            assert!(limits.is_ok(), "{fits} mm/min");
+            assert_eq!(rule, settings.brake(1000).0);
         }
     }
 }
