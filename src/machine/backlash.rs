@@ -48,10 +48,15 @@ impl Backlash {
         }
     }
 
-    /// Adapts the state to a change of the backlash from `before` to `after` steps.
+    /// Adapts the state to a change of the backlash from `before` to `after` steps. Without any
+    /// before, its side does not tell which way the motor moved last, and is unknown from now on.
     fn resize(&mut self, before: [i32; 2], after: [i32; 2]) {
         for ((ahead, before), after) in self.ahead.iter_mut().zip(before).zip(after) {
-            *ahead = ahead.map(|now| if now == before { after } else { now.min(after).max(0) });
+            *ahead = match *ahead {
+                Some(_) if before == 0 && after != 0 => None,
+                Some(now) if now == before => Some(after),
+                now => now.map(|now| now.min(after).max(0)),
+            };
         }
     }
 
@@ -220,5 +225,19 @@ mod tests {
         backlash.take_up([10, 4], [-1, -1]);
         backlash.resize([10, 4], [20, 0]);
         assert_eq!(backlash.take_up([20, 0], [1, 1]), [20, 0]);
+    }
+
+    #[test]
+    fn a_motor_that_had_no_backlash_takes_none_up_before_it_reverses() {
+        for direction in [1, -1] {
+            let mut backlash = Backlash::default();
+            backlash.take_up([0, 4], [direction, direction]);
+            backlash.resize([0, 4], [40, 4]);
+            assert_eq!(backlash.take_up([40, 4], [direction, direction]), [0, 0]);
+            assert_eq!(
+                backlash.take_up([40, 4], [-direction, -direction]),
+                [-40 * direction, -4 * direction]
+            );
+        }
     }
 }
