@@ -3,12 +3,18 @@
 use super::{JobSize, Setting, Settings, Tool};
 use crate::array::MapEach;
 
+/// The speed along the path that a setting asks for, as far as both axes allow it, in 2^-16 mm/min;
+/// at least 1.
+fn per_minute(settings: &Settings, speed: Setting) -> u64 {
+    u64::from(settings.path_speed(speed).to_bits().unsigned_abs()).max(1)
+}
+
 /// The time, in milliseconds, that a job of this size would take if all speeds were reached at
 /// once.
 pub(super) fn even_milliseconds(settings: &Settings, size: JobSize) -> u64 {
     let line = |length: u64, speed| {
         // The length is in 2^-18 mm and the speed in 2^-16 mm/min.
-        (length >> 2).saturating_mul(60_000) / settings.positive_bits(speed)
+        (length >> 2).saturating_mul(60_000) / per_minute(settings, speed)
     };
     line(size.drawn, Setting::DrawSpeed)
         + line(size.travelled, Setting::TravelSpeed)
@@ -69,7 +75,7 @@ impl Estimate {
         let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
         let (acceleration, _) = settings.acceleration_and_corners();
         let acceleration = u64::from(acceleration.to_bits().unsigned_abs()).max(1);
-        let per_second = settings.positive_bits(speed) / 60;
+        let per_second = per_minute(settings, speed) / 60;
         self.milliseconds += rest_to_rest(self.length >> 2, per_second, acceleration);
         // Each change of speed takes longer by about the time in which the acceleration builds up.
         let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());
@@ -77,5 +83,29 @@ impl Estimate {
             self.milliseconds += ramp.min((per_second * 1000 / jerk).isqrt());
         }
         self.length = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::Value;
+
+    #[test]
+    fn lines_take_as_long_as_the_axes_allow() {
+        let mut settings = Settings::default();
+        for setting in [Setting::MaxRateX, Setting::MaxRateY] {
+            settings.set(setting, Value::from_num(600)).expect("a valid setting");
+        }
+        // A square of 100 mm takes 40 s at 10 mm/s.
+        let side = 100 << 18;
+        let size = JobSize { drawn: 4 * side, ..JobSize::default() };
+        assert_eq!(even_milliseconds(&settings, size), 40_000);
+        let mut estimate = Estimate::default();
+        for delta in [(8000, 0), (0, 8000), (-8000, 0), (0, -8000)] {
+            estimate.add(&settings, delta, true, side);
+        }
+        let milliseconds = estimate.end(&settings);
+        assert!((40_000..42_000).contains(&milliseconds), "{milliseconds}");
     }
 }
