@@ -11,6 +11,10 @@ use super::{Alarm, Machine, MachineError, Setting, Target, Tool};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
 use crate::motion::{Move, PushError, SpeedLimit};
 
+/// The most steps of a belt that homing winds up, less the half that is added to a travel: with it,
+/// they are less than the 2^22 steps of the longest move.
+const LONGEST_BELT: i32 = PAGE_LIMIT / 2 * 5;
+
 /// One of the two axes of the page, as a limit switch belongs to it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "defmt", derive(defmt::Format))]
@@ -289,12 +293,15 @@ impl Machine<'_> {
         let properties = Kinematics::properties(&self.settings);
         let steps = |setting| {
             let steps_per_mm = homing.axis.of(properties.steps_per_mm);
-            self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT / 2)
+            self.settings.millimetres_as_steps(setting, steps_per_mm).min(PAGE_LIMIT)
         };
-        let distance = homing.distance(
-            steps(homing.axis.of(properties.homing_travel)),
-            steps(Setting::HomingPullOff),
-        );
+        let mut travel = steps(homing.axis.of(properties.homing_travel));
+        if let Some(anchors) = self.settings.kinematics().belts() {
+            let longest = homing.axis.of(anchors.longest_belts(self.travel().x));
+            // With the half that is added to a travel, an eighth to spare.
+            travel = travel.max((longest - longest / 4).min(LONGEST_BELT));
+        }
+        let distance = homing.distance(travel, steps(Setting::HomingPullOff));
         let distance = if self.homes_low(homing.axis) { distance } else { -distance };
         let mut point = self.homing_position(self.planned_motors());
         let from = homing.pressed_at.unwrap_or(point);

@@ -212,6 +212,61 @@ fn homing_that_is_given_up_slows_down_as_fast_as_it_may() {
 }
 
 #[test]
+fn a_belt_that_is_longer_than_its_anchors_are_apart_is_wound_to_its_switch() {
+    let mut settings = polargraph();
+    for (setting, value) in [
+        (Setting::Homing, 1.0),
+        (Setting::HomingSeek, 6000.0),
+        (Setting::AnchorWidth, 600.0),
+        (Setting::AnchorLeft, 150.0),
+        (Setting::AnchorHeight, 1600.0),
+        (Setting::TravelY, 1500.0),
+        (Setting::TravelX, 300.0),
+    ] {
+        settings.set(setting, Value::from_num(value)).expect("valid");
+    }
+    let start = settings.kinematics().motors(point(12_000, 0));
+    let mut belts = start;
+    let mut state = State::Idle;
+    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        belts = point(start.x + turn.pins.x, start.y + turn.pins.y);
+        let switches = Switches { x: belts.x <= 19_200, y: belts.y <= 19_200 };
+        if turn.now == 0 {
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        state = turn.machine.state();
+        state == State::Home
+    });
+    assert_eq!(state, State::Idle);
+    assert!(belts.x.abs_diff(19_280) <= 1 && belts.y.abs_diff(19_280) <= 1, "{belts:?}");
+}
+
+#[test]
+fn an_axis_of_many_fine_steps_is_homed_from_its_other_end() {
+    let settings = crate::fixtures::with(&[
+        (Setting::Homing, 1.0),
+        (Setting::TravelSpeed, 3000.0),
+        (Setting::StepsPerMmX, 2400.0),
+        (Setting::StepsPerMmY, 2400.0),
+    ]);
+    let start = point(1_000_000, 10);
+    let mut state = State::Idle;
+    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        let switches = corner(point(start.x + turn.pins.x, start.y + turn.pins.y), turn.now);
+        if turn.now == 0 {
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        state = turn.machine.state();
+        state == State::Home
+    });
+    assert_eq!(state, State::Idle);
+}
+
+#[test]
 fn a_program_that_pauses_behind_homing_has_the_override() {
     let settings = crate::fixtures::with(&[(Setting::Homing, 1.0)]);
     let (mut is_homed, mut fastest) = (false, Value::ZERO);

@@ -43,7 +43,7 @@ pub(super) struct Properties {
     pub(super) is_limited: bool,
     /// Whether switches end the travel on the page or that of a motor.
     pub(super) homing_space: HomingSpace,
-    /// The settings that hold how far the switch of each axis may be away.
+    /// The settings that hold how far the switch of each axis may be away; a belt may be longer.
     pub(super) homing_travel: [Setting; 2],
     /// The setting that holds the coordinate of a homed axis; `None` for 0.
     pub(super) homed_length: Option<Setting>,

@@ -82,6 +82,12 @@ impl Anchors {
         PagePoint { x: length_of(x, y), y: length_of(self.width - x, y) }
     }
 
+    /// The most steps that each belt has on a page of this `width`: at one of its lower corners.
+    pub(in crate::machine) fn longest_belts(self, width: i32) -> [i32; 2] {
+        let [at_left, at_right] = [0, width].map_each(|x| self.belts(PagePoint { x, y: 0 }));
+        [at_left.x.max(at_right.x), at_left.y.max(at_right.y)]
+    }
+
     /// The position on the page for lengths of the belts in steps, rounded to the nearest step.
     pub(super) fn page(self, belts: PagePoint) -> PagePoint {
         let Self { left, width } = self;
