@@ -113,3 +113,30 @@ fn by_the_uart_a_sender_asks_for_room() -> TestResult {
     );
     Ok(())
 }
+
+/// The sender of each burst has been told that there is room for all of it. Bytes come faster than
+/// chords, letters and dashes are drawn.
+#[test]
+fn by_the_uart_bursts_that_there_is_room_for_lose_nothing() -> TestResult {
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    let circles = "CI100;CI101;".repeat(80);
+    let label = format!("SI0.1,0.15;LB{}\x03", "Wq8&".repeat(240));
+    let chords: String =
+        (0..95).map(|at| format!(",{},{}", 2000 + at * 37 % 300, 2000 + at * 53 % 300)).collect();
+    let dashes = format!("LT2,1;PD2000,2000{chords};");
+    // A polygon of many points, whose fill takes long to compute, with circles behind it.
+    let corners: String =
+        (0..76).map(|at| format!(",{},{}", 100 * at, 500 - at % 2 * 400)).collect();
+    let fill = format!("LT;PU0,0;PM0;PD0,500{corners};PM2;FP;{}", "CI100;".repeat(40));
+    line.emulator.send(b"IN;SP1;PU4000,4000;")?;
+    for burst in [circles, label, dashes, fill] {
+        line.emulator.send(b"\x1B.L")?;
+        assert_eq!(answer(&mut *line.emulator)?, "1024");
+        assert!(burst.len() > 800 && burst.len() <= 1024, "{}", burst.len());
+        line.emulator.send(burst.as_bytes())?;
+        line.emulator.send(b"\x1B.E")?;
+        assert_eq!(answer(&mut *line.emulator)?, "0", "{burst}");
+        line.emulator.send(b"\x1B.K")?;
+    }
+    Ok(())
+}

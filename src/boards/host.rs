@@ -257,6 +257,11 @@ impl<'q> HostBoard<'q> {
         self.received.is_empty() && self.requests == RealTime::default()
     }
 
+    /// The number of bytes that were received and have not been read.
+    pub fn waiting(&self) -> usize {
+        self.received.len()
+    }
+
     /// Returns the bytes that were sent and removes them.
     pub fn take_sent(&mut self) -> Vec<u8> {
         core::mem::take(&mut self.sent)

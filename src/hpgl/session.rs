@@ -188,6 +188,11 @@ impl Session {
         self.handshake.output = output;
     }
 
+    /// Whether bytes wait to be sent.
+    pub fn has_output(&self) -> bool {
+        !self.handshake.output.is_empty()
+    }
+
     /// Forgets what was sent.
     pub fn clear_output(&mut self) {
         self.handshake.output.clear();

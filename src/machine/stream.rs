@@ -1,5 +1,7 @@
 //! Commands that are sent one by one: moves of G-code, jogging, parking, dwells and pauses.
 
+#[cfg(feature = "hpgl")]
+use super::State;
 use super::state::{Activity, Source};
 use super::{JobSize, Machine, MachineError, Setting, Switches, Target, Value};
 use crate::drawing::{PAGE_LIMIT, PagePoint};
@@ -91,6 +93,23 @@ impl Machine<'_> {
     /// until [`Machine::has_room`] is true.
     pub fn is_streaming(&self) -> bool {
         matches!(self.activity, Activity::Jog) || self.activity.is_stream()
+    }
+
+    /// Whether the last move known so far is drawn and ends at this position of the page.
+    #[cfg(feature = "hpgl")]
+    pub fn draws_to(&self, point: PagePoint) -> bool {
+        self.segmenter.is_none() && self.runner.inks_to(point)
+    }
+
+    /// Whether it is known where the pen will be: neither does a jog run, nor a job that is not
+    /// sent move by move.
+    #[cfg(feature = "hpgl")]
+    pub fn knows_end(&self) -> bool {
+        match self.state() {
+            State::Jog | State::Abort | State::Home => false,
+            State::Run | State::Hold { .. } => self.activity.is_stream(),
+            _ => true,
+        }
     }
 
     /// The position where all moves known so far end, in steps of the page.

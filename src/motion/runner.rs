@@ -305,6 +305,12 @@ impl<'m> Runner<'m> {
         self.lookahead.capacity()
     }
 
+    /// Whether the last move appended is inked and leaves the pen at this position of the page.
+    #[cfg(feature = "hpgl")]
+    pub fn inks_to(&self, point: PagePoint) -> bool {
+        self.page_end == point && self.last.is_some_and(|last| last.ink.is_some())
+    }
+
     /// Whether no more targets fit now.
     pub fn is_full(&self) -> bool {
         self.lookahead.is_full()

@@ -22,9 +22,21 @@ pub(super) struct HpGl<'m> {
     /// The port whose HP-GL is carried out.
     port: Option<usize>,
     session: &'m mut Session,
+    /// Whether HP-GL has begun and nothing of it has been carried out yet.
+    is_new: bool,
     /// Whether something was to be drawn while the machine was locked. Nothing is drawn then until
     /// the next `IN`.
     was_locked: bool,
+}
+
+/// What has become of a byte of a port.
+pub(super) enum Taken {
+    /// It belongs to a line, and was not taken.
+    Line,
+    /// It was taken, and another one can be taken at once.
+    More,
+    /// It was taken, and something has to be done before the next one.
+    Last,
 }
 
 /// The result of trying to carry out an action.
@@ -43,7 +55,7 @@ impl<'m> HpGl<'m> {
     /// Without HP-GL, in the memory of `session`.
     pub(super) fn new(session: &'m mut Session) -> Self {
         let dialects = [Dialect::new(); PORT_LIMIT];
-        Self { dialects, port: None, session, was_locked: false }
+        Self { dialects, port: None, session, is_new: false, was_locked: false }
     }
 
     /// The port at which HP-GL is in force or still carried out.
@@ -69,18 +81,18 @@ impl<'m> HpGl<'m> {
 }
 
 impl<'m, I: Index> Plotter<'m, I> {
-    /// Takes a byte if it is HP-GL. Returns `false` for a byte of a line.
-    pub(super) fn take_hpgl<B: Board>(&mut self, port: usize, byte: u8, board: &mut B) -> bool {
-        let Some(dialect) = self.hpgl.dialects.get_mut(port) else { return false };
+    /// Takes a byte if it is HP-GL.
+    pub(super) fn take_hpgl<B: Board>(&mut self, port: usize, byte: u8, board: &mut B) -> Taken {
+        let Some(dialect) = self.hpgl.dialects.get_mut(port) else { return Taken::Line };
         let token = dialect.take(byte);
         let is_mine = self.hpgl.port.is_none_or(|mine| mine == port);
         match token {
-            Token::Line => return false,
+            Token::Line => return Taken::Line,
             Token::Leaves => {
                 if let Some(reader) = self.readers.get_mut(port) {
                     reader.clear();
                 }
-                return false;
+                return Taken::Line;
             }
             Token::Begins(_) if !is_mine => {
                 board.reply_to(Replies::Only(port));
@@ -99,16 +111,19 @@ impl<'m, I: Index> Plotter<'m, I> {
                 let (at, limits) = frame(&self.inner.machine);
                 self.hpgl.session.begin(beginning, byte, at, limits);
                 self.hpgl.port = Some(port);
-                self.hpgl.was_locked = false;
+                self.hpgl.is_new = true;
                 self.inner.hpgl_pen = None;
                 self.mute(board);
             }
             Token::Code | Token::Text | Token::Control if is_mine => {
                 self.hpgl.session.receive(byte, token);
+                if self.hpgl.session.room() > 0 && !self.hpgl.session.has_output() {
+                    return Taken::More;
+                }
             }
-            Token::Code | Token::Text | Token::Control => {}
+            Token::Code | Token::Text | Token::Control => return Taken::More,
         }
-        true
+        Taken::Last
     }
 
     /// Sends replies to the ports at which no HP-GL is in force.
@@ -163,6 +178,12 @@ impl<'m, I: Index> Plotter<'m, I> {
 
     /// Carries out the next action. Returns whether there was anything to do.
     fn carry_out_action<B: Board>(&mut self, board: &mut B) -> bool {
+        if self.hpgl.is_new {
+            if !self.inner.machine.knows_end() {
+                return false;
+            }
+            self.initialize_hpgl();
+        }
         let action = self.hpgl.session.action().clone();
         if !self.hpgl.session.has_asked() {
             // The sender may have taken the request for a pen back.
@@ -174,10 +195,9 @@ impl<'m, I: Index> Plotter<'m, I> {
                 self.hpgl.session.answer(&answer);
                 Outcome::Done
             }
+            Action::Initialize if !self.inner.machine.knows_end() => Outcome::Waits,
             Action::Initialize => {
-                let (at, limits) = frame(&self.inner.machine);
-                self.hpgl.session.initialize(at, limits);
-                self.hpgl.was_locked = false;
+                self.initialize_hpgl();
                 Outcome::Done
             }
             Action::Pen(number) => self.change_pen(number, board),
@@ -191,6 +211,13 @@ impl<'m, I: Index> Plotter<'m, I> {
             Outcome::Waits => return false,
         }
         true
+    }
+
+    /// Makes the state after `IN`, with the pen where the moves known so far end.
+    fn initialize_hpgl(&mut self) {
+        let (at, limits) = frame(&self.inner.machine);
+        self.hpgl.session.initialize(at, limits);
+        (self.hpgl.is_new, self.hpgl.was_locked) = (false, false);
     }
 
     /// Draws a line or a dot, or moves without drawing.
@@ -219,6 +246,8 @@ impl<'m, I: Index> Plotter<'m, I> {
         let is_dot = from == Some(to);
         let moved = match travel {
             Some(point) => machine.draw_to(Target { point, ink: None }, None),
+            // The pen is down there already. To lower it again, the machine would stop.
+            None if is_dot && machine.draws_to(to) => Ok(()),
             None if is_dot => machine.lower_pen(),
             None => {
                 let ink = ink.then_some(LineType::Full);

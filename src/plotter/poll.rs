@@ -4,6 +4,8 @@
 #[cfg(feature = "hpgl")]
 use super::Replies;
 use super::commands::Next;
+#[cfg(feature = "hpgl")]
+use super::hpgl::Taken;
 use super::plot::Drawing;
 #[cfg(feature = "tiles")]
 use super::stored::PartsProgress;
@@ -16,6 +18,12 @@ use crate::protocol::{CommandError, LineReader, Numbering, RealTime, Received};
 /// The most bytes of a line that are read in one turn of the main loop. They take a small part of
 /// the time of a turn, which plans steps first.
 const BYTES_IN_TURN: u32 = 32;
+
+/// The same for a port at which HP-GL is in force. Its sender counts on the room for the bytes that
+/// wait to be interpreted, so they must leave the port's queue as fast as they come. As many
+/// come in 11 ms.
+#[cfg(feature = "hpgl")]
+const HPGL_BYTES_IN_TURN: u32 = 128;
 
 impl<I: Index> Plotter<'_, I> {
     /// Answers the serial line, and keeps the queue of step events full. Returns whether there was
@@ -66,11 +74,22 @@ impl<I: Index> Plotter<'_, I> {
         };
         self.inner.busy_at = board.microseconds();
         let mut left = BYTES_IN_TURN;
+        #[cfg(feature = "hpgl")]
+        if self.hpgl.port().is_some() {
+            left = HPGL_BYTES_IN_TURN;
+        }
         // Bytes within a line change nothing and have no reply, so several are read in a turn.
         let (numbering, line, is_busy) = loop {
             #[cfg(feature = "hpgl")]
-            if self.take_hpgl(port, byte, board) {
-                return true;
+            match self.take_hpgl(port, byte, board) {
+                Taken::Line => {}
+                Taken::More if left > 1 => {
+                    left -= 1;
+                    let Some(next) = board.read_byte() else { return true };
+                    (port, byte) = next;
+                    continue;
+                }
+                Taken::More | Taken::Last => return true,
             }
             // Nothing comes between the instructions of HP-GL that are being carried out.
             #[cfg(feature = "hpgl")]

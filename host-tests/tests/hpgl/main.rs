@@ -11,7 +11,8 @@ mod senders;
 
 use ink::{assert_same_ink, inked, plan, units};
 use penup::machine::State;
-use penup_host_tests::whole_jobs::Bench;
+use penup_client::emulator::MachineEventKind;
+use penup_host_tests::whole_jobs::{Bench, machine_events};
 use std::fmt::Write as _;
 
 /// A plotter with little memory.
@@ -231,6 +232,61 @@ fn a_hold_between_two_instructions_stops_what_comes() {
         bench.work(3000);
         assert_ne!(bench.plotter.machine().position(), before);
         assert_eq!(bench.plotter.machine().state(), State::Idle);
+    }
+}
+
+/// How long the plotter takes for the instructions behind `IN;PU0,0;PD`, in ms, and how often it
+/// lowers the pen.
+fn time_and_lowerings(text: &str) -> (u64, usize) {
+    let mut bench = Bench::small();
+    draw(&mut bench, format!("IN;PU0,0;PD{text}").as_bytes());
+    let time = bench.board.trace().now() * 1000 / u64::from(penup::motion::TICKS_PER_SECOND);
+    let events = machine_events(&bench.board.trace().take_changes());
+    let is_down = |event: &&MachineEventKind| matches!(event, MachineEventKind::Pen { down: true });
+    (time, events.iter().filter(is_down).count())
+}
+
+#[test]
+fn the_pen_passes_repeated_points_and_lines_below_a_step_without_a_stop() {
+    let line = |points: fn(i32) -> String| {
+        let points: Vec<String> = (1..=35).map(|point| points(point * 80)).collect();
+        time_and_lowerings(&format!("{};PU;", points.join(",")))
+    };
+    let (once, lowerings) = line(|x| format!("{x},0"));
+    assert_eq!(lowerings, 1);
+    for (name, (time, lowerings)) in [
+        ("twice", line(|x| format!("{x},0,{x},0"))),
+        ("below a step", line(|x| format!("{x},0,{x}.1,0.1,{x},0"))),
+        ("lowered", line(|x| format!("{x},0;PU;PD;PD{x},0"))),
+    ] {
+        assert!(time.abs_diff(once) <= 50 && lowerings == 1, "{name}: {time} and {once} ms");
+    }
+    // Dots are drawn where the pen comes raised, and with another pen.
+    for (text, lowerings) in [("", 1), (";PU;PD", 1), ("9,0;PU0,0;PD", 2), ("9,0;PU;SP2;PD", 2)] {
+        assert_eq!(time_and_lowerings(&format!("{text};PU;")).1, lowerings, "{text}");
+    }
+}
+
+#[test]
+fn hp_gl_begins_where_a_jog_or_a_job_has_ended() {
+    for begin in ["IN;", "\x1B.(", "$hpgl\n", "\x1B.(IN;"] {
+        let mut bench = Bench::small();
+        bench.say("$J=G90 X100 Y0 F1200\n");
+        bench.work(200);
+        bench.board.receive(format!("{begin}OA;").as_bytes());
+        bench.work(20);
+        assert!(!bench.heard().contains('\r'), "the jog still runs");
+        bench.board.receive(b"\x85");
+        bench.work(2000);
+        let steps = bench.plotter.machine().position().x;
+        assert!((1..1000).contains(&steps), "{steps}");
+        let units = f64::from(steps) / 2.0;
+        let heard = bench.heard();
+        let [x, ..] = heard.split(',').collect::<Vec<_>>()[..] else { panic!("{heard}") };
+        assert!((x.parse::<f64>().expect("a number") - units).abs() <= 0.5, "{heard} {units}");
+        bench.board.receive(b"PR;PD400,0;PU;");
+        bench.work(4000);
+        assert_eq!(bench.plotter.machine().position().x, steps + 800, "{begin}");
     }
 }
 

@@ -3,6 +3,7 @@
 use super::ink::{assert_same_ink, inked, plan};
 use super::{chiplotle, gnuplot, tolerance, vpype};
 use penup::machine::State;
+use penup::motion::TICKS_PER_SECOND;
 use penup::plotter::Board;
 use penup_host_tests::whole_jobs::Bench;
 
@@ -106,6 +107,40 @@ fn a_sender_that_asks_for_room_loses_nothing() {
             &plan(&file).expect("a valid file"),
             tolerance(name),
         );
+    }
+}
+
+/// Turns of the main loop are longer than bytes of the line while circles, letters and short chords
+/// are drawn: 0.6 ms against 87 µs. A sender may all the same send at once as much as it was told
+/// that there is room for.
+#[test]
+fn a_sender_may_fill_the_room_at_once_however_long_turns_take() {
+    let circles = "CI100;CI101;CI102;".repeat(80);
+    let label = format!("LB{}", "Wq8&".repeat(300));
+    let chords: String =
+        (0..120).map(|at| format!(",{},{}", 2000 + at * 37 % 300, 2000 + at * 53 % 300)).collect();
+    let dashes = format!("PD2000,2000{chords}");
+    for (begin, drawn) in [
+        ("IN;SP1;PU4000,4000;", circles),
+        ("IN;SP1;SI0.1,0.15;PU1000,4000;", label),
+        ("IN;SP1;LT2,1;PU2000,2000;", dashes),
+    ] {
+        let mut bench = Bench::small();
+        bench.board.receive(begin.as_bytes());
+        bench.work(10_000);
+        assert_eq!(bench.say("\x1B.B"), "1024\r");
+        let mut bytes = drawn.bytes().take(1024);
+        loop {
+            let came: Vec<u8> = bytes.by_ref().take(7).collect();
+            bench.board.receive(&came);
+            let waiting = bench.board.waiting();
+            assert!(waiting <= PORT_BYTES, "{begin} {waiting} bytes wait in the port");
+            bench.plotter.poll(&mut bench.board);
+            bench.board.pass((TICKS_PER_SECOND / 1600).into());
+            if came.is_empty() {
+                break;
+            }
+        }
     }
 }
 
