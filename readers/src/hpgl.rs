@@ -253,9 +253,18 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
             break;
         }
         let token = dialect.take(byte);
+        let name = instruction.name.as_str();
         match token {
             Token::Control => continue,
-            Token::Code if byte == DAMAGED => {
+            // In a label it is a letter of Latin-1; in texts that are not drawn it is nothing.
+            Token::Text if byte == DAMAGED && !matches!(name, "PE" | "DT" | "SM") => {
+                let letter = if name == "LB" { "ÿ" } else { "" };
+                for byte in letter.bytes() {
+                    reader.push(byte, instruction.begin).map_err(|why| (instruction.begin, why))?;
+                }
+                continue;
+            }
+            Token::Code | Token::Text if byte == DAMAGED => {
                 return Err((at, "the byte 0xFF is no HP-GL: is the file damaged?".to_owned()));
             }
             Token::Leaves | Token::Line | Token::Begins(_) => {

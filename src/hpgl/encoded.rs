@@ -58,7 +58,6 @@ impl<B: PolygonBuffer> Interpreter<B> {
     pub(super) fn push_encoded(&mut self, byte: u8) -> bool {
         let line = &mut self.polyline;
         if byte == DAMAGED {
-            self.lose();
             return false;
         }
         if byte == b';' {

@@ -118,8 +118,11 @@ pub struct Interpreter<B = [Vertex; VERTICES]> {
     /// Whether a number was bad.
     pub(super) is_bad: bool,
     pub(super) polyline: Polyline,
-    /// The code point of a letter so far, and how many more bytes it has.
+    /// The bits of a letter so far, with all those of its first byte, and how many more bytes it
+    /// has.
     pub(super) partial: (u32, u8),
+    /// The byte that is to be taken once more when the steps are done.
+    pub(super) again: Option<u8>,
 
     pub(super) frame: Frame,
     /// The position on the page, which may be beyond the limits.
@@ -182,6 +185,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
             partial: (0, 0),
             frame: Frame::ZERO,
             at: Point::ZERO,
+            again: None,
             is_lost: false,
             is_down: false,
             is_relative: false,
@@ -239,7 +243,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
     /// Forgets what is left to do for the last byte.
     pub fn clear_steps(&mut self) {
         self.steps.clear();
-        (self.index, self.stroke) = (0, None);
+        (self.index, self.stroke, self.again) = (0, None, None);
         self.first_of_sheet = Action::Nothing;
     }
 
@@ -251,7 +255,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
 
     /// Whether nothing is left to do for the bytes so far, and no instruction is incomplete.
     pub fn is_idle(&self) -> bool {
-        self.steps.is_empty() && self.stroke.is_none() && self.first_of_sheet == Action::Nothing
+        self.steps.is_empty()
+            && self.stroke.is_none()
+            && self.again.is_none()
+            && self.first_of_sheet == Action::Nothing
     }
 
     /// The speed that `VS` has chosen for lines, in cm/s, in units of 2^-16; `None` if it has not.
@@ -358,7 +365,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
             if self.stroke.is_some() {
                 continue;
             }
-            let step = self.steps.front()?.clone();
+            let Some(step) = self.steps.front().cloned() else {
+                let byte = self.again.take()?;
+                self.push(byte);
+                continue;
+            };
             let index = self.index;
             self.index += 1;
             let action = match step {

@@ -1,11 +1,11 @@
 //! Labels: their bytes, the size, direction and slant of letters, and where each stroke of a
 //! letter lies.
 
-use super::LABEL_END;
 use super::coordinates::{Frame, Point, UNIT};
 use super::interpreter::{ErrorNumber, Interpreter, Step};
 use super::parser::Mode;
 use super::polygon::PolygonBuffer;
+use super::{DAMAGED, LABEL_END};
 use crate::array::MapEach;
 use crate::drawing::LetterStrokes;
 use crate::fixed::{divide_rounding, product};
@@ -154,30 +154,41 @@ impl<B: PolygonBuffer> Interpreter<B> {
         Ok(())
     }
 
-    /// Takes a byte of a label.
+    /// Takes a byte of a label. Letters are those of UTF-8. A byte that is none of it is one of
+    /// Latin-1, as older programs write them.
     pub(super) fn push_text(&mut self, byte: u8) {
-        if byte == self.text.terminator {
-            self.mode = Mode::Code;
+        let (partial, left) = core::mem::take(&mut self.partial);
+        let is_over = byte == self.text.terminator;
+        if byte == DAMAGED {
             return;
         }
-        let (partial, left) = self.partial;
-        self.partial = match (byte, left) {
-            (0x80..=0xBF, 1..) => (partial << 6 | u32::from(byte & 0x3F), left - 1),
-            (0xC2..=0xDF, _) => (u32::from(byte & 0x1F), 1),
-            (0xE0..=0xEF, _) => (u32::from(byte & 0x0F), 2),
-            (0xF0..=0xF4, _) => (u32::from(byte & 0x07), 3),
-            _ => (byte.into(), 0),
-        };
-        let (letter, left) = self.partial;
+        if left > 0 && matches!(byte, 0x80..=0xBF) && !is_over {
+            let bits = partial << 6 | u32::from(byte & 0x3F);
+            if left > 1 {
+                self.partial = (bits, left - 1);
+                return;
+            }
+            // The bits that the first byte has of the letter depend on the number of bytes.
+            let letter = match bits {
+                0..=0x3FFF => bits & 0x7FF,
+                0x4000..=0xF_FFFF => bits & 0xFFFF,
+                _ => bits & 0x1F_FFFF,
+            };
+            return self.write(char::from_u32(letter).unwrap_or('\u{FFFD}'));
+        }
         if left > 0 {
-            return;
+            // The byte is taken again behind what came of the letter: a byte of Latin-1, or more,
+            // which are drawn as a box.
+            self.again = Some(byte);
+            return self.write(u8::try_from(partial).map_or('\u{FFFD}', char::from));
         }
         match byte {
+            _ if is_over => self.mode = Mode::Code,
             0x00..=0x1F | 0x7F => self.control_letter(byte, false),
-            0x20..=0x7E => self.write(byte.into()),
-            // Bytes that are no letters are drawn as boxes.
-            0x80..=0xBF => self.write(char::from_u32(letter).unwrap_or('\u{FFFD}')),
-            _ => self.write('\u{FFFD}'),
+            0xC2..=0xDF => self.partial = (byte.into(), 1),
+            0xE0..=0xEF => self.partial = (byte.into(), 2),
+            0xF0..=0xF4 => self.partial = (byte.into(), 3),
+            _ => self.write(byte.into()),
         }
     }
 

@@ -41,6 +41,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
     /// Takes a byte of HP-GL without instructions to the interface. Before the next byte, take all
     /// that [`Interpreter::next_action`] returns.
     pub fn push(&mut self, byte: u8) {
+        if byte == DAMAGED {
+            self.lose();
+        }
         match self.mode {
             Mode::Code => self.push_code(byte),
             Mode::Label => self.push_text(byte),
@@ -91,10 +94,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
             }
             b';' => self.end_instruction(),
             b'\n' | b'\r' => self.end_line(),
-            DAMAGED => {
-                self.forget_instruction();
-                self.lose();
-            }
+            DAMAGED => self.forget_instruction(),
             _ => {
                 let number = self.number.end();
                 self.take_number(number);
@@ -202,7 +202,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
             if count > 0 {
                 self.fail(ErrorNumber::WrongCount);
             } else if !self.has_pairs && self.is_down && !was_down && !self.is_lost {
-                self.add(Step::Dot);
+                // In a polygon nothing is drawn yet.
+                if !self.polygon.is_open {
+                    self.add(Step::Dot);
+                }
             }
         } else if !self.is_bad
             && let Err(error) = self.carry_out(name, given)
@@ -438,7 +441,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         };
         match u8::try_from(kind) {
             Ok(kind @ 0..=6) => {
-                self.line = LineStyle::chosen(kind, percent);
+                self.line = LineStyle::chosen(kind, length);
                 Ok(())
             }
             _ => Err(ErrorNumber::BadParameter),

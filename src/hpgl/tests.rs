@@ -384,6 +384,46 @@ fn lost_bytes_are_not_drawn_over() {
 }
 
 #[test]
+fn what_follows_lost_bytes_in_a_text_is_not_drawn() {
+    for (text, drawn) in [
+        (&b"LBI\xFFI\x03"[..], "200,310>200,100"),
+        (b"LBI\xFFI\r\nI\x03PR;PD5,5;", "200,310>200,100"),
+        (b"LBI\xC3\xFF\xA9I\x03", "200,310>200,100"),
+        (b"LBI\xFFIPA5,5;PD6,6;", "200,310>200,100"),
+        (b"LBI\xFFI\x03PD5,5,7,7;", "200,310>200,100 go 5,5 5,5>7,7"),
+        (b"PD;WDI\xFF\x03PR5,5;", "dot 100,100"),
+        (b"PD;CO\xFF;PR5,5;", "dot 100,100"),
+        (b"PD;DT\xFFPR5,5;", "dot 100,100"),
+        (b"PD;SM\xFFPR5,5;", "dot 100,100"),
+    ] {
+        let bytes = [b"SI0.5,0.525;PU100,100;", text].concat();
+        assert_eq!(actions(&bytes), format!("go 100,100 {drawn}"), "{}", text.escape_ascii());
+    }
+}
+
+#[test]
+fn letters_of_labels_are_those_of_utf_8_or_of_latin_1() {
+    let begin = b"SI0.5,0.525;PU100,100;LB";
+    let label = |text: &[u8]| actions(&[&begin[..], text, b"\x03PD0,0;"].concat());
+    for (latin_1, utf_8) in [
+        (&b"M\xE4x\xE9"[..], "Mäxé"),
+        (b"\xC4\xD6\xDC\xE4\xF6\xFC\xDF", "ÄÖÜäöüß"),
+        (b"\xF8\xE5\xE5\r\n\xE9\x08\xE8", "øåå\r\né\u{8}è"),
+        // A letter of UTF-8 that is broken off is a box.
+        (b"\xE2\x82x", "\u{FFFD}x"),
+        (b"\xF0\x9F\x98", "\u{FFFD}"),
+        ("\u{4E2D}\u{1F600}".as_bytes(), "\u{FFFD}\u{FFFD}"),
+    ] {
+        assert_eq!(label(latin_1), label(utf_8.as_bytes()), "{utf_8}");
+        let letters = utf_8.chars().filter(|letter| !letter.is_control()).count();
+        let columns = 100 + 300 * letters;
+        if !utf_8.contains('\r') {
+            assert!(label(latin_1).ends_with(&format!(" {columns},100>0,0")), "{utf_8}");
+        }
+    }
+}
+
+#[test]
 fn no_bytes_make_it_panic_or_draw_outside() {
     let mut state = 1u32;
     let mut random = || {

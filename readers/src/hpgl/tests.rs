@@ -302,3 +302,12 @@ fn a_polygon_of_few_points_is_filled_as_by_a_plotter() {
         assert_eq!(reader.take_error(), None, "{case}: {text}");
     }
 }
+
+#[test]
+fn labels_of_latin_1_are_drawn_as_those_of_utf_8() {
+    let label = |text: &[u8]| sent("a.plt", &[b"PU40,40;LB", text, b"\x03CO\xFF\xE4;"].concat());
+    let expected = label("Mäxéÿ".as_bytes()).expect("HP-GL");
+    assert_eq!(label(b"M\xE4x\xE9\xFF"), Ok(expected));
+    let error = sent("a.plt", b"PU40,40;PE\xFF;PD5,5;").expect_err("refused");
+    assert!(error.contains("the byte 0xFF"), "{error}");
+}
