@@ -3,7 +3,7 @@
 use super::coordinates::{Frame, Point, Rectangle, UNIT};
 use super::encoded::Polyline;
 use super::label::TextStyle;
-use super::line_type::{DashPart, LineStyle, Stroke};
+use super::line_type::{DashPart, LineStyle, PatternLength, Stroke};
 use super::number::Number;
 use super::outline::ArcStep;
 use super::parser::Mode;
@@ -135,6 +135,8 @@ pub struct Interpreter<B = [Vertex; VERTICES]> {
     pub(super) has_no_pen: bool,
     pub(super) text: TextStyle,
     pub(super) line: LineStyle,
+    /// Whether the last number of arcs is how far a chord may be off, and not its angle (`CT1`).
+    pub(super) bounds_deviation: bool,
     pub(super) fill: FillStyle,
     pub(super) polygon: Polygon<B>,
     pub(super) hatch: Hatch,
@@ -183,15 +185,16 @@ impl<B: PolygonBuffer> Interpreter<B> {
             is_bad: false,
             polyline: Polyline::ZERO,
             partial: (0, 0),
+            again: None,
             frame: Frame::ZERO,
             at: Point::ZERO,
-            again: None,
             is_lost: false,
             is_down: false,
             is_relative: false,
             has_no_pen: false,
             text: TextStyle::ZERO,
             line: LineStyle::ZERO,
+            bounds_deviation: false,
             fill: FillStyle::ZERO,
             polygon: Polygon::new(buffer),
             hatch: Hatch::ZERO,
@@ -225,7 +228,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         self.frame.set_default();
         self.is_relative = false;
         self.text = TextStyle::DEFAULT;
-        self.line = LineStyle::SOLID;
+        (self.line, self.bounds_deviation) = (LineStyle::SOLID, false);
         self.fill = FillStyle::DEFAULT;
         self.polygon.clear();
         self.ticks = [UNIT / 2; 2];
@@ -450,7 +453,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
         if self.line.number.is_none() {
             return self.ink([stroke.from, stroke.to]);
         }
-        let pattern = self.frame.percent(self.line.percent);
+        let pattern = match self.line.length {
+            PatternLength::Percent(percent) => self.frame.percent(percent),
+            PatternLength::Units(units) => units,
+        };
         let part = self.line.next_part(&mut stroke, pattern)?;
         self.stroke = Some(stroke);
         match part {

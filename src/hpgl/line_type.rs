@@ -18,14 +18,22 @@ const PATTERNS: [&[u8]; 6] = [
 const LEAST: i64 = 8 * UNIT;
 
 /// The style in which lines are drawn.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub(super) struct LineStyle {
     /// The number after `LT`; `None` for solid lines.
     pub(super) number: Option<u8>,
-    /// The length of the pattern in percent of the distance from P1 to P2, in units of 2^-16.
-    pub(super) percent: i64,
+    pub(super) length: PatternLength,
     /// The distance into the pattern at which the last line ended.
     phase: i64,
+}
+
+/// The length of a pattern, in units of 2^-16.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum PatternLength {
+    /// In percent of the distance from P1 to P2.
+    Percent(i64),
+    /// In plotter units.
+    Units(i64),
 }
 
 /// A line that is drawn in parts.
@@ -51,17 +59,18 @@ pub(super) enum DashPart {
 
 impl LineStyle {
     /// The length of the pattern when none was chosen: 4 percent.
-    pub(super) const DEFAULT_PERCENT: i64 = 4 * UNIT;
+    const DEFAULT_LENGTH: PatternLength = PatternLength::Percent(4 * UNIT);
 
     /// A value that consists of zero bits. It is not valid before initialization.
-    pub(super) const ZERO: Self = Self { number: None, percent: 0, phase: 0 };
+    pub(super) const ZERO: Self =
+        Self { number: None, length: PatternLength::Percent(0), phase: 0 };
 
     /// Solid lines.
-    pub(super) const SOLID: Self = Self { number: None, percent: Self::DEFAULT_PERCENT, phase: 0 };
+    pub(super) const SOLID: Self = Self { number: None, length: Self::DEFAULT_LENGTH, phase: 0 };
 
     /// Begins the pattern from its start, as every `LT` does.
-    pub(super) fn chosen(number: u8, percent: i64) -> Self {
-        Self { number: Some(number), percent, phase: 0 }
+    pub(super) fn chosen(number: u8, length: PatternLength) -> Self {
+        Self { number: Some(number), length, phase: 0 }
     }
 
     /// The next part of a line, with patterns of this length. `None` at its end.
@@ -160,14 +169,14 @@ mod tests {
             (5, "------- - ------- - -----"),
             (6, "----- - - ----- - - -----"),
         ] {
-            let mut style = LineStyle::chosen(number, 0);
+            let mut style = LineStyle::chosen(number, PatternLength::Percent(0));
             assert_eq!(picture(&mut style, 250).trim_end(), expected, "LT{number}");
         }
     }
 
     #[test]
     fn a_pattern_goes_on_in_the_next_line() {
-        let mut style = LineStyle::chosen(2, 0);
+        let mut style = LineStyle::chosen(2, PatternLength::Percent(0));
         let parts = [30, 30, 70].map(|length| picture(&mut style, length));
         assert_eq!(parts.concat(), "-----     ---");
     }

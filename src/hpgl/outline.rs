@@ -8,6 +8,15 @@ use crate::fixed::sin_cos_degrees;
 /// A whole turn, in units of 2^-16 degrees.
 const TURN: i64 = 360 * UNIT;
 
+/// What a sender asks of the chords of an arc, in units of 2^-16.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Chord {
+    /// Each turns by at most so many degrees.
+    Angle(i64),
+    /// Each is at most so many plotter units off the arc.
+    Off(i64),
+}
+
 /// An arc as straight chords. Where x and y have different scales, it is one of an ellipse. Many
 /// may wait in the queue, so what the frame tells is not kept in each.
 #[derive(Debug, Clone, Copy)]
@@ -22,18 +31,25 @@ pub(super) struct ArcStep {
 }
 
 impl ArcStep {
-    /// The arc with this beginning. Without the angle of a chord, chords are at most an eighth of
-    /// a plotter unit off the arc.
-    fn new(center: Point, [radius, across]: [Point; 2], sweep: i64, chord: Option<i64>) -> Self {
+    /// The arc with this beginning. If nothing is asked of the chords, they are at most an eighth
+    /// of a plotter unit off the arc.
+    fn new(center: Point, [radius, across]: [Point; 2], sweep: i64, chord: Option<Chord>) -> Self {
         // A second turn draws the same again.
         let sweep = if sweep.abs() > TURN { sweep % TURN + TURN * sweep.signum() } else { sweep };
+        let longest = radius.length().max(across.length()).unsigned_abs();
         let chords = match chord {
-            Some(angle) => (sweep.unsigned_abs()).div_ceil(angle.unsigned_abs().max(1)),
-            // A chord of an angle a is r·a²/8 off the arc, so a is one divided by the root of r in
-            // plotter units. A radian has 57.3 degrees.
+            Some(Chord::Angle(angle)) => {
+                (sweep.unsigned_abs()).div_ceil(angle.unsigned_abs().max(1))
+            }
+            // A chord of an angle a is at most r·a²/8 off the arc. A radian has 57.3 degrees.
+            Some(Chord::Off(distance)) => {
+                let ratio = (longest << 16) / distance.unsigned_abs().saturating_mul(8).max(1);
+                // The root is in units of 2^-8.
+                (sweep.unsigned_abs() * ratio.isqrt()).div_ceil((57 << 8) << 16)
+            }
+            // So a is one divided by the root of r in plotter units.
             None => {
-                let longest = radius.length().max(across.length());
-                let root = (longest.unsigned_abs() >> 12).isqrt(); // in units of 2^-2
+                let root = (longest >> 12).isqrt(); // in units of 2^-2
                 (sweep.unsigned_abs() * root).div_ceil((57 * 4) << 16)
             }
         };
@@ -69,13 +85,13 @@ impl<B: PolygonBuffer> Interpreter<B> {
         center: Point,
         radius: Point,
         sweep: i64,
-        chord: Option<i64>,
+        chord: Option<Chord>,
     ) -> Option<ArcStep> {
         Some(ArcStep::new(center, [radius, self.frame.across(radius)?], sweep, chord))
     }
 
     /// `AA` and `AR`: an arc about a centre.
-    pub(super) fn arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
+    pub(super) fn arc(&mut self, center: Point, sweep: i64, chord: Option<Chord>) {
         let radius = self.at.minus(center);
         if radius == Point::default() {
             return;
@@ -91,7 +107,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// `CI`: a circle about the pen, which then returns.
-    pub(super) fn circle(&mut self, radius: Point, chord: Option<i64>) {
+    pub(super) fn circle(&mut self, radius: Point, chord: Option<Chord>) {
         if radius == Point::default() {
             return;
         }
@@ -104,7 +120,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// `EW`: the outline of a wedge about the pen.
-    pub(super) fn wedge(&mut self, radius: Point, sweep: i64, chord: Option<i64>) {
+    pub(super) fn wedge(&mut self, radius: Point, sweep: i64, chord: Option<Chord>) {
         let center = self.at;
         let arc = self.arc_about(center, radius, sweep, chord);
         let (Some(begin), Some(arc)) = (center.plus(radius), arc) else { return self.overflow() };

@@ -1,11 +1,11 @@
 //! Takes the bytes of instructions, and carries each instruction out at its end.
 
-use super::coordinates::{Point, UNIT};
+use super::coordinates::{Point, UNIT, UNITS_PER_MM};
 use super::dialect::Comment;
 use super::interpreter::{ErrorNumber, Interpreter, Step};
-use super::line_type::LineStyle;
+use super::line_type::{LineStyle, PatternLength};
 use super::number::Parsed;
-use super::outline::sine_and_cosine;
+use super::outline::{Chord, sine_and_cosine};
 use super::polygon::PolygonBuffer;
 use super::{DAMAGED, dialect};
 
@@ -31,7 +31,7 @@ pub(super) enum Mode {
 /// Instructions that have no effect on what is drawn, or that penup carries out in its own way.
 #[rustfmt::skip]
 const WITHOUT_EFFECT: &[[u8; 2]] = &[
-    *b"AC", *b"AD", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CT", *b"CV", *b"DC", *b"DP", *b"EC",
+    *b"AC", *b"AD", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CV", *b"DC", *b"DP", *b"EC",
     *b"FI", *b"FN", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY", *b"LA", *b"MC", *b"NP", *b"NR",
     *b"PB", *b"PC", *b"PS", *b"PW", *b"QL", *b"RF", *b"RP", *b"SB", *b"SG", *b"SV", *b"TD", *b"TR",
     *b"UL", *b"WU",
@@ -246,7 +246,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
         let chord = |index: usize| match numbers.get(index) {
             None => Ok(None),
             Some(0) => Err(ErrorNumber::BadParameter),
-            Some(angle) => Ok(Some(*angle)),
+            Some(angle) if !self.bounds_deviation => Ok(Some(Chord::Angle(*angle))),
+            Some(distance) => {
+                let distance = self.frame.length(Point { x: *distance, y: 0 });
+                Ok(Some(Chord::Off(distance.ok_or(ErrorNumber::Overflow)?.x)))
+            }
         };
         match &name {
             b"IN" => self.add(Step::Initialize),
@@ -356,6 +360,12 @@ impl<B: PolygonBuffer> Interpreter<B> {
                     self.fill_wedge(radius, sweep, chord)?;
                 }
             }
+            b"CT" => match *numbers {
+                [] | [0] => self.bounds_deviation = false,
+                [UNIT] => self.bounds_deviation = true,
+                [_] => return Err(bad),
+                _ => return Err(ErrorNumber::WrongCount),
+            },
             b"PM" => self.polygon_mode(numbers)?,
             b"EP" => {
                 at_most(0)?;
@@ -431,11 +441,13 @@ impl<B: PolygonBuffer> Interpreter<B> {
             return Ok(());
         };
         let kind = (number / UNIT).unsigned_abs();
-        let percent = match rest {
-            [] => self.line.percent,
-            [percent] if *percent > 0 && *percent <= 127 * UNIT => *percent,
-            // Patterns are measured in percent (HP-GL/2: the third number is 0), and not in mm.
-            [percent, 0] if *percent > 0 && *percent <= 127 * UNIT => *percent,
+        let length = match *rest {
+            [] => self.line.length,
+            // The third number is of HP-GL/2: 0 for percent, 1 for mm.
+            [percent] | [percent, 0] if percent > 0 && percent <= 127 * UNIT => {
+                PatternLength::Percent(percent)
+            }
+            [mm, UNIT] if mm > 0 && mm <= 1000 * UNIT => PatternLength::Units(mm * UNITS_PER_MM),
             [_] | [_, _] => return Err(ErrorNumber::BadParameter),
             _ => return Err(ErrorNumber::WrongCount),
         };

@@ -15,13 +15,14 @@ pub(super) use fill::{FillStyle, Hatch};
 
 use super::coordinates::{Point, UNIT};
 use super::interpreter::{ErrorNumber, Interpreter, Step};
+use super::outline::Chord;
 
 /// The most points of a polygon on a plotter, with those that close its parts. Each takes 8 bytes.
 pub const VERTICES: usize = 256;
 /// Coordinates of a vertex are kept without this many of their lowest bits: in 2^-6 plotter units.
 const DROPPED_BITS: u32 = 10;
 /// The angle of the chords of arcs in a polygon, if none is given: 5 degrees.
-const CHORD: i64 = 5 * UNIT;
+const CHORD: Chord = Chord::Angle(5 * UNIT);
 
 /// A point of a polygon.
 #[derive(Debug, Clone, Copy)]
@@ -203,7 +204,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// `AA` and `AR` in polygon mode: an arc about a centre.
-    pub(super) fn add_arc(&mut self, center: Point, sweep: i64, chord: Option<i64>) {
+    pub(super) fn add_arc(&mut self, center: Point, sweep: i64, chord: Option<Chord>) {
         let radius = self.at.minus(center);
         let Some(arc) = self.arc_about(center, radius, sweep, chord.or(Some(CHORD))) else {
             return self.overflow();
@@ -217,7 +218,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// `CI` in polygon mode: a subpolygon of its own. The pen then returns.
-    pub(super) fn add_circle(&mut self, radius: Point, chord: Option<i64>) {
+    pub(super) fn add_circle(&mut self, radius: Point, chord: Option<Chord>) {
         let center = self.at;
         let Some(begin) = center.plus(radius) else { return self.overflow() };
         self.polygon.close();
@@ -230,7 +231,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
     }
 
     /// Adds the points of an arc that begins there.
-    fn push_wedge(&mut self, center: Point, begin: Point, sweep: i64, chord: Option<i64>) {
+    fn push_wedge(&mut self, center: Point, begin: Point, sweep: i64, chord: Option<Chord>) {
         let radius = begin.minus(center);
         let Some(arc) = self.arc_about(center, radius, sweep, chord.or(Some(CHORD))) else {
             return self.overflow();
@@ -258,7 +259,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         &mut self,
         radius: Point,
         sweep: i64,
-        chord: Option<i64>,
+        chord: Option<Chord>,
     ) -> Result<(), ErrorNumber> {
         let center = self.at;
         let begin = center.plus(radius).ok_or(ErrorNumber::Overflow)?;

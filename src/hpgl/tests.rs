@@ -290,7 +290,7 @@ fn numbers_that_say_what_is_so_anyway_are_taken() {
     );
     assert!(actions(format!("{triangle}FP1;OE;").as_bytes()).ends_with("'3'"));
     assert_eq!(actions(b"LT2,4,0;PD300,0;OE;"), actions(b"LT2,4;PD300,0;OE;"));
-    assert!(actions(b"LT2,4,1;OE;").ends_with("'3'"));
+    assert!(actions(b"LT2,4,2;OE;").ends_with("'3'"));
 }
 
 #[test]
@@ -421,6 +421,34 @@ fn letters_of_labels_are_those_of_utf_8_or_of_latin_1() {
             assert!(label(latin_1).ends_with(&format!(" {columns},100>0,0")), "{utf_8}");
         }
     }
+}
+
+#[test]
+fn the_length_of_a_pattern_may_be_in_mm() {
+    // As KiCad writes it: 4 mm are 160 units.
+    assert_eq!(actions(b"LT -2 4 1;PD200,0;LT;PD0,0;"), "0,0>80,0 160,0>200,0 200,0>0,0");
+    assert_eq!(actions(b"LT2,4,1;LT2;PD100,0;"), "0,0>80,0", "the length stays");
+    assert_eq!(actions(b"IP0,0,300,400;LT2,4,1;LT2,32,0;PD100,0;"), "0,0>80,0");
+    assert_eq!(actions(b"LT2,4,2;OE;"), "'3'");
+}
+
+#[test]
+fn chords_may_be_chosen_by_how_far_they_are_off() {
+    let count = |text: &str| actions(format!("PU5000,5000;{text}").as_bytes()).matches('>').count();
+    for (radius, most) in [(1000, 1), (1000, 5), (1000, 30), (1000, 500), (40, 5), (300, 300)] {
+        let chords = count(&format!("CT1;CI{radius},{most};"));
+        let angle = std::f64::consts::TAU / chords as f64;
+        let off = f64::from(radius) * (1.0 - (angle / 2.0).cos());
+        assert!(chords > 2 && off <= f64::from(most), "{radius} {most}: {chords} {off}");
+        assert!(f64::from(most) < off * 4.5, "{radius} {most}: {chords} {off}");
+    }
+    assert_eq!(count("CT1;SC0,100,0,100;CI10,1;SC;"), count("CT1;CI1000,100;"));
+    // Angles are the default, and polygons follow, too.
+    assert_eq!(count("CI1000,5;"), 72);
+    assert_eq!(count("CT1;CT;CI1000,5;"), 72);
+    assert_eq!(count("CT1;DF;CI1000,5;"), 72);
+    assert_eq!(count("CT1;PM0;CI1000,5;PM2;EP;"), count("CT1;CI1000,5;"));
+    assert_eq!(actions(b"CT2;OE;CT1,1;OE;"), "'3' '2'");
 }
 
 #[test]

@@ -311,3 +311,12 @@ fn labels_of_latin_1_are_drawn_as_those_of_utf_8() {
     let error = sent("a.plt", b"PU40,40;PE\xFF;PD5,5;").expect_err("refused");
     assert!(error.contains("the byte 0xFF"), "{error}");
 }
+
+#[test]
+fn patterns_in_mm_and_chords_by_their_distance_are_drawn() {
+    let dashes = lines("PU0,0;LT -2 4 1;PD400,0;");
+    assert_eq!(dashes.iter().filter(|line| line.starts_with("l ")).count(), 3);
+    let count = |text: &str| lines(text).iter().filter(|line| line.starts_with("v ")).count();
+    assert!(count("PU400,400;CT1;CI200,100;") < 6);
+    assert_eq!(count("PU400,400;CI200,10;"), 36);
+}
