@@ -149,10 +149,9 @@ impl<I: Index> Inner<'_, I> {
         }
         if let State::Alarm(_) | State::Sleep = self.machine.state() {
             // What comes behind it draws only where it lowers the pen, which is raised.
-            let mut program = self.program;
-            program.raise_pen();
-            self.note_shift(&program);
-            self.program = program;
+            if self.program.raise_pen() {
+                self.report_counts.overrides = 0;
+            }
         }
         let pen = self.machine.pen_wanted();
         if pen != self.pen_reported {
@@ -278,7 +277,10 @@ impl<I: Index> Inner<'_, I> {
         match listing {
             Listing::Help => {
                 line(format_args!("{GRBL_HELP}"));
-                help(&mut |usage, meaning| line(format_args!("[HLP:{usage} {meaning}]")));
+                help(&mut |usage, meaning| match cfg!(feature = "command-help") {
+                    true => line(format_args!("[HLP:{usage} {meaning}]")),
+                    false => line(format_args!("[HLP:{usage}]")),
+                });
             }
             Listing::Settings { named } => {
                 for (info, value) in self.machine.settings().iter() {

@@ -132,66 +132,89 @@ pub enum Command<'a> {
     GCode(GCode<'a>),
 }
 
+/// What a command means, for the list of `$`. On a board without room for these texts it is empty.
+pub(crate) const fn meaning(text: &'static str) -> &'static str {
+    if cfg!(feature = "command-help") { text } else { "" }
+}
+
 /// The `$` commands and G-code words, each with its meaning, as `$` lists them. It lists the
 /// options of a plot between the two parts.
 pub const HELP: [&[(&str, &str)]; 2] = [
     &[
-        ("$", "this list"),
-        ("$I", "version, board and limits; $I=TEXT adds a text of yours"),
-        ("$$", "settings of the machine; $NUMBER=VALUE changes one"),
-        ("$settings", "the same with their names and units"),
-        ("$#", "coordinate systems, kept positions and offsets"),
-        ("$G", "modes of G-code"),
-        ("$N", "G-code at the start, such as G20; $N0=LINE and $N1=LINE set it"),
-        ("$RST=$|#|*", "defaults again: settings, coordinates, or these and the texts"),
-        ("$options", "what is drawn and how, as it stands"),
+        ("$", meaning("this list")),
+        ("$I", meaning("version, board and limits; $I=TEXT adds a text of yours")),
+        ("$$", meaning("settings of the machine; $NUMBER=VALUE changes one")),
+        ("$settings", meaning("the same with their names and units")),
+        ("$#", meaning("coordinate systems, kept positions and offsets")),
+        ("$G", meaning("modes of G-code")),
+        ("$N", meaning("G-code at the start, such as G20; $N0=LINE and $N1=LINE set it")),
+        ("$RST=$|#|*", meaning("defaults again: settings, coordinates, or these and the texts")),
+        ("$options", meaning("what is drawn and how, as it stands")),
     ],
     &[
-        ("$model", "size of the model against the limits"),
-        ("$clear", "forget the model"),
+        ("$model", meaning("size of the model against the limits")),
+        ("$clear", meaning("forget the model")),
         (
             "$list=v|l|f|c,FIRST,LAST",
-            "vertices, bars, faces or curves with their numbers; without numbers all",
+            meaning("vertices, bars, faces or curves with their numbers; without numbers all"),
         ),
-        ("$delete=v|l|f|c,FIRST,LAST", "take some out; the numbers above fall"),
-        ("$plug=v|l|f|c,NUMBER", "take one out; the last takes its number"),
-        ("$move=NUMBER,X,Y,Z", "move a vertex to a position"),
-        ("$translate=X,Y,Z,FIRST,LAST", "shift vertices; without numbers all, here and below"),
-        ("$scale=X,Y,Z,FIRST,LAST", "multiply coordinates"),
-        ("$rotate=x|y|z,DEGREES,FIRST,LAST", "turn about an axis"),
+        ("$delete=v|l|f|c,FIRST,LAST", meaning("take some out; the numbers above fall")),
+        ("$plug=v|l|f|c,NUMBER", meaning("take one out; the last takes its number")),
+        ("$move=NUMBER,X,Y,Z", meaning("move a vertex to a position")),
+        (
+            "$translate=X,Y,Z,FIRST,LAST",
+            meaning("shift vertices; without numbers all, here and below"),
+        ),
+        ("$scale=X,Y,Z,FIRST,LAST", meaning("multiply coordinates")),
+        ("$rotate=x|y|z,DEGREES,FIRST,LAST", meaning("turn about an axis")),
         (
             "$mirror=A,B,C,FIRST,LAST",
-            "add the image about the plane of three vertices, joined on the plane",
+            meaning("add the image about the plane of three vertices, joined on the plane"),
         ),
-        ("$reflect=A,B,C,FIRST,LAST", "move to the image about the plane of three vertices"),
-        ("$undo", "take back the last change of the model, unless a plot came after"),
-        ("$plot", "draw it"),
-        ("$again", "draw the last job again, also after a loss of power"),
-        ("$resume", "go on with the job that a loss of power or a reset stopped, after $H"),
-        ("$resume=origin", "the same where you have put the pen at the origin by hand"),
+        (
+            "$reflect=A,B,C,FIRST,LAST",
+            meaning("move to the image about the plane of three vertices"),
+        ),
+        ("$undo", meaning("take back the last change of the model, unless a plot came after")),
+        ("$plot", meaning("draw it")),
+        ("$again", meaning("draw the last job again, also after a loss of power")),
+        (
+            "$resume",
+            meaning("go on with the job that a loss of power or a reset stopped, after $H"),
+        ),
+        ("$resume=origin", meaning("the same where you have put the pen at the origin by hand")),
         #[cfg(feature = "stream")]
-        ("$stream=…", "draw strokes that a computer sends by $s=…; $stream tells how many came"),
-        ("$X", "unlock after an alarm"),
-        ("$H", "find the limit switches"),
-        ("$J=G91 X.. Y.. F..", "move by hand with the pen up, F is needed; byte 0x85 ends it"),
-        ("$C", "begin or end to check only: nothing moves"),
-        ("$SLP", "switch the motors off; $X wakes"),
+        (
+            "$stream=…",
+            meaning("draw strokes that a computer sends by $s=…; $stream tells how many came"),
+        ),
+        ("$X", meaning("unlock after an alarm")),
+        ("$H", meaning("find the limit switches")),
+        (
+            "$J=G91 X.. Y.. F..",
+            meaning("move by hand with the pen up, F is needed; byte 0x85 ends it"),
+        ),
+        ("$C", meaning("begin or end to check only: nothing moves")),
+        ("$SLP", meaning("switch the motors off; $X wakes")),
         #[cfg(feature = "hpgl")]
-        ("$hpgl", "HP-GL from now on, until ctrl-X or a line that begins with $"),
-        ("$UF2", "become the drive onto which a new image is copied, where the board has one"),
+        ("$hpgl", meaning("HP-GL from now on, until ctrl-X or a line that begins with $")),
+        (
+            "$UF2",
+            meaning("become the drive onto which a new image is copied, where the board has one"),
+        ),
         (
             "G0 | G1 | G2 | G3 | G4 | G20 | G21 | G28 | G90 | G91",
-            "move, arc, wait, inches, mm, park, absolute, relative",
+            meaning("move, arc, wait, inches, mm, park, absolute, relative"),
         ),
         (
             "G10 | G53 | G54 | G92 | G28.1 | G30 | G30.1 | G43.1",
-            "coordinate systems and kept positions",
+            meaning("coordinate systems and kept positions"),
         ),
         (
             "X1 | Y1 | I1 | J1 | R1 | P1 | F1 | Z1",
-            "numbers of the former; Z0 and below is pen down, see $206",
+            meaning("numbers of the former; Z0 and below is pen down, see $206"),
         ),
-        ("M0 | M2 | M3 | M5", "pause until ~, end, pen down, pen up"),
+        ("M0 | M2 | M3 | M5", meaning("pause until ~, end, pen down, pen up")),
     ],
 ];
 

@@ -26,6 +26,7 @@ pub use alarm::AlarmEntry;
 #[cfg(any(test, feature = "host"))]
 pub use alarm::alarm_entries;
 pub use block_error::BlockError;
+pub(crate) use command::meaning;
 pub use command::{Command, HELP};
 pub use command_error::{CommandError, ErrorEntry};
 #[cfg(feature = "tiles")]

@@ -7,7 +7,7 @@ use crate::array::MapEach;
 use crate::fixed::{Length, Millimetres, SixDecimals};
 use crate::host_only::HostOnly;
 use crate::order::{Method, Shape};
-use crate::protocol::{CommandError, Escape, numbers, positive};
+use crate::protocol::{CommandError, Escape, meaning, numbers, positive};
 
 /// The heading in the client's help of the options that say from where and how the model is seen.
 const CAMERA: &str = "Camera";
@@ -27,14 +27,14 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "eye",
         values: &["X,Y,Z"],
-        help: "where you look from",
+        help: meaning("where you look from"),
         kind: Kind::Position(|options| &mut options.eye),
         flag: client(Flag::new(CAMERA, "Where the eye is [default: a three-quarter view]")),
     },
     PlotOption {
         name: "at",
         values: &["X,Y,Z"],
-        help: "what you look at",
+        help: meaning("what you look at"),
         kind: Kind::Position(|options| &mut options.at),
         flag: client(Flag::new(
             CAMERA,
@@ -44,14 +44,14 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "up",
         values: &["X,Y,Z"],
-        help: "which way is up",
+        help: meaning("which way is up"),
         kind: Kind::Position(|options| &mut options.up),
         flag: client(Flag::new(CAMERA, "The direction that is up in the picture [default: 0,0,1]")),
     },
     PlotOption {
         name: "angles",
         values: &["A,B,C"],
-        help: "look along z after turning by C about z, B about y, A about x, in degrees",
+        help: meaning("look along z after turning by C about z, B about y, A about x, in degrees"),
         kind: Kind::Position(|options| &mut options.angles),
         flag: client(Flag::new(
             CAMERA,
@@ -62,7 +62,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "view",
         values: &["auto"],
-        help: "forget eye, at, up and angles: a three-quarter view",
+        help: meaning("forget eye, at, up and angles: a three-quarter view"),
         kind: Kind::Reset(|options| {
             (options.eye, options.at, options.up, options.angles) = (None, None, None, None);
         }),
@@ -71,7 +71,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "projection",
         values: ProjectionChoice::WORDS.split_at(5).0,
-        help: "how lines of sight run",
+        help: meaning("how lines of sight run"),
         kind: Kind::Other {
             set: |options, text| {
                 options.projection = ProjectionChoice::parse(text)?;
@@ -91,14 +91,14 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "projection",
         values: ProjectionChoice::WORDS.split_at(5).1,
-        help: "a parallel view by its direction",
+        help: meaning("a parallel view by its direction"),
         kind: Kind::Continued,
         flag: NO_FLAG,
     },
     PlotOption {
         name: "behind",
         values: &["clip", "refuse"],
-        help: "what becomes of what is behind the eye",
+        help: meaning("what becomes of what is behind the eye"),
         kind: Kind::Choice {
             get: |options| usize::from(!options.clip_behind),
             set: |options, at| options.clip_behind = at == 0,
@@ -111,7 +111,9 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "see",
         values: &["faces", "wire", "vertices", "edges"],
-        help: "any faces hide; nothing hides; one convex solid from its vertices, or its edges",
+        help: meaning(
+            "any faces hide; nothing hides; one convex solid from its vertices, or its edges",
+        ),
         kind: Kind::Choice {
             get: |options| options.see as usize,
             set: |options, at| {
@@ -136,7 +138,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "hidden",
         values: HiddenLines::WORDS,
-        help: "what becomes of hidden lines",
+        help: meaning("what becomes of hidden lines"),
         kind: Kind::Other {
             set: |options, text| {
                 options.hidden = HiddenLines::parse(text)?;
@@ -155,7 +157,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "seams",
         values: ON_OFF,
-        help: "whether the lines are drawn where faces pass through each other",
+        help: meaning("whether the lines are drawn where faces pass through each other"),
         kind: Kind::Choice {
             get: |options| usize::from(!options.seams),
             set: |options, at| options.seams = at == 0,
@@ -168,7 +170,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "blocks",
         values: &["separate", "merged"],
-        help: "whether blocks that touch are drawn as one shape",
+        help: meaning("whether blocks that touch are drawn as one shape"),
         kind: Kind::Choice {
             get: |options| usize::from(options.merged_blocks),
             set: |options, at| options.merged_blocks = at == 1,
@@ -181,7 +183,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "crease",
         values: &["DEGREES"],
-        help: "leave out edges between faces that bend less; 0 draws every edge",
+        help: meaning("leave out edges between faces that bend less; 0 draws every edge"),
         kind: Kind::Other {
             set: |options, text| {
                 let [degrees] = numbers(text)?;
@@ -201,8 +203,10 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "precision",
         values: &["auto", "LENGTH"],
-        help: "how far coordinates may be off: auto goes by their decimals, 0 takes them as they \
+        help: meaning(
+            "how far coordinates may be off: auto goes by their decimals, 0 takes them as they \
                stand",
+        ),
         kind: Kind::Other {
             set: set_precision,
             show: |options, formatter| match options.precision {
@@ -222,7 +226,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "pens",
         values: &["auto", "one"],
-        help: "whether usemtl, or else g, chooses pens, or one draws all",
+        help: meaning("whether usemtl, or else g, chooses pens, or one draws all"),
         kind: Kind::Choice {
             get: |options| usize::from(options.one_pen),
             set: |options, at| options.one_pen = at == 1,
@@ -239,7 +243,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "page",
         values: &["WIDTHxHEIGHT"],
-        help: "size of the sheet in mm",
+        help: meaning("size of the sheet in mm"),
         kind: Kind::Other {
             set: |options, text| {
                 let (width, height) = text.split_once(['x', 'X']).ok_or(CommandError::NotAPage)?;
@@ -264,7 +268,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "margin",
         values: &["MM"],
-        help: "what stays free on each side of the sheet",
+        help: meaning("what stays free on each side of the sheet"),
         kind: Kind::Length {
             least: Millimetres::ZERO,
             greatest: Millimetres::MAX,
@@ -278,7 +282,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "title",
         values: &["TEXT"],
-        help: "what stands below the drawing, the rest of the line; nothing for none",
+        help: meaning("what stands below the drawing, the rest of the line; nothing for none"),
         kind: Kind::Other {
             set: set_title,
             show: |options, formatter| write!(formatter, "{}", Escape(options.title.as_str())),
@@ -288,7 +292,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "title-size",
         values: &["MM"],
-        help: "height of its capitals, 1 to 100",
+        help: meaning("height of its capitals, 1 to 100"),
         kind: Kind::Length {
             least: Millimetres::ONE,
             greatest: Millimetres::const_from_int(100),
@@ -299,7 +303,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "fit",
         values: ON_OFF,
-        help: "scale a plan to the page, or draw it at true size",
+        help: meaning("scale a plan to the page, or draw it at true size"),
         kind: Kind::Choice {
             get: |options| usize::from(!options.fit),
             set: |options, at| options.fit = at == 0,
@@ -315,7 +319,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "order",
         values: &["auto", "greedy", "exact"],
-        help: "how the moves between strokes are chosen",
+        help: meaning("how the moves between strokes are chosen"),
         kind: Kind::Choice {
             get: |options| options.method as usize,
             set: |options, at| {
@@ -334,7 +338,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "cycle",
         values: ON_OFF,
-        help: "whether the pen returns to where it began",
+        help: meaning("whether the pen returns to where it began"),
         kind: Kind::Choice {
             get: |options| usize::from(options.shape == Shape::OpenPath),
             set: |options, at| {
@@ -349,8 +353,10 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "effort",
         values: &["auto", "NUMBER"],
-        help: "work to improve the order: auto stops when it no longer saves time; or distances \
+        help: meaning(
+            "work to improve the order: auto stops when it no longer saves time; or distances \
                tried for each move with the pen up, 0 takes the nearest next",
+        ),
         kind: Kind::Whole(|options| &mut options.effort),
         flag: client(Flag::new(
             ORDER,
@@ -362,7 +368,7 @@ pub const OPTIONS: &[PlotOption] = &[
     PlotOption {
         name: "lift",
         values: &["MM"],
-        help: "extra pen-up travel in mm that is accepted to save one lift, 0 to 1000",
+        help: meaning("extra pen-up travel in mm that is accepted to save one lift, 0 to 1000"),
         kind: Kind::Length {
             least: Millimetres::ZERO,
             greatest: Millimetres::const_from_int(1000),

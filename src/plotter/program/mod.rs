@@ -279,7 +279,7 @@ impl Program {
     /// As [`Program::after`].
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn after_jog(
-        self,
+        mut self,
         line: GCode<'_>,
         context: &Context<'_>,
     ) -> Result<(Self, PagePoint), CommandError> {
@@ -302,12 +302,11 @@ impl Program {
         jog.relative = block.relative.unwrap_or(jog.relative);
         let [x, y, z] = jog.destination(&block, context)?;
         let point = steps_at([x, y], context.settings.page_steps());
-        let mut jogged = Self { at: [x, y, z], move_feed: jog.feed, ..self };
         if block.has(b'Z') {
             // A person who moves Z by hand means to lift the pen: a jog never lowers it.
-            jogged.leave_height();
+            self.leave_height();
         }
-        Ok((jogged, point))
+        Ok((Self { at: [x, y, z], move_feed: jog.feed, ..self }, point))
     }
 
     /// Sets the modes of the line, and what its M3 to M9, S and T say.

@@ -265,13 +265,13 @@ impl Program {
     }
 
     /// Raises the pen, as M5 and Z do, because the machine has raised it in an alarm or in sleep.
-    /// The next program draws only where it puts the pen down.
-    pub(in crate::plotter) fn raise_pen(&mut self) {
-        self.spindle = 5;
+    /// The next program draws only where it puts the pen down. Returns whether M3 was in force.
+    pub(in crate::plotter) fn raise_pen(&mut self) -> bool {
         self.draws = false;
         self.pen.s_is_down = false;
         self.pen.waits = false;
         self.leave_height();
+        core::mem::replace(&mut self.spindle, 5) != 5
     }
 
     /// Raises the pen and forgets what the program has shown of it.
