@@ -118,7 +118,8 @@ impl ModelSource for Given<'_> {
 fn options(seed: u64) -> Options {
     let mut random = Random::new(!seed);
     let [with_hidden, with_seams, merged_blocks, with_crease] = [0; 4].map(|_| random.once_in(2));
-    let crease = with_crease.then_some(Crease { cosine: 1 << 19, depth_stretch: (1, 1) });
+    let crease =
+        with_crease.then_some(Crease { cosine: 1 << 19, depth_stretch: (1, 1), slants: [0; 2] });
     Options { with_hidden, with_seams, merged_blocks, crease }
 }
 
@@ -231,9 +232,11 @@ fn check_model(seed: u64) -> usize {
     with_model(seed, |model| {
         let Ok(view) = View::new(&camera(seed, model), model) else { return };
         let options = Options {
-            crease: options(seed)
-                .crease
-                .map(|crease| Crease { depth_stretch: view.depth_stretch(), ..crease }),
+            crease: options(seed).crease.map(|crease| Crease {
+                depth_stretch: view.depth_stretch(),
+                slants: view.slants(),
+                ..crease
+            }),
             ..options(seed)
         };
         let precision = model.precision();

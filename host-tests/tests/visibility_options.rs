@@ -180,6 +180,7 @@ fn a_ball_with_creases_only_is_its_outline() -> Result<(), VisibilityError> {
     let crease = Some(Crease {
         cosine: 908_093, // 30 degrees
         depth_stretch: view.depth_stretch(),
+        slants: [0; 2],
     });
     let options = Options { crease, ..Options::default() };
     let (_, all) = find(&view.vertices, &ball.corners, view.projection, Options::default())?;

@@ -198,7 +198,7 @@ impl Camera {
     /// # Errors
     /// See [`ViewError`].
     pub fn sight_lines(&self, fraction_bits: u32) -> Result<SightLines, ViewError> {
-        let Axes { directions: [right, up, forward], origin } = Axes::new(self)?;
+        let Axes { directions: [right, up, forward], origin, .. } = Axes::new(self)?;
         let position = origin.map(|coordinate| libm::ldexp(coordinate, fraction_bits as i32));
         let limit = libm::ldexp(1.0, 60);
         if self.lens.projection() == Projection::Perspective && largest_component(position) <= limit
@@ -219,9 +219,10 @@ impl Camera {
 /// The axes of the image and the point from which they are measured.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Axes {
-    /// The directions right, up and away from the eye. They have length 1, except for the slant of
-    /// an oblique lens.
+    /// The directions right, up and away from the eye. They have length 1, except for the slants.
     pub directions: [Direction; 3],
+    /// How much of the direction away from the eye is added to those right and up, within ±2.
+    pub slants: [f64; 2],
     /// The eye in perspective; otherwise the point looked at.
     pub origin: Direction,
 }
@@ -229,28 +230,29 @@ pub(super) struct Axes {
 impl Axes {
     /// Computes the axes from the point and the direction that the user chose, and the lens.
     pub fn new(camera: &Camera) -> Result<Self, ViewError> {
-        let (eye, at, [right, up, forward]) = match camera.pose {
+        let (eye, at, straight) = match camera.pose {
             Pose::Towards { eye, at, up } => (eye, at, towards(eye, at, up)?),
             Pose::Turned { eye, angles } => (eye, eye, turned(angles)),
         };
-        let directions = match camera.lens {
+        let slants = match camera.lens {
             Lens::Oblique { angle, ratio } => {
                 let (sin, cos) = sin_cos_degrees(angle);
-                let slanted = |mut axis: Direction, by: f64| {
-                    for (part, forward) in axis.iter_mut().zip(forward) {
-                        *part += ratio * by * forward;
-                    }
-                    axis
-                };
-                [slanted(right, cos), slanted(up, sin), forward]
+                [ratio * cos, ratio * sin]
             }
-            Lens::Perspective | Lens::Orthographic => [right, up, forward],
+            Lens::Perspective | Lens::Orthographic => [0.0; 2],
         };
         let origin = match camera.lens.projection() {
             Projection::Perspective => eye,
             Projection::Parallel => at,
         };
-        Ok(Self { directions, origin })
+        Ok(Self::slanted(straight, slants, origin))
+    }
+
+    /// Slants these directions right, up and away from the eye, which have length 1.
+    fn slanted([right, up, forward]: [Direction; 3], slants: [f64; 2], origin: Direction) -> Self {
+        let [along, upward] = slants;
+        let directions = [sum(right, along, forward), sum(up, upward, forward), forward];
+        Self { directions, slants, origin }
     }
 
     /// The axes of the parallel view that shows the same as the perspective one, if the eye is
@@ -269,10 +271,9 @@ impl Axes {
             return None;
         }
         // x/w and y/w around the centre, to the first order.
-        let slanted = |axis, beside: f64| sum(axis, -beside / depth, forward);
         // Measured from the model, because the eye may be as far as 10^15.
         let origin = sum(sum(sum([0.0; 3], x, right), y, up), z, forward);
-        Some(Self { directions: [slanted(right, across), slanted(up, above), forward], origin })
+        Some(Self::slanted(self.directions, [-across / depth, -above / depth], origin))
     }
 }
 

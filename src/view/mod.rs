@@ -65,6 +65,8 @@ pub struct View {
     image_unit: f64,
     /// What [`Self::depth_stretch`] returns: how much deeper the view is than the model.
     depth_stretch: (u32, u32),
+    /// What [`Self::slants`] returns: how much of the depth is added to width and height.
+    slants: [i32; 2],
     /// What [`Self::near`] returns: the least depth that is drawn.
     near: Option<i32>,
 }
@@ -160,7 +162,7 @@ impl View {
     #[cfg_attr(not(feature = "tiles"), inline(always))]
     fn of_extents(
         projection: Projection,
-        Axes { directions, origin }: Axes,
+        Axes { directions, slants, origin }: Axes,
         extents: [(f64, f64); 3],
         reach: f64,
         fraction_bits: u32,
@@ -207,8 +209,12 @@ impl View {
             }
             Projection::Parallel => (1.0 / scale, None),
         };
-        let depth_stretch = as_ratio(depth_scale / scale);
-        Ok(Self { rows, projection, image_unit, depth_stretch, near })
+        let stretch = depth_scale / scale;
+        let depth_stretch = as_ratio(stretch);
+        // The depth of a normal was divided by the exact stretch, not by the rounded one.
+        let unit = 256.0 * f64::from(depth_stretch.0) / stretch;
+        let slants = slants.map(|slant| libm::round(slant * unit) as i32);
+        Ok(Self { rows, projection, image_unit, depth_stretch, slants, near })
     }
 
     /// Returns the view coordinates of a position of the model.
@@ -287,6 +293,12 @@ impl View {
     /// two numbers from 1 to 2^20. It is needed to compute the angles between faces.
     pub fn depth_stretch(&self) -> (u32, u32) {
         self.depth_stretch
+    }
+
+    /// Returns the slants of an oblique view, which are needed to compute the angles between faces.
+    /// See [`Crease::slants`](crate::visibility::Crease::slants).
+    pub fn slants(&self) -> [i32; 2] {
+        self.slants
     }
 
     /// Returns the factor by which x/w and y/w are multiplied to give coordinates on the image

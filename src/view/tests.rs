@@ -63,7 +63,8 @@ fn images_are_those_of_the_formula() {
             ] {
                 let camera = Camera { lens, ..camera(eye, at) };
                 let view = View::new(&camera, model).unwrap();
-                let Axes { directions: [right, up, forward], origin } = Axes::new(&camera).unwrap();
+                let Axes { directions: [right, up, forward], origin, .. } =
+                    Axes::new(&camera).unwrap();
                 let unit = libm::ldexp(1.0, -(model.fraction_bits() as i32));
                 for position in model.vertices() {
                     let p = position.coordinates().map(|c| f64::from(c) * unit);

@@ -23,6 +23,11 @@ pub struct Crease {
     /// (7, 2) if what is 2 units long across the view is 7 units long in depth. Each number is from
     /// 1 to 2^20.
     pub depth_stretch: (u32, u32),
+    /// How an oblique view slants the normals of faces. With slants of \[s, t\] and a stretch of
+    /// (d, w), the normal (x, y, z) in the view is (w x, w y, d z + (s x + t y) / 256) in the
+    /// model. Both are zero if the lines of sight are at right angles to the page, or meet in the
+    /// eye.
+    pub slants: [i32; 2],
 }
 
 impl Crease {
@@ -50,16 +55,19 @@ impl Crease {
             Projection::Parallel => normal[2].signum(),
         };
         let is_drawn = facing(one) * facing(other) <= 0
-            || self.is_sharp(self.unstretched(one), self.unstretched(other));
+            || self.is_sharp(self.in_model(one), self.in_model(other));
         let is_folded = || dot(one, other) <= 0;
         is_drawn && (is_folded() || !are_one_plane())
     }
 
     /// Returns the normal of a face as it is in the model, given the one in the view, whose depth
-    /// is stretched. Only its direction is kept; its components are below 2^20.
-    fn unstretched(&self, normal: [i64; 3]) -> [i64; 3] {
+    /// is stretched and slanted. Only its direction is kept; its components are below 2^20.
+    fn in_model(&self, normal: [i64; 3]) -> [i64; 3] {
         let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
-        let exact = [0, 1, 2].map_each(|n| product(normal[n], i64::from(by[n])));
+        // A part is below 2^57 (see `areas`), and each of its factors below 2^32.
+        let mut exact = [0, 1, 2].map_each(|n| product(normal[n], i64::from(by[n]) << 8));
+        exact[2] += product(normal[0], self.slants[0].into());
+        exact[2] += product(normal[1], self.slants[1].into());
         // It has as many bits as the largest part.
         let all = exact.iter().fold(0, |all, part| all | part.unsigned_abs());
         let excess = (128 - all.leading_zeros()).saturating_sub(20);
@@ -81,13 +89,16 @@ impl Crease {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::{Precision, page_side};
+    use crate::model::{Position, Positions};
+    use crate::view::{Camera, Lens, Pose, View};
 
     const AT: Vertex = Vertex::new(0, 0, 1000);
 
     /// Whether a crease keeps the edge along y that two triangles share; they rise by `left` and
     /// `right` over 1000 units across.
     fn draws(cosine: i32, depth_stretch: (u32, u32), left: i32, right: i32) -> bool {
-        let crease = Crease { cosine, depth_stretch };
+        let crease = Crease { cosine, depth_stretch, slants: [0; 2] };
         let far = Vertex::new(0, 500, 1000);
         let one = [AT, far, Vertex::new(-1000, 0, 1000 - left)];
         let other = [far, AT, Vertex::new(1000, 0, 1000 - right)];
@@ -113,7 +124,7 @@ mod tests {
 
     #[test]
     fn one_plane_has_no_crease_unless_it_is_folded() {
-        let crease = Crease { cosine: 1 << 20, depth_stretch: (1, 1) };
+        let crease = Crease { cosine: 1 << 20, depth_stretch: (1, 1), slants: [0; 2] };
         let far = Vertex::new(0, 500, 1000);
         for (across, is_one_plane, is_drawn) in
             [(1000, true, false), (1000, false, true), (-1000, true, true)]
@@ -134,7 +145,7 @@ mod tests {
 
     #[test]
     fn a_silhouette_is_drawn_however_blunt() {
-        let crease = Crease { cosine: -(1 << 20), depth_stretch: (1, 1) };
+        let crease = Crease { cosine: -(1 << 20), depth_stretch: (1, 1), slants: [0; 2] };
         let far = Vertex::new(0, 500, 1000);
         let one = [AT, far, Vertex::new(-1000, 0, 0)];
         for (tip, is_drawn) in [(-1, true), (0, true), (1, false)] {
@@ -151,5 +162,115 @@ mod tests {
                 crease.draws(Projection::Parallel, AT, [&mut both.0, &mut both.1], true, &|| false);
             assert_eq!(kept, is_drawn, "{tip}");
         }
+    }
+
+    /// The largest coordinate of the models of [`Bend`].
+    const LARGEST: f64 = 67_108_864.0;
+
+    /// Two triangles of a model: the ends of their common edge, and the third corner of each.
+    struct Bend([[i32; 3]; 4]);
+
+    impl Bend {
+        /// The angle between the normals of the two triangles, in degrees. `None` if one of them is
+        /// narrower than `least`, so that the rounding of the view turns it.
+        fn degrees(&self, least: f64) -> Option<f64> {
+            let [from, to, one, other] = self.0.map(|at| at.map(f64::from));
+            let difference = |to: [f64; 3], a: [f64; 3]| [0, 1, 2].map(|n| to[n] - a[n]);
+            let cross = |u: [f64; 3], v: [f64; 3]| {
+                [[1, 2], [2, 0], [0, 1]].map(|[m, n]: [usize; 2]| u[m] * v[n] - u[n] * v[m])
+            };
+            let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
+            let [along, one, other] = [to, one, other].map(|end| difference(end, from));
+            let [one, other] = [cross(along, one), cross(other, along)];
+            let is_wide = |normal| dot(normal, normal) > dot(along, along) * least.powi(2);
+            let cosine = dot(one, other) / (dot(one, one) * dot(other, other)).sqrt();
+            (is_wide(one) && is_wide(other) && dot(along, along) > least.powi(2))
+                .then(|| cosine.acos().to_degrees())
+        }
+    }
+
+    impl Positions for Bend {
+        fn fraction_bits(&self) -> u32 {
+            0
+        }
+
+        fn bounds(&self) -> Option<(Position, Position)> {
+            let limit = |choose: fn(i32, i32) -> i32| {
+                let [x, y, z] =
+                    [0, 1, 2].map(|n| self.0.iter().map(|at| at[n]).reduce(choose).unwrap());
+                Position { x, y, z }
+            };
+            Some((limit(i32::min), limit(i32::max)))
+        }
+
+        fn positions(&self) -> impl Iterator<Item = Position> {
+            self.0.into_iter().map(|[x, y, z]| Position { x, y, z })
+        }
+
+        fn precision(&self) -> Precision {
+            Precision::default()
+        }
+    }
+
+    /// Random bends in random parallel views: straight ones, oblique ones, and those of an eye very
+    /// far away that looks aside. Some of the models are flat and seen from their front.
+    #[test]
+    fn the_angle_in_the_model_decides_in_every_parallel_view() {
+        let mut state = 1u64;
+        let mut random = move || {
+            state = state.wrapping_mul(0x5851_F42D_4C95_7F2D).wrapping_add(0x1405_7B7E_F767_814F);
+            (state >> 33) as f64 / f64::from(1u32 << 30) - 1.0
+        };
+        let mut counts = [[0; 2]; 4];
+        for n in 0..40_000 {
+            let kind = n % 4;
+            let flatness = if kind == 3 { 128.0 } else { 1.0 };
+            let mut point = |limit: f64| [(); 3].map(|()| limit * random());
+            let mut corners = [(); 4].map(|()| point(LARGEST));
+            if kind == 3 {
+                // One face is nearly parallel to the page, the other a wall from its edge on.
+                corners.iter_mut().for_each(|corner| corner[1] /= flatness);
+                let beside = point(LARGEST / flatness);
+                corners[3] =
+                    [0, 1, 2].map(|n| f64::midpoint(corners[0][n], corners[1][n]) + beside[n]);
+            }
+            let bend = Bend(corners.map(|corner| corner.map(|part| part as i32)));
+            let (eye, at, up) = match kind {
+                2 => (point(1e13), point(1e13), point(1.0)),
+                3 => ([0.0, -1.0, 0.0], [0.0; 3], [0.0, 0.0, 1.0]),
+                _ => (point(1.0), [0.0; 3], point(1.0)),
+            };
+            let lens = match kind {
+                0 => Lens::Orthographic,
+                2 => Lens::Perspective,
+                _ => Lens::Oblique { angle: 180.0 * random(), ratio: 1.0 + random() },
+            };
+            let pose = Pose::Towards { eye, at, up: Some(up) };
+            let Ok(view) = View::new(&Camera { pose, lens }, &bend) else { continue };
+            let (limit, margin) = (90.0 + 90.0 * random(), if kind == 3 { 0.2 } else { 0.05 });
+            let Some(degrees) = bend.degrees(LARGEST / 16.0 / flatness) else { continue };
+            if (degrees - limit).abs() < margin {
+                continue;
+            }
+            if view.projection() == Projection::Perspective {
+                continue;
+            }
+            let [from, to, one, other] = bend.0.map(|[x, y, z]| view.vertex(Position { x, y, z }));
+            let crease = Crease {
+                cosine: (limit.to_radians().cos() * 1_048_576.0).round() as i32,
+                depth_stretch: view.depth_stretch(),
+                slants: view.slants(),
+            };
+            let faces: [&mut dyn Iterator<Item = Vertex>; 2] =
+                [&mut [from, to, one].into_iter(), &mut [to, from, other].into_iter()];
+            let found = crease.draws(Projection::Parallel, to, faces, false, &|| false);
+            let side = |tip: Vertex| page_side(Projection::Parallel, from, to, tip).signum();
+            let is_outline = side(one) * side(other) >= 0;
+            assert_eq!(found, is_outline || degrees > limit, "{n}: {degrees} {limit} {view:?}");
+            if !is_outline {
+                counts[kind][usize::from(found)] += 1;
+            }
+        }
+        assert!(counts.iter().flatten().all(|&count| count > 300), "{counts:?}");
     }
 }

@@ -452,8 +452,11 @@ mod tests {
                 with_hidden: seed.is_multiple_of(2),
                 with_seams: true,
                 merged_blocks: seed % 5 == 1,
-                crease: (seed % 7 == 2)
-                    .then_some(Crease { cosine: 992_000, depth_stretch: (1, 1) }),
+                crease: (seed % 7 == 2).then_some(Crease {
+                    cosine: 992_000,
+                    depth_stretch: (1, 1),
+                    slants: [0; 2],
+                }),
             };
             // Boards know no boxes of faces, so each seam is looked for there.
             let (corners, wide_corners) = (balls.corners::<u16>(), balls.corners::<u32>());

@@ -188,6 +188,7 @@ impl PlotOptions {
         let crease = (self.crease > 0.0).then(|| Crease {
             cosine: libm::round(sin_cos_degrees(bend).1 * 1_048_576.0) as i32,
             depth_stretch: view.depth_stretch(),
+            slants: view.slants(),
         });
         let with_hidden = self.hidden != HiddenLines::Erased;
         visibility::Options {

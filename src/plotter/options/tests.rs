@@ -1,4 +1,6 @@
 use super::*;
+use crate::geometry::{Projection, Vertex};
+use crate::model::{Corner, Model, Position, no_undo};
 use crate::view::Lens;
 use std::format;
 use std::string::{String, ToString};
@@ -102,5 +104,31 @@ fn a_flag_explains_each_choice() {
         let Some(flag) = option.flag.get() else { continue };
         let explained = flag.choices.len();
         assert!(explained == 0 || explained == option.values.len(), "{}", option.name);
+    }
+}
+
+/// The inner edges of a cube bend by 90 degrees, in oblique views, too.
+#[test]
+fn an_oblique_view_keeps_the_creases_of_a_cube() {
+    let mut memory = ([Position::ORIGIN; 8], [<Corner>::ZERO; 2]);
+    let mut cube = Model::new(&mut memory.0, &mut memory.1);
+    for at in ["0 0 0", "1 0 0", "0 0 1", "0 1 1", "1 1 1", "1 0 1"] {
+        let mut at = at.split(' ').map(|part| Decimal::parse(part).unwrap());
+        cube.add_vertex([(); 3].map(|()| at.next().unwrap()), &mut no_undo).unwrap();
+    }
+    for projection in ["orthographic", "cavalier", "cabinet", "oblique,30,2"] {
+        for (crease, is_drawn) in [("60", true), ("90", true), ("91", false)] {
+            let mut options = with("projection", projection).unwrap();
+            options.set("crease", crease).unwrap();
+            let view = View::new(&options.camera(&cube).unwrap(), &cube).unwrap();
+            let corners = [0, 1, 2, 3, 4, 5].map(|n| view.vertex(cube.vertices()[n]));
+            let [a, b, c, d, e, f] = corners;
+            // The front and the top have the edge from c to f in common.
+            let faces: [&mut dyn Iterator<Item = Vertex>; 2] =
+                [&mut [a, b, f, c].into_iter(), &mut [c, f, e, d].into_iter()];
+            let crease = options.visibility(&view).crease.unwrap();
+            let found = crease.draws(Projection::Parallel, f, faces, false, &|| false);
+            assert_eq!(found, is_drawn, "{projection} {crease:?}");
+        }
     }
 }
