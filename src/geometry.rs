@@ -258,7 +258,8 @@ pub fn plane_side_margin(a: Vertex, b: Vertex, c: Vertex, d: Vertex, error_bound
     if error_bound == 1 {
         first + 6
     } else {
-        first.saturating_add((6 * error_bound).saturating_mul(error_bound * error_bound))
+        let third = (6 * error_bound).saturating_mul(error_bound).saturating_mul(error_bound);
+        first.saturating_add(third)
     }
 }
 

@@ -68,6 +68,25 @@ fn the_margin_of_a_plane_grows_with_the_differences_of_each_coordinate() {
 }
 
 #[test]
+fn the_margin_of_a_plane_saturates_at_every_error_bound() {
+    // Up to 2^21 the parts of a difference are joined bit by bit.
+    for most in [0, 1, 1000, 2 * COORDINATE_LIMIT - 1, 2 * COORDINATE_LIMIT] {
+        let b = Vertex::new(most - COORDINATE_LIMIT, 5, 5);
+        let a = Vertex::new(-COORDINATE_LIMIT, 5, 5);
+        // The squares of the error bounds after the fifth exceed 2^63.
+        for error_bound in [1, 2, 65_535, 1_048_576, 3_037_000_499, 3_037_000_500, u32::MAX] {
+            let (m, d) = (i128::from(most), i128::from(error_bound));
+            let exact = 18 * d * m * (m + d) + 6 * d * d * d;
+            let margin = plane_side_margin(a, b, a, a, error_bound);
+            assert_eq!(i128::from(margin), exact.min(i64::MAX.into()), "{most} {error_bound}");
+        }
+    }
+    let [low, high] = [-COORDINATE_LIMIT, COORDINATE_LIMIT].map(|c| Vertex::new(c, c, c));
+    let skew = Vertex::new(COORDINATE_LIMIT - 1, 0, -1);
+    assert_eq!(plane_side_margin(low, high, skew, low, u32::MAX), i64::MAX);
+}
+
+#[test]
 fn a_plane_asks_the_same_as_four_points() {
     let mut state = 1u32;
     let mut random = || {
