@@ -179,6 +179,12 @@ impl PageMap {
         Ok(Self { a, b, k, window: None })
     }
 
+    /// Returns the binary logarithm of the scale, rounded down, plus one. Of two maps of one image
+    /// whose values differ by 3 or more, one has more than four times the scale of the other.
+    pub fn magnitude(&self) -> i32 {
+        64 - (self.a[0].leading_zeros() + self.k) as i32
+    }
+
     /// Makes the map take coordinates that are greater by a factor of 2^`bits`.
     fn coarsen(&mut self, bits: u32) {
         // (a p 2^-bits + b) / 2^k = (a p + b 2^bits) / 2^(k + bits)
