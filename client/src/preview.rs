@@ -14,20 +14,20 @@ use penup::geometry::{Projection, Vertex};
 use penup::index::Index;
 use penup::machine::{Path, Setting, Settings};
 use penup::motion::TICKS_PER_SECOND;
+use penup::order::{Shape, TimeModel};
 use penup::plotter::{Observer, Plotter, Unobserved};
 use penup::protocol::CommandError;
 use penup::stage::{Aborted, Cancel, Stage};
 use penup::view::View;
 use penup::visibility::{EdgeParameter, Stretch};
 use penup_job::machine_settings::is_grid;
-use penup_job::path::{PagePoint, Run};
+use penup_job::path::Run;
 use penup_job::protocol::{MODEL, PLOT};
 use penup_job::relooped::Relooped;
 use penup_job::results::{JobReport, JobResult, Lengths, Timings};
 use penup_job::room::Room;
-use penup_job::straight::{TOLERANCE, straightened};
 use penup_job::streamed::{Form, StreamError, StreamedJob};
-use penup_job::strokes::{Stroke, dashes_of, strokes_of};
+use penup_job::strokes::{dashes_of, has_several_pens, runs_of, strokes_of};
 use penup_readers::lines::Lines;
 use std::io;
 use std::time::{Duration, Instant};
@@ -160,7 +160,8 @@ impl<I: Index> InMemory<I> {
 
     /// What the drawing that was computed last leaves out of the model: sentences without a full
     /// stop. A plotter says the same when it draws by `$plot`.
-    pub fn left_out(&self) -> Vec<String> {
+    pub fn left_out(&mut self) -> Vec<String> {
+        let path = self.open_path();
         let job = self.plotter.job();
         let faces = match job.degenerate_faces() {
             0 => None,
@@ -173,7 +174,16 @@ impl<I: Index> InMemory<I> {
                 "edges are left out ({count}): within the precision, the faces beside them are one"
             )),
         };
-        faces.into_iter().chain(edges).collect()
+        faces.into_iter().chain(edges).chain(path).collect()
+    }
+
+    /// Says that no pen returns to where it began, if `--cycle` asks for that and the drawing that
+    /// was computed last has several pens.
+    pub fn open_path(&mut self) -> Option<String> {
+        let steps = self.plotter.machine().settings().page_steps();
+        let order = self.plotter.options().order(steps, TimeModel::default());
+        (order.shape == Shape::ClosedCycle && has_several_pens(&mut self.plotter.strokes()))
+            .then(|| "several pens draw it, so nothing is changed by --cycle".to_owned())
     }
 
     /// Computes the drawing of the model that was sent.
@@ -297,7 +307,7 @@ impl<I: Index> InMemory<I> {
             let dot = f64::from(settings.get(Setting::DotLength).to_bits()) / f64::from(1 << 16);
             let steps = self.steps_per_mm();
             let lines = self.with_strokes(|strokes| dashes_of(strokes, steps, dot));
-            runs(lines, 1.0 / steps[0])
+            runs_of(lines, 1.0 / steps[0])
         };
         Drawn { runs, steps, duration_s }
     }
@@ -313,12 +323,17 @@ impl<I: Index> InMemory<I> {
         self.compute(&mut watch, &mut segments)?;
         let timings_ms = watch.stop();
         let steps_per_mm = self.steps_per_mm();
-        let (stroke_pens, strokes): (Vec<u8>, Vec<_>) = self
+        let (mut stroke_pens, mut strokes): (Vec<u8>, Vec<_>) = self
             .with_strokes(|strokes| strokes_of(strokes, steps_per_mm))
             .into_iter()
             .map(|stroke| (stroke.pen, stroke.points))
             .unzip();
         let lengths = Lengths::of(&strokes);
+        // A return of the pen counts among the moves, and is no stroke.
+        if strokes.last().is_some_and(|points| points.len() == 1) {
+            strokes.pop();
+            stroke_pens.pop();
+        }
         Ok(JobResult {
             segments: segments.ends,
             segment_pens: segments.pens,
@@ -396,20 +411,6 @@ fn with_begins<R>(
         true => visit(&mut Relooped::of(&mut strokes)),
         false => visit(&mut strokes),
     }
-}
-
-/// The path of the pen that `strokes` describe, from the origin on.
-fn runs(strokes: Vec<Stroke>, step: f64) -> Vec<Run> {
-    let (mut runs, mut at, mut last_pen) = (Vec::new(), [0.0; 2], 1);
-    for Stroke { pen, points } in strokes {
-        let begin: PagePoint = points.first().copied().unwrap_or(at);
-        let end = points.last().copied().unwrap_or(begin);
-        runs.push(Run { pen_down: false, pen: last_pen, points: vec![at, begin] });
-        let points = straightened(&points, TOLERANCE * step);
-        runs.push(Run { pen_down: true, pen, points });
-        (at, last_pen) = (end, pen);
-    }
-    runs
 }
 
 /// Measures the computing time of each stage.

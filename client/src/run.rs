@@ -19,7 +19,7 @@ use crate::output::{self, STANDARD_OUTPUT};
 use crate::plot::{draw, plot, relooped};
 use crate::png::png;
 use crate::preview::{Drawn, InMemory};
-use crate::progress::{Bar, duration};
+use crate::progress::{Bar, Progress as _, duration};
 use crate::sender::{Sender, Timeouts};
 use crate::tape;
 use penup::index::Index;
@@ -203,6 +203,9 @@ fn show<I: Index>(
         let other = plotter.drawn();
         drawn.steps += u64::from(passes - 1) * other.steps;
         drawn.duration_s += f64::from(passes - 1) * other.duration_s;
+    }
+    if let Some(said) = plotter.open_path() {
+        bar.note(&said);
     }
     drop(bar);
     let Drawn { runs, steps, duration_s } = drawn;

@@ -145,9 +145,10 @@ impl Sheet {
         assert_eq!(drawn.len(), self.segments.len(), "a segment is missing");
         let mut moves: Vec<_> =
             tour.windows(2).map(|pair| (self.end(pair[0]), self.start(pair[1]))).collect();
-        if shape == Shape::ClosedCycle
-            && let (Some(&first), Some(&last)) = (tour.first(), tour.last())
-        {
+        let pen = self.segments.first().map(|segment| segment.pen());
+        let has_one_pen = self.segments.iter().all(|segment| Some(segment.pen()) == pen);
+        let is_closed = shape == Shape::ClosedCycle && has_one_pen;
+        if is_closed && let (Some(&first), Some(&last)) = (tour.first(), tour.last()) {
             moves.push((self.end(last), self.start(first)));
         }
         moves.retain(|(from, to)| from != to);

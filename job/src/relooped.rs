@@ -40,7 +40,14 @@ impl Relooped {
         let is_line = |before: &StreamedTarget, target: &StreamedTarget| {
             target.target.ink.is_some() && target.pen == before.pen
         };
+        let [begin, last] = [targets.first(), targets.last()].map(|it| it.map(|it| it.target));
         targets.chunk_by_mut(is_line).for_each(reloop);
+        // A pen that returns to where it began has now begun elsewhere.
+        if begin == last
+            && let [first, .., last] = &mut *targets
+        {
+            last.target = first.target;
+        }
         Self { targets, next: 0 }
     }
 }
@@ -134,6 +141,20 @@ mod tests {
         let rest = strokes[40..].concat();
         let rest = all(&mut Relooped::of(&mut TargetList::new(&rest)));
         assert_eq!(rest, relooped[relooped.len() - rest.len()..]);
+    }
+
+    #[test]
+    fn a_pen_that_returns_does_so_to_where_it_begins_now() {
+        let begin = loop_at(0, 7)[0];
+        let path = [loop_at(0, 7), loop_at(100, 5), vec![begin]].concat();
+        let relooped = all(&mut Relooped::of(&mut TargetList::new(&path)));
+        assert_ne!(relooped[0], begin);
+        assert_eq!(relooped[relooped.len() - 1], relooped[0]);
+        assert_eq!(relooped.len(), path.len());
+        // Another move at the end stays.
+        let path = [loop_at(0, 7), vec![loop_at(100, 5)[0]]].concat();
+        let relooped = all(&mut Relooped::of(&mut TargetList::new(&path)));
+        assert_eq!(relooped.last(), path.last());
     }
 
     #[test]

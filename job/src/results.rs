@@ -22,7 +22,7 @@ pub struct JobResult {
     /// The length drawn, in mm.
     pub pen_down_mm: f64,
     /// The length of the moves between strokes in mm, from the start of the first stroke to the end
-    /// of the last one.
+    /// of the last one, and of the return to that start, if there is one.
     pub pen_up_mm: f64,
     /// Harrison's drawing efficiency (5.7, equation 7): the length drawn divided by the length of
     /// all moves, 0 to 1.

@@ -1,6 +1,7 @@
 //! The strokes of a job, as a plotter will draw them.
 
-use crate::path::PagePoint;
+use crate::path::{PagePoint, Run};
+use crate::straight::{TOLERANCE, straightened};
 use penup::drawing::LineType;
 use penup::machine::{Path, Target};
 use penup::step::Pattern;
@@ -15,7 +16,7 @@ pub struct Stroke {
 }
 
 /// Reads the strokes of `path`, whose unit is the motor step; there are `steps` of them in a mm of
-/// x and of y.
+/// x and of y. If the pen returns to where it began, the last one is that single point.
 pub fn strokes_of(path: &mut dyn Path, steps: [f64; 2]) -> Vec<Stroke> {
     let mut strokes: Vec<Stroke> = Vec::new();
     while let Some(Target { point, ink }) = path.next_target() {
@@ -34,11 +35,20 @@ pub fn strokes_of(path: &mut dyn Path, steps: [f64; 2]) -> Vec<Stroke> {
     strokes
 }
 
+/// Whether several pens draw `path`, which is read to its end. The strokes of a pen follow each
+/// other.
+pub fn has_several_pens(path: &mut dyn Path) -> bool {
+    let first = path.next_target().map(|_| path.pen());
+    while path.next_target().is_some() {}
+    first.is_some_and(|first| first != path.pen())
+}
+
 /// The units of a length in a millimetre, in which dots and gaps are cut.
 const LENGTH_UNITS: f64 = (1 << 18) as f64;
 
 /// Reads the lines that the pen draws without being lifted: as [`strokes_of`], but each dot and
-/// each dash is a line of its own. Dots are about `dot` mm long.
+/// each dash is a line of its own, and so is the single point to which the pen returns. Dots are
+/// about `dot` mm long.
 pub fn dashes_of(path: &mut dyn Path, steps: [f64; 2], dot: f64) -> Vec<Stroke> {
     let mut lines: Vec<Stroke> = Vec::new();
     let mut from = [0.0; 2];
@@ -77,4 +87,21 @@ pub fn dashes_of(path: &mut dyn Path, steps: [f64; 2], dot: f64) -> Vec<Stroke> 
         from = to;
     }
     lines
+}
+
+/// The path of the pen that `strokes` describe, from the origin on, with steps of `step` mm.
+pub fn runs_of(strokes: Vec<Stroke>, step: f64) -> Vec<Run> {
+    let (mut runs, mut at, mut last_pen) = (Vec::new(), [0.0; 2], 1);
+    for Stroke { pen, points } in strokes {
+        let begin: PagePoint = points.first().copied().unwrap_or(at);
+        let end = points.last().copied().unwrap_or(begin);
+        runs.push(Run { pen_down: false, pen: last_pen, points: vec![at, begin] });
+        // A single point is where the pen returns to.
+        if points.len() > 1 {
+            let points = straightened(&points, TOLERANCE * step);
+            runs.push(Run { pen_down: true, pen, points });
+        }
+        (at, last_pen) = (end, pen);
+    }
+    runs
 }

@@ -141,7 +141,8 @@ impl Board {
     pub fn strokes(&mut self) -> Vec<f64> {
         let strokes = strokes_of(&mut self.plotter.strokes(), self.steps);
         let mut numbers = Vec::new();
-        for Stroke { pen, points } in strokes {
+        // A single point is where the pen returns to.
+        for Stroke { pen, points } in strokes.into_iter().filter(|it| it.points.len() > 1) {
             numbers.extend([f64::from(pen), points.len() as f64]);
             numbers.extend(points.into_iter().flatten());
         }

@@ -222,6 +222,9 @@ pub struct Report {
     pub bound: u64,
     /// Whether `pen_up` is proved to be the least possible: it equals `bound`.
     pub optimal: bool,
+    /// Whether a move with the pen up, which `lifts` and `pen_up` contain, leads from the end of
+    /// the tour back to its start.
+    pub returns: bool,
 }
 
 /// The reasons why a drawing cannot be ordered.
@@ -261,14 +264,18 @@ pub fn order<I: Index>(
         ..drawing
     };
     check(drawing, tour.len())?;
+    let pens = || drawing.segments.iter().map(|segment| segment.pen());
+    // With several pens, none returns to its own start.
+    let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
+    let options = Options { shape, ..options };
     let mut report = Report::default();
     order_pens(drawing, options, Anchor::default(), scratch, cancel, tour, &mut report)?;
-    measure(drawing, tour, options.shape, &mut report);
+    measure(drawing, tour, shape, &mut report);
     Ok(report)
 }
 
 /// Orders the segments of all pens, which must have been checked, and adds to `report` what is not
-/// measured in the end. The pen comes from `anchor`.
+/// measured in the end. The pen comes from `anchor`. Only the path of a single pen may be closed.
 #[cfg_attr(feature = "early-ink", inline(never))] // Its three callers share one copy of the code.
 #[cfg_attr(not(feature = "early-ink"), inline(always))]
 fn order_pens<I: Index>(
@@ -283,8 +290,6 @@ fn order_pens<I: Index>(
     let mut work_budget = WorkBudget::new(cancel);
     let mut rest = &mut *tour;
     let pens = || drawing.segments.iter().map(|segment| segment.pen());
-    // With several pens, none returns to its own start.
-    let shape = if pens().min() == pens().max() { options.shape } else { Shape::OpenPath };
     let mut next_pen = pens().min();
     let mut pen_at = anchor.place();
     let mut anchor = anchor;
@@ -292,7 +297,6 @@ fn order_pens<I: Index>(
         let count = pens().filter(|&other| other == pen).count();
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
-        let options = Options { shape, ..options };
         let scratch = scratch.reborrow();
         let from = core::mem::take(&mut anchor);
         order_pen(drawing, pen, options, from, scratch, &mut work_budget, legs, report)?;
@@ -482,7 +486,8 @@ fn measure<I: Index>(drawing: Drawing<'_, I>, tour: &[Leg<I>], shape: Shape, rep
         pen = position(leg.flipped());
     }
     if let Some(&leg) = closing {
-        report.lifts += u32::from(position(leg) != pen);
+        report.returns = position(leg) != pen;
+        report.lifts += u32::from(report.returns);
         report.pen_up += u64::from(length(pen, position(leg)));
     }
     report.optimal = report.pen_up == report.bound;

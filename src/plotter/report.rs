@@ -135,8 +135,9 @@ impl<I: Index> Inner<'_, I> {
         let contents = model.checksum();
         let options = self.options.checksum();
         Reply(board).line(format_args!("[MODEL:checksum {contents:08X}, options {options:08X}]"));
-        let order::Report { odd_points, components, pen_down, pen_up, lifts, bound, optimal } =
-            *self.known_job().report();
+        let order::Report {
+            odd_points, components, pen_down, pen_up, lifts, bound, optimal, ..
+        } = *self.known_job().report();
         Reply(board)
             .line(format_args!("[JOB:odd points {odd_points}, parts {components}, lifts {lifts}]"));
         // This converts from 1/256 step to 1/256 mm. Lengths are below 2^56.

@@ -96,7 +96,6 @@ fn unpacked(ring: &[u64], index: usize) -> Option<StreamedTarget> {
 impl<I: Index> Strokes<'_, I> {
     /// Returns the next target that was sent. A job of this kind has no strokes besides those that
     /// are sent.
-    #[inline(never)] // Other jobs come here once, at their end.
     pub(super) fn next_streamed(&mut self) -> Option<Target> {
         let StreamedTarget { target, pen } = self.streamed?.target(self.ring, self.cursor.leg)?;
         self.cursor.leg += 1;

@@ -127,7 +127,7 @@ impl<I: Index> Job<I> {
             report.odd_points,
             report.components,
             report.lifts,
-            u32::from(report.optimal),
+            u32::from(report.optimal) | u32::from(report.returns) << 1,
             low(report.pen_down),
             high(report.pen_down),
             low(report.pen_up),
@@ -140,8 +140,7 @@ impl<I: Index> Job<I> {
     /// The job with these figures, or `None` if its memory would be larger than any board's.
     /// Whatever the figures are, [`Job::strokes`] stays within its memory.
     pub(super) fn from_figures(figures: [u32; FIGURES]) -> Option<Self> {
-        let [segments, points, legs, odd_points, components, lifts, optimal, lengths @ ..] =
-            figures;
+        let [segments, points, legs, odd_points, components, lifts, signs, lengths @ ..] = figures;
         let [down, down_high, up, up_high, bound, bound_high] = lengths;
         let count =
             |count: u32| usize::try_from(count).ok().filter(|&count| count <= I::NONE.get());
@@ -153,7 +152,8 @@ impl<I: Index> Job<I> {
                 odd_points,
                 components,
                 lifts,
-                optimal: optimal != 0,
+                optimal: signs & 1 != 0,
+                returns: signs & 2 != 0,
                 pen_down: length(down, down_high),
                 pen_up: length(up, up_high),
                 bound: length(bound, bound_high),
@@ -239,6 +239,7 @@ impl<I: Index> Job<I> {
             drawing,
             tour,
             has_more,
+            returns: self.report.returns,
             cursor,
             ends,
             #[cfg(feature = "stream")]
@@ -267,6 +268,7 @@ impl<I: Index> Job<I> {
         Strokes {
             drawing,
             tour,
+            returns: self.report.returns,
             cursor,
             ends,
             #[cfg(feature = "stream")]

@@ -63,6 +63,8 @@ pub struct Strokes<'a, I = u16> {
     /// Whether more strokes follow, of which the order is not known yet.
     #[cfg(feature = "early-ink")]
     pub(in crate::plotter) has_more: bool,
+    /// Whether the pen goes back, behind the last stroke, to where the first one begins.
+    pub(super) returns: bool,
     /// The position up to which the strokes have been handed over.
     pub(in crate::plotter) cursor: &'a mut Cursor<I>,
     /// By how much the strokes are made longer, if they are.
@@ -157,6 +159,27 @@ impl<'a, I: Index> Strokes<'a, I> {
     }
 }
 
+impl<I: Index> Strokes<'_, I> {
+    /// The next target behind the legs of the tour: the return of the pen, or a target that was
+    /// sent.
+    #[inline(never)] // It is called where a job ends, and for strokes that are sent.
+    fn next_behind(&mut self) -> Option<Target> {
+        if self.returns && self.cursor.leg == self.tour.len() {
+            let (_, [begin, _]) = self.leg(0)?;
+            let point = match &self.ends {
+                Some(ends) => self.early(ends, 0)?,
+                None => *self.drawing.points.get(begin.get())?,
+            };
+            self.cursor.leg += 1;
+            return Some(Target { point, ink: None });
+        }
+        #[cfg(feature = "stream")]
+        return self.next_streamed();
+        #[cfg(not(feature = "stream"))]
+        None
+    }
+}
+
 impl<I: Index> Path for Strokes<'_, I> {
     // Where steps are planned, which is done for each chord.
     #[cfg_attr(not(feature = "lm3s6965"), inline(always))]
@@ -169,10 +192,7 @@ impl<I: Index> Path for Strokes<'_, I> {
             return Some(target);
         }
         let index = self.cursor.leg;
-        #[cfg(not(feature = "stream"))]
-        let (segment, [from, to]) = self.leg(index)?;
-        #[cfg(feature = "stream")]
-        let Some((segment, [from, to])) = self.leg(index) else { return self.next_streamed() };
+        let Some((segment, [from, to])) = self.leg(index) else { return self.next_behind() };
         let begins_here = self.cursor.at == Some(from);
         let number = if begins_here { to } else { from };
         let mut point = *self.drawing.points.get(number.get())?;

@@ -347,7 +347,7 @@ pub const OPTIONS: &[PlotOption] = &[
         },
         flag: client(Flag {
             is_switch: true,
-            ..Flag::new(ORDER, "Let the pen return to where it began")
+            ..Flag::new(ORDER, "Let the pen return to where it began, if one pen draws all")
         }),
     },
     PlotOption {

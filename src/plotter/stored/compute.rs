@@ -137,6 +137,8 @@ pub(super) fn next_part<I: Index>(
 ) -> Result<Option<Computed<I>>, CommandError> {
     let begin = search.tiles.index_words();
     let order = search.options.order(steps, search.time_model);
+    // No part is a path of its own to whose start the pen could return.
+    let order = order::Options { shape: order::Shape::OpenPath, ..order };
     loop {
         let count = if !search.tiles.is_over() {
             find_lines(model, search, words, cancel)?
