@@ -21,7 +21,7 @@ fn main() {
         let sheet = Sheet::from_obj(&text);
         for method in [Method::Auto] {
             for shape in [Shape::OpenPath, Shape::ClosedCycle] {
-                let options = Options { method, shape, effort, lift_cost };
+                let options = Options { method, shape, effort, lift_cost, ..Options::default() };
                 let (_, report) = sheet.order(options).expect("an order");
                 let mut memory = vec![0; 1 << 16];
                 let mut tour = vec![Leg::new(0, false); sheet.segments.len()];

@@ -91,6 +91,24 @@ fn the_pen_returns_to_where_it_began_and_the_report_counts_it() {
     assert!(answer.contains("|Drawn:3/3|"), "{answer}");
 }
 
+/// The report tells millimetres, however many steps they are.
+#[test]
+fn the_report_is_true_where_the_steps_of_x_and_y_differ() {
+    for (settings, steps) in [
+        ("$101=160\n", [80.0, 160.0]),
+        ("$100=160\n", [160.0, 80.0]),
+        ("$100=40\n$101=120\n$cycle=on\n", [40.0, 120.0]),
+    ] {
+        let mut bench = drawn(settings);
+        let (ends, [down, _]) = assert_true_report(&mut bench, steps);
+        assert_eq!(down, 166.0);
+        assert_eq!(ends[0] == ends[1], settings.contains("cycle"));
+        // The order is the best in steps, which is not proved to be the best in millimetres.
+        let answer = bench.say("$model\n");
+        assert!(answer.contains("bound 0.0 mm, not proved the least]"), "{answer}");
+    }
+}
+
 /// A single part that ends where it began needs no return.
 #[test]
 fn a_pen_that_is_back_already_makes_no_move() {

@@ -57,7 +57,7 @@ proptest! {
         shape in prop_oneof![Just(Shape::OpenPath), Just(Shape::ClosedCycle)],
     ) {
         let sheet = star(&points, side);
-        let options = Options { method, shape, effort: Effort::Units(0), lift_cost: 0 };
+        let options = Options { method, shape, effort: Effort::Units(0), ..Options::default() };
         let (_, report) = sheet.order(options).expect("an order");
         let least = least(&sheet, shape);
         prop_assert!(report.bound <= least && least <= report.pen_up);

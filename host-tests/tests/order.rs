@@ -25,15 +25,28 @@ fn polylines(reach: i32) -> impl Strategy<Value = Vec<Vec<(i32, i32)>>> {
 
 fn orders_everything(sheet: &Sheet) -> Result<(), OrderError> {
     for (method, shape) in ALL {
-        let (_, nearest_first) =
-            sheet.order(Options { method, shape, effort: Effort::Units(0), lift_cost: 0 })?;
-        let (_, improved) =
-            sheet.order(Options { method, shape, effort: Effort::Units(3), lift_cost: 0 })?;
+        let (_, nearest_first) = sheet.order(Options {
+            method,
+            shape,
+            effort: Effort::Units(0),
+            ..Options::default()
+        })?;
+        let (_, improved) = sheet.order(Options {
+            method,
+            shape,
+            effort: Effort::Units(3),
+            ..Options::default()
+        })?;
         if sheet.segments.iter().all(|segment| segment.pen() == 0) {
             assert!(improved.pen_up <= nearest_first.pen_up);
         }
-        let (_, seldom_lifted) =
-            sheet.order(Options { method, shape, effort: Effort::Units(3), lift_cost: 5 << 8 })?;
+        let (_, seldom_lifted) = sheet.order(Options {
+            method,
+            shape,
+            effort: Effort::Units(3),
+            lift_cost: 5 << 8,
+            ..Options::default()
+        })?;
         assert_eq!(improved.pen_down, nearest_first.pen_down);
         assert_eq!(seldom_lifted.pen_down, nearest_first.pen_down);
     }
@@ -215,7 +228,8 @@ proptest! {
         }
         let shape = if closed { Shape::ClosedCycle } else { Shape::OpenPath };
         for (method, effort) in [(Method::Auto, 200), (Method::Greedy, 0), (Method::Exact, 20)] {
-            let options = Options { method, shape, effort: Effort::Units(effort), lift_cost: 300 };
+            let (effort, lift_cost) = (Effort::Units(effort), 300);
+            let options = Options { method, shape, effort, lift_cost, ..Options::default() };
             let (tour, report) = sheet.order(options).expect("fits");
             let (wide, wide_report) = sheet.order_wide(options).expect("fits");
             prop_assert_eq!(report, wide_report);
@@ -233,7 +247,7 @@ proptest! {
         }
         prop_assert_eq!(orders_everything(&sheet), Ok(()));
         let (method, shape) = (Method::Auto, Shape::OpenPath);
-        let options = Options { method, shape, effort: Effort::Units(1), lift_cost: 0 };
+        let options = Options { method, shape, effort: Effort::Units(1), ..Options::default() };
         let (tour, _) = sheet.order(options).expect("as above");
         let pens = tour.iter().map(|leg| sheet.segments[leg.segment()].pen());
         prop_assert!(pens.is_sorted());

@@ -54,7 +54,8 @@ fn by_trial(costs: &[Vec<i64>]) -> i64 {
 
 fn compare(tips: &[PagePoint], shape: Shape, solve: fn(&[Vec<i64>]) -> i64) {
     let tips = &tips[..tips.len() & !1];
-    let options = Options { method: Method::Exact, shape, effort: Effort::Units(0), lift_cost: 0 };
+    let options =
+        Options { method: Method::Exact, shape, effort: Effort::Units(0), ..Options::default() };
     let (_, report) = star(tips).order(options).expect("plenty of memory");
     assert_eq!(report.pen_up as i64, solve(&costs(tips, shape)), "{shape:?}");
     assert!(report.optimal);

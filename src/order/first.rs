@@ -14,7 +14,7 @@
 //! No strokes are chosen if the order takes too little time to be worth it, or if the parts at the
 //! left end are too large to be ordered at once.
 
-use super::metric::length;
+use super::metric::{length, true_length, y_in_x};
 use super::network::{Anchor, pen_segments};
 use super::partition::Partition;
 use super::{EXACT_POINTS, Leg, Options, OrderError, Report, Shape, check, measure, order_pens};
@@ -330,7 +330,7 @@ pub fn order_rest<I: Index>(
     }
     report.odd_points += first.odd_points;
     report.components += first.parts;
-    Ok(measure_all(drawing, drawn, rest, report))
+    Ok(measure_all(drawing, drawn, rest, options, report))
 }
 
 /// Measures an open path that consists of two parts, and returns its report. What is not measured
@@ -339,6 +339,7 @@ pub(super) fn measure_all<I: Index>(
     drawing: Drawing<'_, I>,
     drawn: &[Leg<I>],
     rest: &[Leg<I>],
+    options: Options,
     report: Report,
 ) -> Report {
     let mut all = Report {
@@ -346,14 +347,15 @@ pub(super) fn measure_all<I: Index>(
         components: report.components,
         ..Report::default()
     };
+    let options = Options { shape: Shape::OpenPath, ..options };
     for legs in [drawn, rest] {
-        measure(drawing, legs, Shape::OpenPath, &mut all);
+        measure(drawing, legs, options, &mut all);
     }
     let end = drawn.last().and_then(|leg| end_of(drawing, *leg));
     let begin = rest.first().and_then(|leg| end_of(drawing, leg.flipped()));
     if let Some((end, begin)) = end.zip(begin).filter(|(end, begin)| end != begin) {
         all.lifts += 1;
-        all.pen_up += u64::from(length(end, begin));
+        all.pen_up += true_length(end, begin, y_in_x(options.steps));
     }
     Report { bound: 0, optimal: false, ..all }
 }

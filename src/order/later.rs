@@ -120,7 +120,7 @@ pub fn improve_rest<I: Index>(
     match improve_legs(drawing, drawn, options, scratch, cancel, rest) {
         Err(OrderError::Scratch(_)) => Ok(report),
         Err(error) => Err(error),
-        Ok(()) => Ok(measure_all(drawing, drawn, rest, report)),
+        Ok(()) => Ok(measure_all(drawing, drawn, rest, options, report)),
     }
 }
 

@@ -1,9 +1,14 @@
-//! Computes the distance between two points of the page, exactly and with integers only.
+//! Computes the distance between two points of the page, exactly and with integers only, and the
+//! lengths of a tour.
 //!
 //! Whatever orders strokes compares lengths of pen moves, so this is its most frequent computation.
 //! The square root avoids divisions, which small cores do not have.
 
-use crate::drawing::PagePoint;
+use super::network::start_point;
+use super::{Leg, Options, Report, Shape};
+use crate::array::MapEach as _;
+use crate::drawing::{Drawing, PagePoint, StepsPerMillimetre};
+use crate::index::Index;
 
 /// Returns the distance between two points of the page in 1/256 steps, rounded down.
 ///
@@ -18,6 +23,64 @@ use crate::drawing::PagePoint;
 /// ```
 pub fn length(a: PagePoint, b: PagePoint) -> u32 {
     root(square(a, b) << 16)
+}
+
+/// [`y_in_x`] where the steps of x and y are equal.
+const EQUAL: u32 = 1 << 20;
+
+/// How many steps of x are as long as a step of y, in units of 2^-20. It is [`EQUAL`] if the steps
+/// are not known.
+pub(crate) fn y_in_x([x, y]: StepsPerMillimetre) -> u32 {
+    let [x, y] = [x, y].map_each(|steps| u64::from(steps.to_bits().unsigned_abs()));
+    (x << 20).checked_div(y).unwrap_or(EQUAL.into()).min(u32::MAX.into()) as u32
+}
+
+/// Returns the distance between two points of the page in 1/256 steps of x, rounded down, where a
+/// step of y may have another length ([`y_in_x`]). For equal steps it is [`length`].
+#[inline(never)] // Inlined, it would take room in each of its callers.
+pub(crate) fn true_length(a: PagePoint, b: PagePoint, y_in_x: u32) -> u64 {
+    let multiply = |a: u32, b: u32| u64::from(a) * u64::from(b);
+    let mut x = multiply(a.x.abs_diff(b.x), 1 << 8);
+    let mut y = multiply(a.y.abs_diff(b.y), y_in_x) >> 12;
+    // The square of what the root takes is below 2^59.
+    let mut shift = 0;
+    while (x | y) >> 29 != 0 {
+        (x, y, shift) = (x >> 1, y >> 1, shift + 1);
+    }
+    let (x, y) = (x as u32, y as u32);
+    u64::from(root(multiply(x, x) + multiply(y, y))) << shift
+}
+
+/// Adds the lengths and lifts of `tour` to `report`.
+pub(super) fn measure<I: Index>(
+    drawing: Drawing<'_, I>,
+    tour: &[Leg<I>],
+    options: Options,
+    report: &mut Report,
+) {
+    let y_in_x = y_in_x(options.steps);
+    let length = |a, b| true_length(a, b, y_in_x);
+    let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
+    let closing = match options.shape {
+        Shape::OpenPath => None,
+        Shape::ClosedCycle => tour.first(),
+    };
+    let mut pen = tour.first().map(|&leg| position(leg)).unwrap_or_default();
+    for &leg in tour {
+        report.lifts += u32::from(position(leg) != pen);
+        report.pen_up += length(pen, position(leg));
+        report.pen_down += length(position(leg), position(leg.flipped()));
+        pen = position(leg.flipped());
+    }
+    if let Some(&leg) = closing {
+        report.returns = position(leg) != pen;
+        report.lifts += u32::from(report.returns);
+        report.pen_up += length(pen, position(leg));
+    }
+    if y_in_x != EQUAL {
+        report.bound = 0;
+    }
+    report.optimal = report.pen_up == report.bound;
 }
 
 /// Returns a lower bound of the distance in 1/256 steps, without a square root: the greater of the
@@ -83,6 +146,25 @@ pub(super) fn root(square: u64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lengths_are_true_whatever_the_steps_are() {
+        use crate::fixed::Millimetres;
+        let steps = |x: i32, y: i32| y_in_x([x, y].map(Millimetres::from_num));
+        let origin = PagePoint::default();
+        let to = |x, y| PagePoint { x, y };
+        for point in [to(1, 1), to(-300, 4), to(77, -1_048_576), to(1_048_576, 1_048_575)] {
+            for equal in [steps(80, 80), y_in_x(StepsPerMillimetre::default())] {
+                assert_eq!(true_length(origin, point, equal), u64::from(length(origin, point)));
+            }
+        }
+        // 30 mm and 40 mm.
+        for (x, y) in [(80, 160), (160, 80), (4000, 2), (2, 4000), (100, 300)] {
+            let all = true_length(origin, to(30 * x, 40 * y), steps(x, y));
+            let expected = 256 * 50 * x as u64;
+            assert!(all.abs_diff(expected) <= 1 + expected / 2000, "{x} {y} {all} {expected}");
+        }
+    }
 
     #[test]
     fn the_root_is_exact() {

@@ -55,9 +55,12 @@ pub use first::{FirstStrokes, StrokeTime, choose_first, first_legs, order_rest};
 pub use later::{Released, improve_rest};
 pub use matching::scratch_bytes as matching_bytes;
 pub use metric::length;
+use metric::measure;
+#[cfg(feature = "tiles")]
+pub(crate) use metric::{true_length, y_in_x};
 
 use crate::array::rotate_left;
-use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint};
+use crate::drawing::{Drawing, PAGE_LIMIT, PagePoint, StepsPerMillimetre};
 use crate::index::Index;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 use bytemuck::{Pod, Zeroable};
@@ -203,9 +206,12 @@ pub struct Options {
     /// Extra pen-up travel that is accepted to save one pen lift, in 1/256 steps, at most 2^30.
     /// Each lift takes time, and leaves a visible mark if it lies within a stroke.
     pub lift_cost: u32,
+    /// The steps per millimetre, for the [`Report`] alone: the order takes those of y for as long
+    /// as those of x. Both are as long if they are 0.
+    pub steps: StepsPerMillimetre,
 }
 
-/// The measures of the resulting tour. Lengths are in 1/256 steps.
+/// The measures of the resulting tour. Lengths are in 1/256 steps of x.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Report {
     /// Number of points where an odd number of segments meet, added over all pens.
@@ -218,7 +224,7 @@ pub struct Report {
     pub pen_up: u64,
     /// The number of moves between strokes, in which the pen is up.
     pub lifts: u32,
-    /// Lower bound of the pen-up length; 0 if none is known.
+    /// Lower bound of the pen-up length; 0 if none is known, as where the steps of x and y differ.
     pub bound: u64,
     /// Whether `pen_up` is proved to be the least possible: it equals `bound`.
     pub optimal: bool,
@@ -270,7 +276,7 @@ pub fn order<I: Index>(
     let options = Options { shape, ..options };
     let mut report = Report::default();
     order_pens(drawing, options, Anchor::default(), scratch, cancel, tour, &mut report)?;
-    measure(drawing, tour, shape, &mut report);
+    measure(drawing, tour, options, &mut report);
     Ok(report)
 }
 
@@ -469,28 +475,6 @@ fn reverse<I: Index>(tour: &mut [Leg<I>]) {
     for leg in tour {
         *leg = leg.flipped();
     }
-}
-
-/// Adds the lengths and lifts of `tour` to `report`.
-fn measure<I: Index>(drawing: Drawing<'_, I>, tour: &[Leg<I>], shape: Shape, report: &mut Report) {
-    let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
-    let closing = match shape {
-        Shape::OpenPath => None,
-        Shape::ClosedCycle => tour.first(),
-    };
-    let mut pen = tour.first().map(|&leg| position(leg)).unwrap_or_default();
-    for &leg in tour {
-        report.lifts += u32::from(position(leg) != pen);
-        report.pen_up += u64::from(length(pen, position(leg)));
-        report.pen_down += u64::from(length(position(leg), position(leg.flipped())));
-        pen = position(leg.flipped());
-    }
-    if let Some(&leg) = closing {
-        report.returns = position(leg) != pen;
-        report.lifts += u32::from(report.returns);
-        report.pen_up += u64::from(length(pen, position(leg)));
-    }
-    report.optimal = report.pen_up == report.bound;
 }
 
 #[cfg(test)]

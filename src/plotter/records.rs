@@ -491,7 +491,7 @@ pub(super) fn load_job<B: Board, I: Index>(
     if let Ok(job) = &mut found
         && job.unordered().is_some()
     {
-        *job = load_order(*job, words, board);
+        *job = load_order(job.for_steps(settings.page_steps()), words, board);
     }
     found
 }

@@ -44,7 +44,7 @@ fn improve_all<I: Index>(count: u32, seed: u32, stroke_milliseconds: u32) -> Imp
         before = report;
         report = improve_rest(drawing, drawn, report, options, scratch, cancel, rest).expect("");
         assert_eq!(drawn, as_drawn, "what is released stays");
-        assert_eq!(report, measure_all(drawing, drawn, rest, report));
+        assert_eq!(report, measure_all(drawing, drawn, rest, options, report));
         assert!(report.pen_up <= before.pen_up);
     }
     Improved { points, segments, tour, rounds, report }
@@ -117,7 +117,7 @@ fn what_is_released_never_goes_on_in_the_same_stroke() {
             before = report;
             report = improve_rest(drawing, drawn, report, options, scratch, cancel, rest)
                 .expect("an order");
-            assert_eq!(report, measure_all(drawing, drawn, rest, report));
+            assert_eq!(report, measure_all(drawing, drawn, rest, options, report));
             let path = path(&segments, &tour);
             assert_ne!(path[released.legs - 1][1], path[released.legs][0], "{seed}");
         }
@@ -203,7 +203,7 @@ fn a_stroke_may_end_where_two_segments_meet() {
     assert_eq!(network.chains(), 3);
     let mut tour = [0, 1, 2, 3].map(|number| Leg::new(number, false));
     let (drawn, rest) = tour.split_at_mut(1);
-    let report = measure_all(drawing, drawn, rest, Report::default());
+    let report = measure_all(drawing, drawn, rest, Options::default(), Report::default());
     let (options, scratch) = (Options::default(), Scratch::new(&mut memory));
     let better = improve_rest(drawing, drawn, report, options, scratch, &mut NeverCancel, rest);
     let better = better.expect("an order");

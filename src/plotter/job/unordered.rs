@@ -1,7 +1,7 @@
 //! Orders a job whose first strokes may be drawn already.
 
 use super::{Job, Unordered};
-use crate::drawing::Drawing;
+use crate::drawing::{Drawing, StepsPerMillimetre};
 use crate::index::Index;
 use crate::order::{
     self, Effort, FirstStrokes, Leg, Method, Options, OrderError, Released, Report, Shape,
@@ -63,7 +63,8 @@ impl Unordered {
         ]
     }
 
-    /// Restores the value from these words; `None` if they hold none. The path is open.
+    /// Restores the value from these words; `None` if they hold none. The path is open, and the
+    /// steps are those that [`Job::for_steps`] sets.
     pub(in crate::plotter) fn from_words(words: [u32; UNORDERED_WORDS]) -> Option<Self> {
         let [segments, odd_points, parts, strokes_left, rest @ ..] = words;
         let segments = usize::try_from(segments).ok()?;
@@ -84,7 +85,8 @@ impl Unordered {
         };
         let time = StrokeTime { steps_per_second, stroke_milliseconds };
         let first = FirstStrokes { segments, odd_points, parts, strokes_left, time };
-        let options = Options { method, shape: Shape::OpenPath, effort, lift_cost };
+        let options =
+            Options { method, shape: Shape::OpenPath, effort, lift_cost, ..Options::default() };
         Some(Self::new(first, options))
     }
 }
@@ -118,6 +120,15 @@ impl<I: Index> Job<I> {
     /// A job of this drawing whose order is not known yet.
     pub(in crate::plotter) fn without_order(self, unordered: Unordered) -> Self {
         Self { unordered: Some(unordered), ..self }
+    }
+
+    /// The same job, whose order will be measured for these steps per millimetre.
+    pub(in crate::plotter) fn for_steps(self, steps: StepsPerMillimetre) -> Self {
+        let unordered = self.unordered.map(|unordered| Unordered {
+            options: Options { steps, ..unordered.options },
+            ..unordered
+        });
+        Self { unordered, ..self }
     }
 
     /// The drawing of the job, which `words` hold.

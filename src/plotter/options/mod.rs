@@ -147,6 +147,7 @@ impl PlotOptions {
             shape: self.shape,
             effort: self.effort.map_or(Effort::Auto(time_model), Effort::Units),
             lift_cost: lift_cost.saturating_to_num(),
+            steps,
         }
     }
 

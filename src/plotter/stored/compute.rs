@@ -257,7 +257,8 @@ fn order_lines<I: Index>(
             tour.reverse();
             tour.iter_mut().for_each(|leg| *leg = leg.flipped());
         }
-        report.pen_up += u64::from(distances[0].min(distances[1]));
+        let near = if distances[1] < distances[0] { last } else { first };
+        report.pen_up += order::true_length(at, near, order::y_in_x(options.steps));
         report.lifts += 1;
     }
     Ok(Some(Job::of(stored, tour.len(), report)))
