@@ -248,7 +248,8 @@ fn check_model(seed: u64) -> usize {
             vertices: seen.vertices,
             elements: seen.elements,
             projection: view.projection(),
-            unrounded: Unrounded::new(&positions, precision, view.error_bound(precision.written)),
+            unrounded: Unrounded::new(&positions, precision, view.error_bound(precision.written))
+                .made_of(&seen.sources),
         };
         let mut known = Found { near: view.near(), ..Found::default() };
         // A view may put a tiny model far from the origin beyond the range; it is refused.

@@ -107,8 +107,9 @@ impl Page {
 
 /// Returns the length of the page along an axis, in steps.
 pub(super) fn side_steps(page: &Page, steps: StepsPerMillimetre, axis: usize) -> i64 {
-    let side = if axis == 0 { page.width } else { page.height };
-    (i64::from(side.to_bits()) * i64::from(steps[axis].to_bits())) >> 32
+    let [x, y] = steps;
+    let (side, per_mm) = if axis == 0 { (page.width, x) } else { (page.height, y) };
+    (i64::from(side.to_bits()) * i64::from(per_mm.to_bits())) >> 32
 }
 
 /// Returns the height that is kept free below the drawing, in steps; 0 along x.

@@ -2,11 +2,13 @@
 
 use super::{JobSize, Setting, Settings, Tool};
 use crate::array::MapEach;
+use core::num::NonZeroU64;
 
 /// The speed along the path that a setting asks for, as far as both axes allow it, in 2^-16 mm/min;
 /// at least 1.
-fn per_minute(settings: &Settings, speed: Setting) -> u64 {
-    u64::from(settings.path_speed(speed).to_bits().unsigned_abs()).max(1)
+fn per_minute(settings: &Settings, speed: Setting) -> NonZeroU64 {
+    let bits = settings.path_speed(speed).to_bits().unsigned_abs();
+    NonZeroU64::new(bits.into()).unwrap_or(NonZeroU64::MIN)
 }
 
 /// The time, in milliseconds, that a job of this size would take if all speeds were reached at
@@ -75,7 +77,7 @@ impl Estimate {
         let speed = if self.inked { Setting::DrawSpeed } else { Setting::TravelSpeed };
         let (acceleration, _) = settings.acceleration_and_corners();
         let acceleration = u64::from(acceleration.to_bits().unsigned_abs()).max(1);
-        let per_second = per_minute(settings, speed) / 60;
+        let per_second = per_minute(settings, speed).get() / 60;
         self.milliseconds += rest_to_rest(self.length >> 2, per_second, acceleration);
         // Each change of speed takes longer by about the time in which the acceleration builds up.
         let jerk = u64::from(settings.get(Setting::Jerk).to_bits().unsigned_abs());

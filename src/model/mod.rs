@@ -14,6 +14,7 @@ mod error;
 mod pens;
 mod positions;
 mod precision;
+mod sources;
 mod store;
 #[cfg(feature = "tiles")]
 mod stored;
@@ -28,6 +29,7 @@ pub use elements::{Corner, Element, Elements};
 pub use error::ModelError;
 pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
 pub use positions::{POSITION_LIMIT, Position, Positions};
+pub use sources::VertexSources;
 #[cfg(feature = "tiles")]
 pub use stored::StoredModel;
 #[cfg(feature = "tiles")]

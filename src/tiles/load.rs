@@ -8,7 +8,7 @@ use crate::geometry::Vertex;
 use crate::index::Index;
 use crate::model::{Corner, Element, Elements, PenWriter, Position};
 use crate::stage::{Aborted, Cancel, OutOfScratch, Scratch, StageError, heap_sort_cancellable};
-use crate::view::{cut, weld};
+use crate::view::{Sources, cut, weld};
 use crate::visibility::{
     Ownership, Scene, SinkFull, Stretch, StretchSink, Unrounded, VisibilityError, YieldCounter,
     find_owned_stretches, scratch_bytes,
@@ -65,6 +65,8 @@ pub(super) struct Loaded<'a> {
     positions: &'a [Position],
     /// The view coordinates of the vertices, and of the points where edges are cut.
     vertices: &'a [Vertex],
+    /// For each of these points the numbers here of the ends of its edge.
+    cuts: &'a [u32],
     /// The faces and bars in front of the near plane.
     pub elements: Elements<'a, u16>,
     /// Where each vertex lies on the page.
@@ -237,18 +239,18 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
             yield_counter.spend(LOOK / 3)?;
             *slot = source.vertex(number);
         }
-        let mut vertices: &'a [Vertex] = seen;
+        let (mut vertices, mut cuts): (&'a [Vertex], &'a [u32]) = (seen, &[]);
         if let Some(near) = parameters.near
             && vertices.iter().any(|vertex| vertex.z < near)
         {
-            (vertices, elements) = cut(vertices, elements, near, scratch)?;
+            (vertices, elements, cuts) = cut(vertices, elements, near, scratch)?;
         }
         let points: &mut [GridPoint] = scratch.take(vertices.len())?;
         for (slot, &vertex) in points.iter_mut().zip(vertices) {
             yield_counter.spend(PLACE / 3)?;
             *slot = self.survey.point(parameters.projection, vertex);
         }
-        Ok(Loaded { firsts, numbers, positions, vertices, elements, points })
+        Ok(Loaded { firsts, numbers, positions, vertices, cuts, elements, points })
     }
 
     /// Finds the stretches of those edges and seams of a loaded part that belong to `owner`. With
@@ -266,13 +268,15 @@ impl<'t, S: ModelSource> Tiles<'t, S> {
         cancel: &mut dyn Cancel,
         sink: &mut dyn StretchSink<N>,
     ) -> Result<(), VisibilityError> {
-        let Loaded { vertices, elements, positions, numbers, .. } = *loaded;
+        let Loaded { vertices, cuts, elements, positions, numbers, .. } = *loaded;
+        let sources = Sources::<u16>::of_cuts(numbers.len(), cuts);
         let parameters = &self.parameters;
         let unrounded = Unrounded::new(
             bytemuck::cast_slice(positions),
             parameters.precision,
             parameters.error_bound.max(1),
-        );
+        )
+        .made_of(&sources);
         let scene = Scene { vertices, elements, projection: parameters.projection, unrounded };
         if is_fast {
             let available = scratch.available_bytes();

@@ -4,9 +4,9 @@
 //! plane). Neighbouring faces that share a cut edge get the same new vertex. The cut itself is not
 //! an edge of the model: an edge whose ends both lie on the near plane must not be drawn.
 
-use super::View;
 use super::curves::Flattening;
 use super::weld::weld;
+use super::{Sources, View};
 use crate::array::MapEach;
 use crate::geometry::Vertex;
 use crate::index::Index;
@@ -15,12 +15,14 @@ use crate::stage::{Cancel, OutOfScratch, Scratch, StageError, heap_sort_by_key};
 
 /// A model as the camera sees it: projected, and without what lies behind the eye.
 #[derive(Debug, Clone, Copy)]
-pub struct Seen<'a, I> {
+pub struct Seen<'a, I: Index> {
     /// The vertices of the model, the ends of its flattened curves, and the points where edges are
     /// cut.
     pub vertices: &'a [Vertex],
     /// The faces and bars, or their parts, that are in front of the near plane.
     pub elements: Elements<'a, I>,
+    /// Of which vertices of the model the others are made.
+    pub sources: Sources<'a, I>,
     /// The number of faces of the model that were left out because they have no area.
     pub degenerate_faces: u32,
     /// Whether anything of the model was cut off.
@@ -44,21 +46,32 @@ pub fn project_scene<'a, I: Index>(
     cancel: &mut dyn Cancel,
 ) -> Result<Seen<'a, I>, StageError> {
     let (elements, degenerate_faces) = weld(model.vertices(), model.elements(), scratch, cancel)?;
-    let (vertices, elements) = match curves {
+    let (vertices, elements, curve_ends) = match curves {
         Some(curves) => curves.add(view, model, elements, scratch, cancel)?,
         None => {
             let vertices = scratch.take::<Vertex>(model.vertices().len())?;
             view.fill(model, vertices, cancel)?;
-            (&*vertices, elements)
+            (&*vertices, elements, &[] as &[I])
         }
+    };
+    let mut sources = Sources {
+        curves: model.curves(),
+        curve_ends,
+        first_chord_end: model.vertices().len(),
+        first_cut: vertices.len(),
+        cuts: &[],
     };
     let is_nearer = |near: &i32| vertices.iter().any(|vertex| vertex.z < *near);
     let near = view.near().filter(is_nearer);
     let (vertices, elements) = match near {
-        Some(near) => cut(vertices, elements, near, scratch)?,
+        Some(near) => {
+            let (vertices, elements, cuts) = cut(vertices, elements, near, scratch)?;
+            sources.cuts = cuts;
+            (vertices, elements)
+        }
         None => (vertices, elements),
     };
-    Ok(Seen { vertices, elements, degenerate_faces, is_cut: near.is_some() })
+    Ok(Seen { vertices, elements, sources, degenerate_faces, is_cut: near.is_some() })
 }
 
 /// Returns the part of an edge at the depth `near` or beyond. Returns `None` if no part is.
@@ -89,14 +102,17 @@ pub fn distinct_edges<'a, I: Index>(
     Ok(bytemuck::cast_slice(without_repeats(keys)))
 }
 
-/// Cuts off what is nearer than `near`: returns the vertices, with those of the cuts after them,
-/// and the elements that are left.
+/// A scene in front of the near plane: the vertices, with those of the cuts after them, the
+/// elements that are left, and for each cut the numbers of the ends of its edge.
+type Cut<'a, I> = (&'a [Vertex], Elements<'a, I>, &'a [<I as Index>::Pair]);
+
+/// Cuts off what is nearer than `near`.
 pub(crate) fn cut<'a, I: Index>(
     vertices: &[Vertex],
     elements: Elements<'_, I>,
     near: i32,
     scratch: &mut Scratch<'a>,
-) -> Result<(&'a [Vertex], Elements<'a, I>), OutOfScratch> {
+) -> Result<Cut<'a, I>, OutOfScratch> {
     let is_seen = |number: I| vertices.get(number.get()).is_some_and(|vertex| vertex.z >= near);
     let is_cut = |edge: &Edge<I>| is_seen(edge.0) != is_seen(edge.1);
 
@@ -173,7 +189,7 @@ pub(crate) fn cut<'a, I: Index>(
     }
     let corners: &'a [I] = corners;
     let corners = bytemuck::cast_slice(corners.get(..length).unwrap_or(&[]));
-    Ok((all, Elements::with_pens(corners, pens.finish())))
+    Ok((all, Elements::with_pens(corners, pens.finish()), keys))
 }
 
 /// An edge, as the numbers of the vertices at its ends.
@@ -244,7 +260,7 @@ mod tests {
             })
             .collect();
         let mut words = [0u64; 100];
-        let (vertices, elements) =
+        let (vertices, elements, _) =
             cut(vertices, Elements::new(&corners), 10, &mut Scratch::new(&mut words)).unwrap();
         let position = |number: u16| vertices[usize::from(number)];
         let found = elements.iter().map(|element| match element {

@@ -20,6 +20,11 @@ pub struct Flattening<'f> {
     pub tolerance: u16,
 }
 
+/// A model whose curves are straight bars: its vertices together with the ends of these chords, its
+/// elements together with a bar for each chord, and for each curve the vertex number after that of
+/// its last chord end.
+type Flattened<'a, I> = (&'a [Vertex], Elements<'a, I>, &'a [I]);
+
 impl Flattening<'_> {
     /// Flattens the curves of the model. `points` are its vertices in view coordinates. `each`
     /// receives the end of each chord, and whether a curve begins there.
@@ -68,8 +73,7 @@ impl Flattening<'_> {
         })
     }
 
-    /// Makes straight bars of the curves of a model. Returns the vertices of the model together
-    /// with the ends of these chords, and `elements` together with a bar for each chord.
+    /// Makes straight bars of the curves of a model, besides its `elements`.
     pub(super) fn add<'a, I: Index>(
         &self,
         view: &View,
@@ -77,8 +81,7 @@ impl Flattening<'_> {
         elements: Elements<'_, I>,
         scratch: &mut Scratch<'a>,
         cancel: &mut dyn Cancel,
-    ) -> Result<(&'a [Vertex], Elements<'a, I>), StageError> {
-        // For each curve, the vertex number after that of its last chord end.
+    ) -> Result<Flattened<'a, I>, StageError> {
         let curve_ends = scratch.take::<I>(model.curve_count())?;
         let first = model.vertices().len();
         let vertices = scratch.take_filled::<Vertex, StageError>(|room| {
@@ -125,6 +128,6 @@ impl Flattening<'_> {
             begin = end;
         }
         let corners: &'a [Corner<I>] = corners;
-        Ok((vertices, Elements::with_pens(corners, pens.finish())))
+        Ok((vertices, Elements::with_pens(corners, pens.finish()), curve_ends))
     }
 }

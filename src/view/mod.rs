@@ -16,11 +16,13 @@
 mod camera;
 mod clip;
 mod curves;
+mod sources;
 mod weld;
 
 pub use camera::{Camera, Direction, Lens, Pose, SightLines};
 pub use clip::{Seen, distinct_edges, project_scene};
 pub use curves::Flattening;
+pub use sources::Sources;
 #[cfg(feature = "tiles")]
 pub(crate) use {
     clip::{cut, on_plane},

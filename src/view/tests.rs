@@ -274,7 +274,7 @@ fn the_chords_of_curves_become_bars() {
     let flattening = Flattening { on_page: &|x, y, _| [x, y], tolerance: 128 };
     let mut words = [0; 512];
     let mut scratch = Scratch::new(&mut words);
-    let (vertices, elements) =
+    let (vertices, elements, _) =
         flattening.add(&view, &model, model.elements(), &mut scratch, &mut NeverCancel).unwrap();
     let bars: std::vec::Vec<[u16; 2]> = elements
         .corners()

@@ -62,12 +62,12 @@ impl Crease {
 
     /// Returns the normal of a face as it is in the model, given the one in the view, whose depth
     /// is stretched and slanted. Only its direction is kept; its components are below 2^20.
-    fn in_model(&self, normal: [i64; 3]) -> [i64; 3] {
-        let by = [self.depth_stretch.1, self.depth_stretch.1, self.depth_stretch.0];
+    fn in_model(&self, [x, y, z]: [i64; 3]) -> [i64; 3] {
+        let ((depth, across), [s, t]) = (self.depth_stretch, self.slants);
         // A part is below 2^57 (see `areas`), and each of its factors below 2^32.
-        let mut exact = [0, 1, 2].map_each(|n| product(normal[n], i64::from(by[n]) << 8));
-        exact[2] += product(normal[0], self.slants[0].into());
-        exact[2] += product(normal[1], self.slants[1].into());
+        let by = |part, factor: u32| product(part, i64::from(factor) << 8);
+        let slanted = product(x, s.into()) + product(y, t.into());
+        let exact = [by(x, across), by(y, across), by(z, depth) + slanted];
         // It has as many bits as the largest part.
         let all = exact.iter().fold(0, |all, part| all | part.unsigned_abs());
         let excess = (128 - all.leading_zeros()).saturating_sub(20);

@@ -60,6 +60,7 @@ impl Extent {
 /// Returns `None` if the triangles do not cross, or cross only in a segment that rounding shrinks
 /// to a point. A corner in the plane of the other triangle counts as lying on one fixed side of it,
 /// so that a seam along a diagonal, where two triangles of one face meet, is found exactly once.
+#[inline(never)] // Inlined, its frame would take stack while the seam is followed.
 pub fn seam(
     one: [Vertex; 3],
     other: [Vertex; 3],

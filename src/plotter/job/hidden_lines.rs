@@ -54,7 +54,7 @@ impl<I: Index> Pipeline<'_, I> {
         };
         let on_page = curves_map.as_ref().map(|map| |x, y, w| map.fine(x, y, w));
         let curves = on_page.as_ref().map(|on_page| Flattening { on_page, tolerance: HALF_A_STEP });
-        let Seen { vertices, elements, degenerate_faces, is_cut } =
+        let Seen { vertices, elements, sources, degenerate_faces, is_cut } =
             project_scene(&view, model, curves, &mut scratch, cancel)?;
         let map = match curves_map {
             Some(map) => map,
@@ -72,7 +72,8 @@ impl<I: Index> Pipeline<'_, I> {
         cancel.enter(Stage::Visibility);
         let precision = options.precision_of(model);
         let positions = bytemuck::cast_slice(model.vertices());
-        let unrounded = Unrounded::new(positions, precision, view.error_bound(precision.written));
+        let unrounded = Unrounded::new(positions, precision, view.error_bound(precision.written))
+            .made_of(&sources);
         let scene = Scene { vertices, elements, projection, unrounded };
         // The memory is divided into three parts: what is already taken, the memory of the
         // visibility stage, and the lines that it finds. Beyond its minimum, up to three times as
