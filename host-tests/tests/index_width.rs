@@ -58,7 +58,8 @@ proptest! {
         spare in prop::sample::select(vec![0usize, 200, 1 << 14]),
     ) {
         let random = random_scene(seed);
-        let crease = with_crease.then_some(Crease { cosine: 1 << 19, depth_stretch: (1, 1), slants: [0; 2] });
+        let half = Crease { cosine: 1 << 19, depth_stretch: (1, 1), slants: [0; 2] };
+        let crease = with_crease.then_some(half);
         let options = Options { with_hidden, with_seams, merged_blocks, crease };
         let narrow = stretches::<u16>(&random, options, spare);
         prop_assert_eq!(narrow, stretches::<u32>(&random, options, spare));

@@ -59,7 +59,8 @@ proptest! {
         part in 0usize..64,
     ) {
         let random = random_scene(seed);
-        let crease = with_crease.then_some(Crease { cosine: 1 << 19, depth_stretch: (1, 1), slants: [0; 2] });
+        let half = Crease { cosine: 1 << 19, depth_stretch: (1, 1), slants: [0; 2] };
+        let crease = with_crease.then_some(half);
         let options = Options { with_hidden, with_seams, merged_blocks, crease };
         let scene = Scene {
             vertices: &random.vertices,

@@ -274,8 +274,8 @@ impl Machine<'_> {
     }
 
     /// Goes on with the activity `next`, now that no motion is planned any more. The limits of
-    /// homing, which also hold while it is given up, and the speeds of a jog, which has no override,
-    /// end here: other ones in mid motion would not fit its speed.
+    /// homing, which also hold while it is given up, and the speeds of a jog, which has no
+    /// override, end here: other ones in mid motion would not fit its speed.
     pub(super) fn end_motion(&mut self, next: Activity) {
         let before = core::mem::replace(&mut self.activity, next);
         if let Activity::Home(_) | Activity::Abort = before {

@@ -117,8 +117,8 @@ impl Settings {
         self.get(Setting::MaxRateX).min(self.get(Setting::MaxRateY))
     }
 
-    /// The speed along the path that one of the settings of speed asks for, in mm/min, as far as both
-    /// axes allow it.
+    /// The speed along the path that one of the settings of speed asks for, in mm/min, as far as
+    /// both axes allow it.
     pub(in crate::machine) fn path_speed(&self, speed: Setting) -> Value {
         self.get(speed).min(self.axes_rate())
     }
