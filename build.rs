@@ -23,7 +23,17 @@ fn main() -> io::Result<()> {
     println!("cargo::rerun-if-changed=boards");
     println!("cargo::rerun-if-changed=src/board_table.rs");
     println!("cargo::rerun-if-changed=src");
-    println!("cargo::rustc-env=PENUP_SOURCES={:08x}", sources(Path::new("src"))?);
+    let mut digest = DefaultHasher::new();
+    for folder in ["src", "boards"] {
+        sources(Path::new(folder))?.hash(&mut digest);
+    }
+    // The versions of what it is built with decide about strokes, too. A package has no such file
+    // of its own where another one depends on it.
+    if let Ok(versions) = fs::read("Cargo.lock") {
+        println!("cargo::rerun-if-changed=Cargo.lock");
+        versions.hash(&mut digest);
+    }
+    println!("cargo::rustc-env=PENUP_SOURCES={:08x}", digest.finish() as u32);
     if env::var("CARGO_CFG_TARGET_OS").as_deref() != Ok("none") {
         return Ok(());
     }
