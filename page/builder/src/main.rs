@@ -80,7 +80,8 @@ fn copy(from: &Path, to: &Path) -> Result<()> {
     Ok(())
 }
 
-/// A script or a style sheet without the lines that are comments, which a browser need not load.
+/// A script or a style sheet without the lines that are comments and without indentation, which a
+/// browser need not load. No text in quotes may go over several lines.
 fn without_comments(text: &str) -> String {
     let mut kept = String::with_capacity(text.len());
     let mut is_comment = false;
@@ -89,7 +90,7 @@ fn without_comments(text: &str) -> String {
         is_comment |= words.starts_with("/*");
         let ends = is_comment && words.ends_with("*/");
         if !is_comment && !words.starts_with("//") {
-            kept.push_str(line);
+            kept.push_str(line.trim_start_matches([' ', '\t']));
         }
         is_comment &= !ends;
     }
