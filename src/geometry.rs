@@ -368,13 +368,13 @@ pub(crate) fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
 
 /// Returns a measure of the area of a triangle of the model, which is 0 if its corners lie in one
 /// line: the largest component of the cross product of two sides.
-pub fn doubled_area(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> i64 {
+pub(crate) fn doubled_area(a: [i32; 3], b: [i32; 3], c: [i32; 3]) -> i64 {
     largest(cross(difference(b, a), difference(c, a)))
 }
 
 /// Returns a measure of the distance of two points of the model: the largest difference of their
 /// coordinates.
-pub fn extent(a: [i32; 3], b: [i32; 3]) -> i64 {
+pub(crate) fn extent(a: [i32; 3], b: [i32; 3]) -> i64 {
     largest(difference(b, a))
 }
 

@@ -5,8 +5,9 @@
 //! reports alarms.
 
 use super::overrides::OverrideChange;
-use super::program::StoredPosition;
-use super::program::{Context, Flow, MachineAction, MachinePosition, Parameter, Program};
+use super::program::{
+    Context, Flow, MachineAction, MachinePosition, Parameter, Program, StoredPosition,
+};
 use super::{Board, Inner, REPLY_BYTES, Reply, help};
 use crate::drawing::{LineType, PagePoint};
 use crate::fixed::{BinaryFraction, decimals_of};

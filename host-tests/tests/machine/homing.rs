@@ -211,6 +211,23 @@ fn homing_that_is_given_up_slows_down_as_fast_as_it_may() {
     }
 }
 
+/// Homes a machine whose switches depend on the position of its pins and on the time. Returns its
+/// state then.
+fn homed(settings: Settings, switches: &mut dyn FnMut(PagePoint, u64) -> Switches) -> State {
+    let mut state = State::Idle;
+    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
+        let switches = switches(turn.pins, turn.now);
+        if turn.now == 0 {
+            turn.machine.home(switches).expect("ready");
+        }
+        turn.machine.watch(switches);
+        turn.machine.fill(&mut TargetList::new(&[]), queue);
+        state = turn.machine.state();
+        state == State::Home
+    });
+    state
+}
+
 #[test]
 fn a_belt_that_is_longer_than_its_anchors_are_apart_is_wound_to_its_switch() {
     let mut settings = polargraph();
@@ -227,17 +244,9 @@ fn a_belt_that_is_longer_than_its_anchors_are_apart_is_wound_to_its_switch() {
     }
     let start = settings.kinematics().motors(point(12_000, 0));
     let mut belts = start;
-    let mut state = State::Idle;
-    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
-        belts = point(start.x + turn.pins.x, start.y + turn.pins.y);
-        let switches = Switches { x: belts.x <= 19_200, y: belts.y <= 19_200 };
-        if turn.now == 0 {
-            turn.machine.home(switches).expect("ready");
-        }
-        turn.machine.watch(switches);
-        turn.machine.fill(&mut TargetList::new(&[]), queue);
-        state = turn.machine.state();
-        state == State::Home
+    let state = homed(settings, &mut |pins, _| {
+        belts = point(start.x + pins.x, start.y + pins.y);
+        Switches { x: belts.x <= 19_200, y: belts.y <= 19_200 }
     });
     assert_eq!(state, State::Idle);
     assert!(belts.x.abs_diff(19_280) <= 1 && belts.y.abs_diff(19_280) <= 1, "{belts:?}");
@@ -252,17 +261,8 @@ fn an_axis_of_many_fine_steps_is_homed_from_its_other_end() {
         (Setting::StepsPerMmY, 2400.0),
     ]);
     let start = point(1_000_000, 10);
-    let mut state = State::Idle;
-    pin_machine::run_with(settings, 25_000, &mut |turn, queue| {
-        let switches = corner(point(start.x + turn.pins.x, start.y + turn.pins.y), turn.now);
-        if turn.now == 0 {
-            turn.machine.home(switches).expect("ready");
-        }
-        turn.machine.watch(switches);
-        turn.machine.fill(&mut TargetList::new(&[]), queue);
-        state = turn.machine.state();
-        state == State::Home
-    });
+    let state =
+        homed(settings, &mut |pins, now| corner(point(start.x + pins.x, start.y + pins.y), now));
     assert_eq!(state, State::Idle);
 }
 
