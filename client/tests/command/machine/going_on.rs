@@ -236,12 +236,12 @@ fn a_job_that_a_loss_of_power_has_stopped_is_not_taken_for_done() {
     assert!(noted.contains("again") || noted.contains("the job has stopped after "), "{noted}");
 }
 
-#[test]
-fn strokes_that_stop_coming_come_again_from_the_same_file() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let plotter = Library::new();
-    let mut client = plotter.plot_waves(folder.path());
-    while plotter.heard.load(Ordering::Relaxed) < 30_000 {
+/// Plots the waves with these options until the plotter has heard so many bytes from this client,
+/// which ends then. Returns how many strokes are drawn, of what has come, once the machine waits.
+fn leave_waves(plotter: &Library, folder: &Path, options: &[&str], bytes: usize) -> u64 {
+    let before = plotter.heard.load(Ordering::Relaxed);
+    let mut client = plotter.plot_waves(folder, options);
+    while plotter.heard.load(Ordering::Relaxed) < before + bytes {
         assert_eq!(client.try_wait().expect("a state"), None, "it ended before");
         std::thread::sleep(Duration::from_millis(1));
     }
@@ -251,15 +251,45 @@ fn strokes_that_stop_coming_come_again_from_the_same_file() {
     let mut seen = (u64::MAX, 0);
     while seen.0 != seen.1 || seen.0 == 0 {
         std::thread::sleep(Duration::from_millis(500));
-        seen = (plotter.strokes(folder.path()), seen.0);
+        seen = (plotter.strokes(folder), seen.0);
     }
-    assert!((1..70).contains(&seen.0), "{seen:?}");
-    let (code, said, noted) = ended(plotter.plot_waves(folder.path()));
+    seen.0
+}
+
+#[test]
+fn strokes_that_stop_coming_come_again_from_the_same_file() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    let drawn = leave_waves(&plotter, folder.path(), &[], 30_000);
+    assert!((1..70).contains(&drawn), "{drawn}");
+    let (code, said, noted) = ended(plotter.plot_waves(folder.path(), &[]));
     assert_eq!(code, Some(0), "{noted}");
     assert!(noted.contains("the plotter draws this already: the last "), "{noted}");
     assert!(said.starts_with("waves.obj is drawn: "), "{said}");
     let status = plotter.json(folder.path(), &["status"]).1;
     assert_eq!(status["state"], "Idle", "{status}");
+}
+
+/// The client of the rest ends, too: the same command sends what is left of the rest.
+#[test]
+fn the_rest_of_a_drawing_that_went_on_is_joined_again() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    leave_waves(&plotter, folder.path(), &[], 30_000);
+    plotter.cut.store(true, Ordering::Relaxed);
+    while plotter.cut.load(Ordering::Relaxed) {}
+    let stopped = plotter.json(folder.path(), &["status"]).1;
+    let first = stopped["stopped"]["done"].as_u64().expect("a number");
+    let rest = stopped["stopped"]["all"].as_u64().expect("a number") - first;
+    let second = leave_waves(&plotter, folder.path(), &["--resume", "--at-origin"], 30_000);
+    assert!(first > 0 && (1..rest).contains(&second), "{first}, {second} of {rest}");
+    let (code, said, noted) = ended(plotter.plot_waves(folder.path(), &["--resume"]));
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("the plotter draws this already: the last "), "{noted}");
+    assert!(said.starts_with("waves.obj is drawn: "), "{said}");
+    let ended = plotter.json(folder.path(), &["status"]).1;
+    assert_eq!(ended["strokes"], serde_json::json!({ "done": rest, "all": rest }), "{ended}");
+    assert_eq!((&ended["state"], &ended["stopped"]), (&"Idle".into(), &serde_json::Value::Null));
 }
 
 #[test]

@@ -161,7 +161,7 @@ impl Library {
     }
 
     /// Starts to plot 70 waves of 300 points, more than the plotter holds, computed by the client.
-    pub fn plot_waves(&self, folder: &Path) -> Child {
+    pub fn plot_waves(&self, folder: &Path, options: &[&str]) -> Child {
         let (mut points, mut lines) = (String::new(), String::new());
         for wave in 0..70 {
             lines += "l";
@@ -175,6 +175,7 @@ impl Library {
         fs::write(folder.join("waves.obj"), points + &lines).expect("written");
         Command::new(env!("CARGO_BIN_EXE_penup"))
             .args(["plot", "waves.obj", "--port", &self.device, "--compute", "host"])
+            .args(options)
             .current_dir(folder)
             .stdout(Stdio::piped())
             .stderr(Stdio::piped())
