@@ -11,8 +11,10 @@ use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_small,
 };
 use penup_host_tests::random::Random;
+use penup_host_tests::streamed_drawing::StreamedDrawing;
 use penup_host_tests::whole_jobs::job_lines;
 use penup_job::pins::PinChange;
+use penup_readers::lines::Lines;
 
 /// What the pins have drawn: each time that the pen was down is a list of points.
 type Run = Vec<Vec<Point>>;
@@ -386,4 +388,68 @@ fn a_drawing_is_drawn_again_wherever_its_beginning_was_cut() {
         finish(plotter);
     });
     assert_eq!(ink(&again), ink(&whole));
+}
+
+/// The first line of a drawing that is sent comes in the very turn of the main loop in which a
+/// drawing in parts ends, or in one of those around it.
+#[test]
+fn a_drawing_that_is_sent_right_behind_the_last_part_is_drawn() {
+    let lines = lattice(&["$eye=99,0.5,0.5", "$at=0.5,0.5,0.5", "$projection=orthographic"]);
+    let (whole, _) = undisturbed(&lines);
+    let plan = ["v 5 5 0", "v 40 5 0", "v 40 30 0", "l 1 2 3", "$plot"];
+    let mut settings = lattice(&[]);
+    settings.retain(|line| line.starts_with("$1") || line.starts_with("$2"));
+    let drawing = [&settings[..], &plan.map(str::to_owned)].concat();
+    let job = StreamedDrawing::of(&drawing).from(0);
+    let sent: Vec<String> = job.in_order().map(|line| line.sent).collect();
+    let (head, rest) = sent.split_first().expect("lines");
+
+    // The machine's number of turns until the drawing in parts has ended.
+    let mut turns = 0;
+    let turn = |plotter: &mut Powered<'_, '_>| {
+        plotter.plotter.poll(plotter.board);
+        plotter.board.wait();
+    };
+    Off::new().on(|plotter| {
+        plotter.order(&lines);
+        plotter.board.receive(head.as_bytes());
+        while plotter.plotter.machine().state() != State::Idle {
+            turn(plotter);
+            turns += 1;
+        }
+    });
+    let mut accepted = 0;
+    for early in 0..8 {
+        let mut is_accepted = false;
+        let run = Off::new().on(|plotter| {
+            plotter.order(&lines);
+            plotter.board.receive(head.as_bytes());
+            for _ in 0..turns + 3 - early {
+                turn(plotter);
+            }
+            plotter.heard();
+            plotter.board.receive(b"\n");
+            // Nothing is read while the end of the drawing is noted.
+            let answer = loop {
+                turn(plotter);
+                match plotter.heard() {
+                    heard if heard.is_empty() => {}
+                    heard => break heard,
+                }
+            };
+            is_accepted = answer.ends_with("ok\n");
+            if is_accepted {
+                accepted += 1;
+                plotter.order(rest);
+            } else {
+                assert!(answer.ends_with("error:8\n"), "{early}: {answer}");
+            }
+            plotter.finish();
+            assert_eq!(plotter.plotter.machine().state(), State::Idle, "{early}");
+        });
+        let first = &run[..run.len().min(whole.len())];
+        assert_eq!(ink(first), ink(&whole), "{early}");
+        assert_eq!(run.len() - first.len(), usize::from(is_accepted), "{early}");
+    }
+    assert!((2..8).contains(&accepted), "{accepted}");
 }
