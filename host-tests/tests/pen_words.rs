@@ -87,9 +87,12 @@ fn a_pause_of_the_sender_does_not_lower_the_pen() {
         ("$206=0", &["G1 Z5 F3000", "G1 X9", "pause", "G1 X30", "X40", "X60"], 0.0),
         ("$206=0", &["G1 Z5 F3000", "pause", "G1 X30", "Z-1", "pause", "X40", "Z5", "X60"], 10.0),
         ("$206=0", &["M3", "G1 X10 F3000", "M5", "pause", "G1 X30", "X40", "M3", "X60"], 30.0),
+        ("$206=0", &["G21", "G1 X9 F3000", "X30", "pause", "X40", "X60"], 60.0),
+        ("$206=0", &["G21", "G1 X9 F3000", "X30", "pause", "G0 X40", "G1 X60"], 50.0),
         // Behind M2 or the mark of an end the next program may move its pen in another way.
         ("$206=0", &["G1 Z5 F3000", "G1 X9", "M2", "pause", "M3", "G1 X30"], 21.0),
         ("$206=0", &["G1 Z5 F3000", "G1 X9", "%", "pause", "M3", "G1 X30"], 21.0),
+        ("$206=0", &["G21", "G1 X9 F3000", "X30", "M2", "pause", "X40", "X60"], 50.0),
     ] {
         let mut bench = bench();
         let heard = send(&mut bench, &[&[setting], lines].concat());

@@ -74,6 +74,8 @@ pub(super) struct PenState {
     waits: bool,
     /// Whether S has changed from one number to another without M5 between.
     varies: bool,
+    /// Whether the program has shown nothing and yet drawn, by G1 to G3 alone.
+    draws_by_feed: bool,
     /// Whether the first line was a move of G1 to G3 that did not draw because it stood alone.
     first_is_dry: bool,
     /// The number of moves of G1 to G3 with the pen down and up; more than 65535 count as 65535.
@@ -172,10 +174,13 @@ impl Program {
         let is_feed = self.motion != Motion::Rapid;
         let has_shown = self.pen.has_on || self.pen.has_off || self.pen.z_is_down.is_some();
         let draws = match rule {
-            // A line that is typed alone draws nothing unless the pen was put down.
+            // A line that is typed alone draws nothing unless the pen was put down, or the program
+            // has drawn before its sender made a pause.
             PenRule::Auto if !has_shown => {
-                self.pen.first_is_dry |= is_feed && self.pen.lines == 1;
-                is_feed && self.pen.lines > 1
+                let draws = is_feed && (self.pen.lines > 1 || self.pen.draws_by_feed);
+                self.pen.first_is_dry |= is_feed && !draws;
+                self.pen.draws_by_feed |= draws;
+                draws
             }
             PenRule::Laser => is_feed && self.is_on() && self.speed > 0,
             rule => self.is_down_at_rest(rule),
@@ -268,6 +273,7 @@ impl Program {
     /// The next program draws only where it puts the pen down. Returns whether M3 was in force.
     pub(in crate::plotter) fn raise_pen(&mut self) -> bool {
         self.draws = false;
+        self.pen.draws_by_feed = false;
         self.pen.s_is_down = false;
         self.pen.waits = false;
         self.leave_height();
