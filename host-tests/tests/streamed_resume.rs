@@ -274,3 +274,53 @@ fn a_drawing_that_begins_anew_goes_on_with_the_settings_that_it_began_with() {
         assert!(drawn > 0, "{drawn}");
     });
 }
+
+/// A whole number as targets are written in `$s=…`.
+fn digits(number: i32) -> String {
+    const DIGITS: &[u8] = b"0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz+-";
+    let mut left = if number < 0 { -2 * number - 1 } else { 2 * number }.cast_unsigned();
+    let mut text = String::new();
+    loop {
+        let (digit, rest) = (left % 32, left / 32);
+        let digit = DIGITS[digit as usize + if rest > 0 { 32 } else { 0 }];
+        text.push(char::from(digit));
+        if rest == 0 {
+            return text;
+        }
+        left = rest;
+    }
+}
+
+/// A stroke that begins where the one before ends is not lifted for, so the machine counts one
+/// stroke less than the drawing has. The drawing is still known to be complete.
+#[test]
+fn a_drawing_whose_strokes_touch_is_complete_at_its_end() {
+    for (dwell, strokes) in [(20, 2), (150, 2), (150, 3), (400, 3)] {
+        let (mut line, mut at) = ("$s=,".to_owned(), [0, 0]);
+        for target in 0..strokes {
+            let from = [400 * (target + 1), 400];
+            for (to, draws) in [(from, false), ([from[0] + 400, 400], true)] {
+                if !draws && target > 0 {
+                    line.push(',');
+                }
+                for axis in 0..2 {
+                    line += &digits(to[axis] - std::mem::replace(&mut at[axis], to[axis]));
+                }
+            }
+        }
+        let head = format!(
+            "$stream=5242880,5242880,7,{},400,400,{},400,{strokes},1,1,1000",
+            2 * strokes,
+            400 * (strokes + 1)
+        );
+        switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+            let settings = [format!("$212={dwell}"), "$213=20".to_owned()];
+            plotter.order(&[&settings[..], &[head, line]].concat());
+            plotter.finish();
+            let status = plotter.status();
+            assert!(!status.contains("Stopped"), "{dwell} {strokes}: {status}");
+            assert!(status.contains(&format!("|Drawn:{strokes}/{strokes}|")), "{status}");
+            assert_eq!(stopped(plotter), None, "{dwell} {strokes}");
+        });
+    }
+}

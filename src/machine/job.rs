@@ -287,7 +287,12 @@ impl Machine<'_> {
                 self.activity = Activity::Home(Homing { is_stopped: true, ..homing });
             }
             _ => {
-                self.complete_log();
+                if let Activity::Run(Source::PathEnd)
+                | Activity::Hold { source: Source::PathEnd, .. } = self.activity
+                {
+                    self.progress.complete(self.runner.run());
+                    self.complete_log();
+                }
                 let page = match progress {
                     RunnerProgress::Done => self.runner.page_end(),
                     _ => self.planned_position(),

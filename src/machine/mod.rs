@@ -254,10 +254,9 @@ impl<'m> Machine<'m> {
     /// Lowers the pen where it was raised and continues the job. If the machine waited for a pen
     /// change, it continues with the next pen.
     pub fn resume(&mut self) {
-        let Activity::Hold { stopped, mut source } = self.activity else { return };
+        let Activity::Hold { mut source, .. } = self.activity else { return };
         if let Source::PenChange { pen, first } = source
-            && stopped
-            && self.runner.is_at_rest()
+            && self.pen_wanted().is_some()
         {
             self.steady = Steady::default();
             self.pen = pen;

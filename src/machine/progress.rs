@@ -77,10 +77,17 @@ impl Progress {
         self.size
     }
 
-    /// The part of the job that has been planned when the runner's totals are `run`.
-    pub(super) const fn done(&self, run: RunLengths) -> JobSize {
+    /// Records that all of the job is planned, when the totals of the runner are `run`. The runner
+    /// counts no stroke that is shorter than a motor step or begins where the one before ends.
+    pub(super) const fn complete(&mut self, run: RunLengths) {
+        self.begun_at.strokes = run.strokes.wrapping_sub(self.size.strokes);
+    }
+
+    /// The part of the job that has been planned when the runner's totals are `run`. A stroke that
+    /// a hold has divided counts twice there, but there are never more strokes than the job has.
+    pub(super) fn done(&self, run: RunLengths) -> JobSize {
         JobSize {
-            strokes: run.strokes.wrapping_sub(self.begun_at.strokes),
+            strokes: run.strokes.wrapping_sub(self.begun_at.strokes).min(self.size.strokes),
             drawn: run.drawn.wrapping_sub(self.begun_at.drawn),
             travelled: run.travelled.wrapping_sub(self.begun_at.travelled),
             milliseconds: 0,

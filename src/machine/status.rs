@@ -30,10 +30,11 @@ impl Machine<'_> {
     /// The number of the pen, from 0, that the machine has stopped for and is waiting for.
     pub fn pen_wanted(&self) -> Option<u8> {
         // The next pen is known as soon as the path was read, and a feed hold may come before the
-        // pen change. So the machine must have finished the strokes of the present pen.
+        // pen change. So the machine must have finished the strokes of the present pen, and stand:
+        // a hand goes to the pen then.
         match self.activity {
             Activity::Hold { stopped: true, source: Source::PenChange { pen, .. } }
-                if self.runner.is_at_rest() =>
+                if self.runner.is_at_rest() && self.is_stopped() =>
             {
                 Some(pen)
             }

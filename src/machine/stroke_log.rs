@@ -7,7 +7,7 @@
 
 use super::Machine;
 #[cfg(feature = "resume")]
-use super::state::{Activity, Source};
+use super::state::Activity;
 
 /// The progress of noting the strokes of the job in flash.
 #[derive(Debug, Clone, Copy, Default)]
@@ -84,10 +84,11 @@ impl Machine<'_> {
         let open = self.log.open?;
         let over = self.strokes_over(open);
         let is_raised = self.runner.is_pen_up_at(self.pins.ticks());
-        // The motion planner does not count strokes that are shorter than a motor step, so the end
-        // of the path counts.
+        // The motion planner counts neither strokes that are shorter than a motor step nor those
+        // that begin where the one before ends, so the end of the path counts.
         let is_end = open.is_whole && self.is_stopped();
-        let strokes = if is_end { self.progress.size().strokes } else { drawn(over, open.begin) };
+        let all = self.progress.size().strokes;
+        let strokes = if open.is_whole { all } else { drawn(over, open.begin) };
         (is_end || (is_raised && over != open.noted)).then_some(strokes)
     }
 
@@ -145,12 +146,8 @@ impl Machine<'_> {
     }
 
     /// The path was planned to its end.
-    pub(super) fn complete_log(&mut self) {
-        let is_end = matches!(
-            self.activity,
-            Activity::Run(Source::PathEnd) | Activity::Hold { source: Source::PathEnd, .. }
-        );
-        if let Some(open) = self.log.open.as_mut().filter(|_| is_end) {
+    pub(super) const fn complete_log(&mut self) {
+        if let Some(open) = &mut self.log.open {
             open.is_whole = true;
         }
     }

@@ -178,8 +178,8 @@ impl<I: Index> Inner<'_, I> {
         let state = match status.state {
             State::Idle if self.machine.is_stopped() => "Idle",
             State::Idle | State::Run | State::Abort => "Run",
-            State::Hold { stopped: true } => "Hold:0",
-            State::Hold { stopped: false } => "Hold:1",
+            State::Hold { stopped: true } if self.machine.is_stopped() => "Hold:0",
+            State::Hold { .. } => "Hold:1",
             State::Jog => "Jog",
             State::Home => "Home",
             State::Check => "Check",
