@@ -620,3 +620,25 @@ proptest! {
         }
     }
 }
+
+/// Who sees `Hold:0` may put a hand to the pen.
+#[test]
+fn a_hold_is_reported_as_standing_when_nothing_moves_any_more() {
+    let mut bench = Bench::new();
+    bench.say("$120=10\n$121=10\nG0X100\n");
+    bench.work(2000);
+    bench.board.receive(b"!");
+    let mut slowed_down = 0;
+    loop {
+        bench.work(5);
+        let status = bench.say("?");
+        if status.contains("<Hold:0") {
+            break;
+        }
+        slowed_down += usize::from(status.contains("<Hold:1"));
+    }
+    assert!(slowed_down > 10, "{slowed_down}");
+    let changes = bench.board.trace().changes().len();
+    bench.work(3000);
+    assert_eq!(bench.board.trace().changes().len(), changes);
+}
