@@ -55,6 +55,8 @@ pub enum Fault {
     AlarmWhileDrawing(u16),
     /// Does not confirm the second and later aborts; the first opens the conversation.
     IgnoresAbort,
+    /// Is unplugged when the second abort is sent.
+    GoneAtAbort,
     /// Is locked after this alarm.
     Locked(u16),
 }
@@ -342,6 +344,10 @@ impl Link for FakePlotter {
                     self.answer_due.get_or_insert(self.clock + self.answer_delay);
                 }
                 b'?' => self.report(),
+                ABORT if self.fault == Fault::GoneAtAbort && self.aborts > 0 => {
+                    self.aborts += 1;
+                    return Err(io::ErrorKind::BrokenPipe.into());
+                }
                 ABORT => self.abort(),
                 HOLD | PAUSE_AFTER_STROKE | RESUME if self.lost_bytes > 0 => self.lost_bytes -= 1,
                 RESUME => {

@@ -6,7 +6,6 @@
 //! process itself, even in the middle of a computation or a wait.
 
 use std::fs;
-use std::io::{self, IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
@@ -66,9 +65,6 @@ pub fn ctrl_c(interrupt: &AtomicBool) {
         let _ = fs::remove_file(file);
     }
     crate::keyboard::restore();
-    let mut stderr = io::stderr();
-    // The message overwrites a progress bar.
-    let clear = if stderr.is_terminal() { "\r\x1b[2K" } else { "" };
-    let _ = writeln!(stderr, "{clear}penup: given up");
+    crate::stderr::say("penup: given up");
     std::process::exit(i32::from(EXIT_CODE));
 }

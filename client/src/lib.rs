@@ -46,6 +46,7 @@ pub mod rejoin;
 pub mod run;
 pub mod sender;
 pub mod serve;
+pub mod stderr;
 pub mod tape;
 pub mod workspace;
 

@@ -8,6 +8,7 @@ use crate::cli::RejoinArgs;
 use crate::keyboard::{Key, Keyboard};
 use crate::ports;
 use crate::rejoin::Rejoining;
+use crate::stderr;
 use penup_job::protocol::ABORT;
 use serialport::SerialPort;
 use std::collections::VecDeque;
@@ -213,8 +214,7 @@ impl SerialLink {
         if self.keyboard.is_some() {
             self.read_keys();
             if first {
-                // This line of the terminal shows a progress bar.
-                eprintln!("\r\x1b[2K{question}");
+                stderr::say(question);
                 self.is_answered = false;
             }
             let is_answered = std::mem::take(&mut self.is_answered);
@@ -224,7 +224,7 @@ impl SerialLink {
         if first {
             // Lines that were typed before the question do not count.
             while typed.try_recv().is_ok() {}
-            eprintln!("{question}");
+            stderr::say(question);
         }
         match typed.try_recv() {
             Ok(()) => Answer::Yes,

@@ -9,9 +9,10 @@
 //! is left out if the first report of the plotter's state tells that it has not started again: its
 //! job goes on, or it still knows of one. An alarm tells itself what has happened.
 
+use crate::stderr;
 use penup_job::protocol::Reply;
 use std::collections::VecDeque;
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _};
 use std::time::{Duration, Instant};
 
 /// The time without a byte after which a plotter that was asked is gone.
@@ -301,9 +302,7 @@ impl<W: Wire> Rejoining<W> {
 
     fn say(&self, text: &str) {
         if !self.is_quiet {
-            // This line of the terminal shows a progress bar. A closed standard error is no reason
-            // to fail.
-            let _ = writeln!(io::stderr(), "\r\x1b[2Kpenup: {text}");
+            stderr::say(&format!("penup: {text}"));
         }
     }
 }

@@ -344,9 +344,11 @@ impl<'a> Sender<'a> {
             self.requests.extend(request);
             return Ok(());
         }
-        Err(match self.abort()? {
-            Some(_) => Error::Interrupted,
-            None => Error::InterruptedUnconfirmed,
+        Err(match self.abort() {
+            Ok(Some(_)) => Error::Interrupted,
+            // Where the line is broken, the plotter may still be drawing.
+            Ok(None) | Err(Error::Link(_)) => Error::InterruptedUnconfirmed,
+            Err(error) => error,
         })
     }
 

@@ -225,9 +225,12 @@ impl Progress for GivesUp<'_> {
 
 #[test]
 fn giving_up_stops_the_machine_and_waits_until_it_says_so() {
-    for (fault, expected) in
-        [(Fault::None, "the pen is up"), (Fault::IgnoresAbort, "did not confirm")]
-    {
+    for (fault, expected, aborts) in [
+        (Fault::None, "the pen is up", 2),
+        // Without a greeting it is sent twice more.
+        (Fault::IgnoresAbort, "did not confirm", 4),
+        (Fault::GoneAtAbort, "did not confirm", 2),
+    ] {
         let mut plotter = FakePlotter::new(fault);
         plotter.strokes = 1000;
         let interrupt = AtomicBool::new(false);
@@ -235,8 +238,7 @@ fn giving_up_stops_the_machine_and_waits_until_it_says_so() {
         let error = sender.plot(&mut GivesUp(&interrupt)).expect_err("it was given up");
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.exit_code(), 130);
-        // Without a greeting it is sent twice more.
-        assert_eq!(plotter.aborts, if fault == Fault::None { 2 } else { 4 });
+        assert_eq!(plotter.aborts, aborts);
     }
 }
 

@@ -6,6 +6,7 @@ use crate::error::Error;
 use crate::link::Link;
 use crate::outcome::Outcome;
 use crate::sender::{Sender, Timeouts};
+use crate::stderr;
 use penup_job::protocol::{ABORT, Reply, ReplyReader};
 use penup_readers::lines::acts_at_once;
 use serde_json::json;
@@ -45,7 +46,7 @@ pub fn console(args: &PortArgs, is_json: bool, interrupt: &AtomicBool) -> Result
         link.send(&[ABORT])?;
     }
     if io::stdin().is_terminal() {
-        eprintln!("{GREETING}");
+        stderr::say(GREETING);
     }
     let refused = talk(&mut link, &typed(), is_reset, is_json)?;
     Ok(Outcome { text: String::new(), json: json!({ "refused": refused }), is_answer: false })
