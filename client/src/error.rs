@@ -363,6 +363,15 @@ pub enum Error {
          the drawing up"
     )]
     Held,
+    /// The machine waits for a pen, and nobody can say that it is in.
+    #[error(
+        "the machine waits for pen {pen}, and nobody can press Enter here, because standard input \
+         is no terminal\nPut pen {pen} in, then let the plotter go on by `penup resume`"
+    )]
+    WaitsForPen {
+        /// The number of the pen, counted from 1.
+        pen: u8,
+    },
     /// Reading from or writing to the link failed.
     #[error("the line to the plotter broke: {0}")]
     Link(#[from] io::Error),
@@ -512,6 +521,7 @@ impl Error {
             | Self::Damaged { .. }
             | Self::OtherContents
             | Self::Held
+            | Self::WaitsForPen { .. }
             | Self::Unconfirmed { .. }
             | Self::SetupBrokenOff { is_interrupted: false, .. }
             | Self::Link(_) => BROKEN_OFF,

@@ -57,6 +57,8 @@ pub enum Fault {
     IgnoresAbort,
     /// Is unplugged when the second abort is sent.
     GoneAtAbort,
+    /// Works, but nobody is there to put in a pen.
+    LeftAlone,
     /// Is locked after this alarm.
     Locked(u16),
 }
@@ -384,10 +386,14 @@ impl Link for FakePlotter {
         Ok(count)
     }
 
-    /// The pen is in when the client is asked for the second time.
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+    /// The pen is in when the client is asked for the second time, if somebody is there.
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
         self.requested_pens.push(pen);
-        Ok(self.requested_pens.len() == 2)
+        Ok(match self.requested_pens.len() {
+            _ if self.fault == Fault::LeftAlone => Answer::Nobody,
+            2 => Answer::Yes,
+            _ => Answer::NotYet,
+        })
     }
 
     fn request(&mut self) -> Option<UserRequest> {

@@ -60,11 +60,12 @@ pub trait Link {
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize>;
 
     /// Called repeatedly while the stopped machine waits for pen number `pen`, counted from 1.
-    /// Starts or awaits the change of the pen and returns whether the pen is in the holder now.
+    /// Starts or awaits the change of the pen and returns whether the pen is in the holder now, as
+    /// far as somebody can say so.
     ///
     /// # Errors
     /// The error that the port reports.
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool>;
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer>;
 
     /// Called repeatedly while the machine is in feed hold in the middle of a drawing. Informs the
     /// user if this is the `first` call of this hold, and returns whether the user wants the
@@ -184,13 +185,13 @@ impl Link for SerialLink {
     }
 
     /// Asks the user to change the pen, and assumes that it is in when the user has pressed Enter.
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
         let first = self.requested_pen.replace(pen) != Some(pen);
         let answer = self.ask(first, &format!("Put in pen {pen}, then press Enter"));
         if answer == Answer::Yes {
             self.requested_pen = None;
         }
-        Ok(answer == Answer::Yes)
+        Ok(answer)
     }
 
     fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {

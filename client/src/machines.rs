@@ -2,7 +2,7 @@
 
 use crate::emulator::{self, EmulatedBoard, EmulatorError};
 use crate::error::Error;
-use crate::link::Link;
+use crate::link::{Answer, Link};
 use crate::table::BoardRow;
 use penup_job::path::Run;
 use penup_job::sampled::SampledPath;
@@ -107,11 +107,11 @@ impl Link for Emulated {
         self.emulator.receive(buffer, timeout)
     }
 
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
         self.follow_pins().map_err(io::Error::other)?;
         self.pen.change_pen(pen);
         self.path.change_pen(pen);
-        Ok(true)
+        Ok(Answer::Yes)
     }
 }
 

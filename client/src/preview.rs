@@ -385,9 +385,9 @@ impl<I: Index> Link for InMemory<I> {
         Ok(now.len())
     }
 
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
         self.board.steps.change_pen(pen);
-        Ok(true)
+        Ok(Answer::Yes)
     }
 
     /// Goes on at once: the pen of a preview is full again after a pause for ink (`$215`).

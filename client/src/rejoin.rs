@@ -340,7 +340,7 @@ fn gone_for_good() -> io::Error {
 mod tests {
     use super::{Rejoining, Why, Wire, without_greeting};
     use crate::error::Error;
-    use crate::link::Link;
+    use crate::link::{Answer, Link};
     use crate::sender::{Sender, Timeouts};
     use penup_job::protocol::ABORT;
     use std::collections::VecDeque;
@@ -409,8 +409,8 @@ mod tests {
             self.port.now()
         }
 
-        fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-            Ok(true)
+        fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+            Ok(Answer::Yes)
         }
     }
 

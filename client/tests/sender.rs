@@ -444,3 +444,13 @@ fn a_job_goes_on_after_a_refusal() {
     assert!(matches!(error, Error::Refused { number: 168, .. }), "{error}");
     sender.go_on(false, &mut Quiet).expect("it goes on");
 }
+
+/// Nobody can say that the pen is in: the client says how to go on, and does not wait for ever.
+#[test]
+fn a_pen_that_nobody_can_put_in_ends_the_waiting() {
+    let mut plotter = FakePlotter::new(Fault::LeftAlone);
+    plotter.pen_before = Some((1, 2));
+    let error = job(&mut plotter, 3).expect_err("nobody is there");
+    assert!(matches!(error, Error::WaitsForPen { pen: 2 }), "{error}");
+    assert_eq!((error.exit_code(), plotter.aborts), (5, 1));
+}

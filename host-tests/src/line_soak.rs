@@ -312,8 +312,8 @@ impl Link for DamagedLine {
         Ok(bytes.len())
     }
 
-    fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-        Ok(true)
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     /// A damaged byte may have been a hold.

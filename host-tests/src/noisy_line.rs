@@ -9,7 +9,7 @@ use crate::random::Random;
 use crate::whole_jobs::Bench;
 use penup::drawing::PagePoint;
 use penup::plotter::Board;
-use penup_client::link::Link;
+use penup_client::link::{Answer, Link};
 use std::collections::{BTreeSet, VecDeque};
 use std::io;
 use std::time::{Duration, Instant};
@@ -190,8 +190,8 @@ impl Link for NoisyLine {
         }
     }
 
-    fn change_pen(&mut self, _pen: u8) -> io::Result<bool> {
-        Ok(true)
+    fn change_pen(&mut self, _pen: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     fn now(&self) -> Instant {

@@ -4,7 +4,7 @@
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
 use penup::board_table::LM3S6965;
-use penup_client::link::Link;
+use penup_client::link::{Answer, Link};
 use penup_client::machines::{WatchedPlotter, emulate};
 use penup_client::progress::Quiet;
 use penup_client::sender::{Sender, Timeouts};
@@ -55,7 +55,7 @@ impl Link for DamagedLine {
         Ok(bytes.len())
     }
 
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
         self.plotter.change_pen(pen)
     }
 }

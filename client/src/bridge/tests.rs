@@ -41,8 +41,8 @@ impl Link for Answers {
         Ok(count)
     }
 
-    fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-        Ok(true)
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     fn ask_to_resume(&mut self, _: bool) -> io::Result<Answer> {

@@ -154,7 +154,7 @@ fn talk(
 #[cfg(test)]
 mod tests {
     use super::{GREETING_SILENCES, LAST_SILENCES, objects, talk};
-    use crate::link::Link;
+    use crate::link::{Answer, Link};
     use std::io;
     use std::sync::mpsc;
     use std::time::Duration;
@@ -190,8 +190,8 @@ mod tests {
             Ok(0)
         }
 
-        fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-            Ok(true)
+        fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+            Ok(Answer::Yes)
         }
     }
 

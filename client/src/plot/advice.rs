@@ -53,6 +53,7 @@ pub(super) fn advice(
         Error::Link(_)
             | Error::Silent { .. }
             | Error::Held
+            | Error::WaitsForPen { .. }
             | Error::LostLine { .. }
             | Error::Damaged { .. }
     );

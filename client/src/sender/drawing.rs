@@ -376,7 +376,11 @@ impl Sender<'_> {
         held_since: &mut Option<Instant>,
     ) -> Result<bool, Error> {
         if let Some(pen) = pen {
-            return Ok(self.link.change_pen(pen)?);
+            return match self.link.change_pen(pen)? {
+                Answer::Yes => Ok(true),
+                Answer::NotYet => Ok(false),
+                Answer::Nobody => Err(Error::WaitsForPen { pen }),
+            };
         }
         let now = self.link.now();
         let is_new = held_since.is_none();

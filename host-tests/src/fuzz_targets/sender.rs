@@ -1,6 +1,6 @@
 //! A plotter that answers the client with anything.
 
-use penup_client::link::Link;
+use penup_client::link::{Answer, Link};
 use penup_client::progress::Quiet;
 use penup_client::sender::{Sender, Timeouts};
 use penup_readers::lines::JobLine;
@@ -53,8 +53,8 @@ impl Link for Script<'_> {
         Ok(count)
     }
 
-    fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-        Ok(true)
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     fn now(&self) -> Instant {

@@ -51,7 +51,7 @@ impl Link for Stalling {
         }
     }
 
-    fn change_pen(&mut self, pen: u8) -> io::Result<bool> {
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
         self.pens.push(pen);
         self.plotter.change_pen(pen)
     }
@@ -176,8 +176,8 @@ impl Link for Holding {
         self.plotter.receive(buffer, timeout)
     }
 
-    fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-        Ok(true)
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     fn ask_to_resume(&mut self, first: bool) -> io::Result<Answer> {
@@ -273,8 +273,8 @@ impl Link for Wire<'_> {
         Ok(count)
     }
 
-    fn change_pen(&mut self, _: u8) -> io::Result<bool> {
-        Ok(true)
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
     }
 
     fn now(&self) -> Instant {
