@@ -27,14 +27,14 @@ pub struct Status {
 }
 
 impl Machine<'_> {
-    /// The number of the pen, from 0, that the machine has stopped for and is waiting for.
+    /// The number of the pen, from 0, that the machine has stopped for and is waiting for. The pins
+    /// may still move: [`Machine::is_stopped`] tells when they stand.
     pub fn pen_wanted(&self) -> Option<u8> {
         // The next pen is known as soon as the path was read, and a feed hold may come before the
-        // pen change. So the machine must have finished the strokes of the present pen, and stand:
-        // a hand goes to the pen then.
+        // pen change. So the machine must have planned the strokes of the present pen to their end.
         match self.activity {
             Activity::Hold { stopped: true, source: Source::PenChange { pen, .. } }
-                if self.runner.is_at_rest() && self.is_stopped() =>
+                if self.runner.is_at_rest() =>
             {
                 Some(pen)
             }

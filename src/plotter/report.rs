@@ -248,7 +248,7 @@ impl<I: Index> Inner<'_, I> {
         if let State::Alarm(alarm) = status.state {
             reply.part(format_args!("|Alarm:{}", AlarmEntry::of(alarm).number));
         }
-        let pen = status.pen_wanted;
+        let pen = status.pen_wanted.filter(|_| self.machine.is_stopped());
         #[cfg(feature = "hpgl")]
         let pen = pen.or(self.hpgl_pen);
         if let Some(pen) = pen {

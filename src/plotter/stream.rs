@@ -95,7 +95,9 @@ impl<I: Index> Inner<'_, I> {
             self.machine.alarm(Alarm::EmergencyStop);
         }
         // Which of them came first is not known; a hold is the safe one, so it comes last.
-        if requests.has(RealTime::RESUME) {
+        // A pen that nobody has been asked for yet is not in.
+        let is_pen_due = self.machine.pen_wanted().is_some() && !self.machine.is_stopped();
+        if requests.has(RealTime::RESUME) && !is_pen_due {
             self.machine.resume();
         }
         if requests.has(RealTime::HOLD) {
@@ -154,7 +156,8 @@ impl<I: Index> Inner<'_, I> {
                 self.report_counts.overrides = 0;
             }
         }
-        let pen = self.machine.pen_wanted();
+        // A hand goes to the pen then.
+        let pen = self.machine.pen_wanted().filter(|_| self.machine.is_stopped());
         if pen != self.pen_reported {
             self.pen_reported = pen;
             if let Some(pen) = pen {
