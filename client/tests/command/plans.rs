@@ -112,3 +112,29 @@ fn a_plan_that_fits_the_turned_page_is_told_how_to_turn_it() {
     assert_eq!(told("250 100", &["--fit"]), (Some(0), false));
     assert_eq!(told("150 100", &[]), (Some(0), false));
 }
+
+/// Dots at any place of the grid of the motors are drawn, also where a millimetre has few steps.
+#[test]
+fn no_dot_is_lost_between_two_steps() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let dots: String = (0..1000)
+        .map(|number| {
+            let [column, row] = [number % 40, number / 40].map(f64::from);
+            format!("<path d='M{:.2},{:.2}h0'/>", column * 4.37 + 10.0, row * 6.13 + 10.0)
+        })
+        .collect();
+    let svg = format!(
+        "<svg xmlns='http://www.w3.org/2000/svg' width='200mm' height='200mm' \
+         viewBox='0 0 200 200'><g stroke='black' stroke-linecap='round'>{dots}</g></svg>"
+    );
+    fs::write(folder.path().join("dots.svg"), svg).expect("written");
+    for settings in [&[][..], &["--set", "100=40", "--set", "101=40"]] {
+        let preview = ["preview", "dots.svg", "--json", "dots.json"];
+        let (code, _, noted) = penup(folder.path(), &[&preview[..], settings].concat());
+        assert_eq!(code, Some(0), "{noted}");
+        let json = fs::read_to_string(folder.path().join("dots.json")).expect("a file");
+        let json: serde_json::Value = serde_json::from_str(&json).expect("JSON");
+        let strokes = json["stroke_pens"].as_array().map(Vec::len);
+        assert_eq!(strokes, Some(1000), "{settings:?}");
+    }
+}

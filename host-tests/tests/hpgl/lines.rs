@@ -55,7 +55,7 @@ fn lines_are_drawn_and_answered_as_listed() {
 #[test]
 fn lines_are_drawn_from_a_file_as_by_the_plotter() {
     /// A dot is drawn from a file as a line of 0.02 mm, in steps.
-    const DOT: f64 = 0.02 * 80.0;
+    const DOT: f64 = 0.08 * 80.0;
     let (mut drawn_alike, mut refused, mut faults) = (0, 0, String::new());
     for (line, [sent, answers, drawn]) in rows().filter(|(line, _)| !line.contains("␛.K")) {
         let expected = strokes(drawn);

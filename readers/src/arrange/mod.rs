@@ -221,9 +221,9 @@ impl Arrangement {
             && !self.scales_to_page()
             && let Some(map) = self.map_to(sheet, margin, plan.bounds())
         {
-            // The plotter scales the plan. A dot would become shorter than a step of the motors.
+            // The plotter scales the plan, but not its dots. Coordinates are whole thousandths.
             let factor = map([1.0, 0.0])[0] - map([0.0; 2])[0];
-            let length = DOT / factor.min(1.0);
+            let length = (DOT / factor).max(0.002);
             plan.strokes.iter_mut().for_each(|stroke| stroke.keep_dot(length));
         }
         if plan.is_empty() {

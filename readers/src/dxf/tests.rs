@@ -302,7 +302,7 @@ fn points_faces_and_dimensions_are_drawn() {
         let [(_, points)] = &strokes(&dxf("4", "", entities))[..] else { panic!("{entities}") };
         points.clone()
     };
-    assert_eq!(one("0 POINT 8 0 10 3 20 4 30 0"), [[3.0, 4.0], [3.02, 4.0]]);
+    assert_eq!(one("0 POINT 8 0 10 3 20 4 30 0"), [[3.0, 4.0], [3.08, 4.0]]);
     let corners = "10 0 20 0 30 1 11 4 21 0 31 1 12 4 22 2 32 1 13 0 23 2 33 1";
     let face = [[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0], [0.0, 0.0]];
     assert_eq!(one(&format!("0 3DFACE 8 0 {corners}")), face);
@@ -405,7 +405,7 @@ fn inserted_blocks_are_clipped() {
         let strokes = strokes(&text).into_iter().map(|(_, points)| points).collect::<Vec<_>>();
         (strokes, notes("a.dxf", text.as_bytes()))
     };
-    let whole = vec![vec![[-13.0, 5.0], [27.0, 5.0]], vec![[43.0, 5.0], [43.02, 5.0]]];
+    let whole = vec![vec![[-13.0, 5.0], [27.0, 5.0]], vec![[43.0, 5.0], [43.08, 5.0]]];
     let rectangle = "10 1 20 0 10 9 20 8";
     assert_eq!(clip(rectangle, ""), (vec![vec![[1.0, 5.0], [9.0, 5.0]]], vec![]));
     let triangle = "10 0 20 0 10 10 20 0 10 0 20 10";

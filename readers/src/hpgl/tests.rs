@@ -86,7 +86,7 @@ fn labels_and_fills_are_drawn_as_a_plotter_draws_them() {
 
 #[test]
 fn dots_are_drawn_as_very_short_lines() {
-    let expected = ["usemtl pen1", "v 1 1 0", "v 1.02 1 0", "l 1 2"];
+    let expected = ["usemtl pen1", "v 1 1 0", "v 1.08 1 0", "l 1 2"];
     for text in ["IN;PU40,40;PD;PU;", "IN;PU40,40;PD40,40;PU;", "IN;PA40,40;PD;PD;SP0;"] {
         assert_eq!(lines(text), expected, "{text}");
         assert!(notes("a.plt", text.as_bytes()).is_empty(), "{text}");
@@ -109,15 +109,19 @@ fn dots_keep_their_length_on_the_paper() {
         x.chunks(2).map(|ends| ((ends[1] - ends[0]) * 1000.0).round() / 1000.0).collect()
     };
     let mut scaled = Arrangement::default();
-    assert_eq!(lengths(&scaled), [0.02; 3]);
+    assert_eq!(lengths(&scaled), [0.08; 3]);
     for factor in ["0.1", "10"] {
         scaled.set("scale", factor).expect("a factor");
-        assert_eq!(lengths(&scaled), [0.02; 3]);
+        assert_eq!(lengths(&scaled), [0.08; 3]);
     }
     // The plotter scales a square of a metre to a tenth of that.
     let page = Page { width: 110.0, height: 210.0 };
     let fitted = Arrangement::on(Some(page), Turn::AsItIs, Some(5.0)).fitted("", 5.0);
-    assert_eq!(lengths(&fitted), [0.2; 3]);
+    assert_eq!(lengths(&fitted), [0.8; 3]);
+    // And to twice its size.
+    let page = Page { width: 2010.0, height: 2010.0 };
+    let fitted = Arrangement::on(Some(page), Turn::AsItIs, Some(5.0)).fitted("", 5.0);
+    assert_eq!(lengths(&fitted), [0.04; 3]);
 }
 
 #[test]

@@ -85,7 +85,7 @@ fn a_background_is_not_drawn_as_a_frame() {
 
 #[test]
 fn dots_with_round_or_square_ends_are_drawn_as_very_short_lines() {
-    let dot = |x: f64| vec![[x, 50.0], [x + 0.02, 50.0]];
+    let dot = |x: f64| vec![[x, 50.0], [x + 0.08, 50.0]];
     for cap in ["round", "square"] {
         let stroke = format!("stroke='red' stroke-linecap='{cap}'");
         let contents = read(&in_mm(&format!(
@@ -96,7 +96,7 @@ fn dots_with_round_or_square_ends_are_drawn_as_very_short_lines() {
         )));
         let contents = contents.expect("an SVG");
         let drawn: Vec<_> = polylines(&contents).into_iter().map(|(_, points)| points).collect();
-        let end = vec![[100.0, 50.0], [99.98, 50.0]];
+        let end = vec![[100.0, 50.0], [99.92, 50.0]];
         assert_eq!(drawn, [dot(10.0), dot(20.0), dot(30.0), dot(33.0), dot(40.0), end], "{cap}");
         let note = "1 path reaches beyond the page of the SVG: the rest is cut off";
         assert_eq!(contents.notes(), [note], "{cap}");
