@@ -6,8 +6,9 @@
 //! the user and the properties of a file into settings, and [`view`] says from where a model is
 //! seen. [`notes`] tells what is drawn otherwise than the file says, and which options do nothing.
 //! [`twin`] computes what the plotter must then contain, and [`room`] the memory that takes.
-//! [`machine_settings`] makes the machine that a computer simulates. [`streamed`] makes lines of
-//! what this computer has computed, and [`relooped`] lets their closed strokes begin elsewhere.
+//! [`machine_settings`] makes the machine that a computer simulates, and [`pen_lines`] tells what
+//! lowers the pen of a machine. [`streamed`] makes lines of what this computer has computed, and
+//! [`relooped`] lets their closed strokes begin elsewhere.
 //! [`pins`] and [`watch`] follow the pen to its [`path`], whose steps [`straight`] makes lines of,
 //! and of which [`sampled`] keeps what a page shows. [`strokes`] and [`results`] tell what was
 //! drawn, [`picture`] shows it, and [`export`] writes it for other machines.
@@ -20,6 +21,7 @@ pub mod machine_settings;
 pub mod notes;
 pub mod path;
 pub mod picture;
+pub mod pen_lines;
 pub mod pins;
 pub mod protocol;
 #[cfg(feature = "stream")]

@@ -50,6 +50,13 @@ impl AssignedSetting {
         }
     }
 
+    /// The setting that a line of a plotter such as `$100=80.000` tells. Firmware of before has its
+    /// name behind it.
+    pub fn told(line: &str) -> Option<Self> {
+        let assignment = line.strip_prefix('$')?.split(' ').next()?;
+        Self::parse(assignment).ok()
+    }
+
     /// The value as a plotter keeps it, rounded to 2^-16; `None` if it is beyond what a setting can
     /// be.
     pub fn kept(&self) -> Option<Value> {
@@ -60,6 +67,13 @@ impl AssignedSetting {
     pub fn name(&self) -> Option<&'static str> {
         SETTINGS.iter().find(|info| info.number() == self.number).map(|info| info.name)
     }
+}
+
+/// The value of a setting among those that a plotter has told; 0 if it has not told it.
+pub fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
+    let number = setting.info().number();
+    let own = settings.iter().find(|it| it.number == number);
+    own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
 }
 
 /// The settings that a machine has with `assigned`, and otherwise with the defaults. It needs no

@@ -1,6 +1,6 @@
 //! The commands that move the machine, stop it, or follow what it draws.
 
-use super::lowering::PenLines;
+use super::lowering::{dip, pen_lines};
 use super::settings::read;
 use super::status::{as_json, described};
 use super::{converse, open};
@@ -161,8 +161,8 @@ pub fn pen(args: &PenArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
             Ok(done("the pen is up", &sender.wait_until_ready()?))
         }
         PenPosition::Down => {
-            let pen = PenLines::of(&read(sender)?)?;
-            Ok(done("the pen was down, and is up again", &pen.dip(sender)?))
+            let pen = pen_lines(&read(sender)?)?;
+            Ok(done("the pen was down, and is up again", &dip(&pen, sender)?))
         }
     })
 }

@@ -11,7 +11,6 @@ use crate::machine_settings::AssignedSetting;
 use crate::outcome::Outcome;
 use crate::output;
 use crate::sender::Sender;
-use penup::machine::Setting;
 use penup_job::protocol::{BUILD, Reply, SETTINGS};
 use serde_json::{Map, Value, json};
 use std::path::Path;
@@ -177,18 +176,10 @@ pub(crate) fn read(sender: &mut Sender<'_>) -> Result<Vec<AssignedSetting>, Erro
     })
 }
 
-/// The value of a setting that was read.
-pub(super) fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
-    let number = setting.info().number();
-    let own = settings.iter().find(|it| it.number == number);
-    own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
-}
-
-/// The setting that a line such as `$100=80.000` tells. Firmware of before has its name behind it.
+/// The setting that a reply tells.
 fn setting_in(reply: &Reply) -> Option<AssignedSetting> {
     let Reply::Other(line) = reply else { return None };
-    let assignment = line.strip_prefix('$')?.split(' ').next()?;
-    AssignedSetting::parse(assignment).ok()
+    AssignedSetting::told(line)
 }
 
 /// The version of the firmware and the board that it runs on.

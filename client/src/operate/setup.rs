@@ -10,16 +10,16 @@ mod directions;
 mod polargraph;
 
 use self::answers::{Answers, say};
-use super::lowering::PenLines;
+use super::lowering::{dip, pen_lines};
 use super::open;
 use super::orders::jog_by;
-use super::settings::{as_json, change, read, value};
+use super::settings::{as_json, change, read};
 use super::squares::{self, MARGIN};
 use crate::cli::PlotterArgs;
 use crate::error::Error;
 use crate::interrupt::MovingPlotter;
 use crate::link::SerialLink;
-use crate::machine_settings::AssignedSetting;
+use crate::machine_settings::{AssignedSetting, value};
 use crate::outcome::Outcome;
 use crate::sender::{Sender, Timeouts};
 use penup::machine::Setting;
@@ -128,7 +128,7 @@ impl Setup<'_> {
             let settings = read(sender)?;
             setup.before.clone_from(&settings);
             // Without a pen that goes down there is nothing to set up.
-            PenLines::of(&settings)?;
+            pen_lines(&settings)?;
             say("Keep a hand at the switch of the motor supply.");
             Ok(settings)
         })?;
@@ -227,7 +227,7 @@ impl Setup<'_> {
         settings: &[AssignedSetting],
         part: u8,
     ) -> Result<(), End> {
-        let pen = PenLines::of(settings)?;
+        let pen = pen_lines(settings)?;
         say(&format!(
             "{part} of 5: heights of the pen, from 0 (raised) to 127 (lowered). Lay paper below \
              the pen. After each answer it goes down for a moment and up again."
@@ -238,7 +238,7 @@ impl Setup<'_> {
         ] {
             let mut height = value(settings, setting);
             loop {
-                pen.dip(sender)?;
+                dip(&pen, sender)?;
                 let question =
                     format!("{what}: it is {height} now. Which height? (Enter keeps it)");
                 let Some(new) = self.answers.number(&question, [0.0, 127.0])? else { break };

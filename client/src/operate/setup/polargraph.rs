@@ -1,12 +1,11 @@
 //! The setup of a polargraph. Its pen can only be moved along a line once the plotter knows where
 //! the motors are, so the machine is measured and the pen is brought to the origin first.
 
-use super::super::settings::value;
 use super::answers::say;
 use super::{End, Machine, Setup, expect_origin, reopened};
 use crate::cli::PlotterArgs;
 use crate::link::SerialLink;
-use crate::machine_settings::AssignedSetting;
+use crate::machine_settings::{AssignedSetting, value};
 use crate::sender::Sender;
 use penup::machine::Setting;
 use penup_job::protocol::HOME;
