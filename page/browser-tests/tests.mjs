@@ -961,6 +961,46 @@ test("a model is seen from a side, upright, and a drag turns it from there", asy
   assert.deepEqual(problems, []);
 });
 
+test("from above and from below, a drag turns the picture as it stands", async () => {
+  for (const [view, key] of [
+    ["top", "ArrowDown"],
+    ["bottom", "ArrowUp"],
+  ]) {
+    await fresh(`#file=lblock.obj&view=${view}`);
+    await page.focus("#sheet");
+    await page.keyboard.press(key);
+    const [eye, at] = await Promise.all(
+      ["eye", "at"].map(async (name) =>
+        (await page.inputValue(`#option-${name}`)).split(",").map(Number),
+      ),
+    );
+    const [x, y] = eye.map((c, axis) => c - at[axis]);
+    assert.ok(Math.abs(x) < 1e-3 * Math.abs(y), `${view}: ${eye} at ${at}`);
+    assert.ok(y < 0, `${view}: ${eye} at ${at}`);
+  }
+  assert.deepEqual(problems, []);
+});
+
+test("a field that has the focus shows the value in force, or what is being typed", async () => {
+  await fresh("#file=lblock.obj");
+  await page.fill("#option-azimuth", "30");
+  await page.press("#option-azimuth", "Enter");
+  await page.waitForFunction(() => document.getElementById("command").value.includes("azimuth"));
+  const wheel = () =>
+    page.evaluate(() =>
+      document
+        .getElementById("sheet")
+        .dispatchEvent(new WheelEvent("wheel", { deltaY: 40, altKey: true, cancelable: true })),
+    );
+  // The eye takes the place of the direction.
+  await wheel();
+  assert.equal(await page.inputValue("#option-azimuth"), "");
+  await page.keyboard.type("4");
+  await wheel();
+  assert.equal(await page.inputValue("#option-azimuth"), "4");
+  assert.deepEqual(problems, []);
+});
+
 test("touch: one finger turns, two zoom and move", async () => {
   await fresh("#file=notched.obj");
   const box = await page.locator("#sheet").boundingBox();

@@ -26,16 +26,20 @@ function level(up) {
 
 /**
  * The eye after a turn by these angles in degrees: `about` what is up, and `by` upwards. Its
- * distance from `at` is multiplied by `nearer`.
+ * distance from `at` is multiplied by `nearer`. An eye straight above or below turns as the picture
+ * stands, which `pictured` says: what is up in it, or null if that is chosen by itself.
  */
-export function turned({ eye, at }, upwards, about, by, nearer = 1) {
+export function turned({ eye, at, up: pictured }, upwards, about, by, nearer = 1) {
   const up = unit(upwards);
   const axes = [...level(up), up];
   const way = eye.map((c, i) => c - at[i]);
-  const [x, y, z] = axes.map((axis) => dot(way, axis));
+  const along = (vector) => axes.map((axis) => dot(vector, axis));
+  const [x, y, z] = along(way);
+  const isSteep = Math.hypot(x, y) < 1e-6 * Math.abs(z);
+  const [east, north] = isSteep ? along(times(pictured ?? axes[1], -z)) : [x, y];
   const distance = Math.hypot(x, y, z) * nearer;
   const degrees = 180 / Math.PI;
-  const azimuth = (Math.atan2(y, x) * degrees + about) / degrees;
+  const azimuth = (Math.atan2(north, east) * degrees + about) / degrees;
   const elevation = Math.asin(z / (Math.hypot(x, y, z) || 1)) * degrees + by;
   const steep = Math.max(-STEEPEST, Math.min(STEEPEST, elevation)) / degrees;
   const flat = Math.cos(steep) * distance;

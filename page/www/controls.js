@@ -92,7 +92,8 @@ export class Controls {
 
   /** Shows these values: a map of those that are not the defaults. */
   show(values) {
-    for (const [name, { option, box, choice, text }] of this.rows) {
+    for (const [name, parts] of this.rows) {
+      const { option, box, choice, text } = parts;
       const value = values.get(name) ?? option.default ?? "";
       if (box) box.checked = value === "on";
       if (choice) {
@@ -100,8 +101,11 @@ export class Controls {
         choice.value = known ? value : OTHER;
         if (text) text.hidden = known;
       }
-      if (text && document.activeElement !== text) text.value = values.get(name) ?? "";
-      else if (text) text.value = values.get(name) ?? text.value;
+      const inForce = values.get(name) ?? "";
+      // What is being typed stays as long as the value in force does.
+      const isTyped = document.activeElement === text && parts.shown === inForce;
+      if (text && !isTyped) text.value = inForce;
+      parts.shown = inForce;
     }
   }
 
