@@ -59,8 +59,9 @@ impl Board {
         let mut board = HostBoard::new(ring, pins);
         pins.set_queue(room.steps);
         let machine = NamedValues::parse(options)?.machine()?;
-        let plotter = Plotter::with_settings(room.lend(), pins, machine);
-        let plotter = plotter.with_early_ink(room.early_ink);
+        let plotter = Plotter::with_settings(room.lend(), pins, machine)
+            .without_undo()
+            .with_early_ink(room.early_ink);
         plotter.greet(&mut board);
         let steps = plotter.machine().settings().page_steps().map(|steps| steps.to_num::<f64>());
         let pen = PenWatch::new(1.0 / steps[0]);

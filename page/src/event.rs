@@ -21,6 +21,9 @@ pub enum Event {
         left: Option<f64>,
         /// The speeds in percent of those in the settings.
         percent: u16,
+        /// Whether the machine is at rest in a hold, and not because it waits for a pen: the user
+        /// holds it, or its pen needs ink.
+        is_held: bool,
         /// The strokes done and all of a job that has stopped and can go on.
         stopped: Option<(u64, u64)>,
     },

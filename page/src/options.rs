@@ -2,18 +2,18 @@
 
 use crate::source::Source;
 use crate::words::{for_page, sentence};
-use penup::machine;
+use penup::machine::{self, Setting, Value};
 use penup::plotter::{OPTIONS, PlotOptions};
 use penup::protocol::Escape;
 use penup_job::Settings;
 use penup_job::export::Retracing;
-use penup_job::machine_settings::{AssignedSetting, is_grid, simulated};
+use penup_job::machine_settings::{AssignedSetting, NoSuchMachine, is_grid, simulated};
 use penup_job::user_choices::{UserChoices, page_value};
 use penup_job::view::{
     AZIMUTH, ELEVATION, MOST_DEGREES, NAMED_VIEWS, VIEW, ViewOption, Viewpoint, Y_UP,
 };
-use penup_readers::PLAN_OPTIONS;
 use penup_readers::page::{A4, NAMED_PAGES, Page};
+use penup_readers::{PLAN_OPTIONS, words};
 use serde::Serialize;
 use wasm_bindgen::prelude::wasm_bindgen;
 
@@ -25,6 +25,17 @@ const RELOOP: &str = "reloop";
 
 /// The option that sets up the emulated machine.
 const SET: &str = "set";
+
+/// The settings of a plotter whose effect is left out of the page, because its program must be
+/// small: those of shaped motion, and of backlash that is taken up while the pen draws.
+const LEFT_OUT: [u16; 6] = [SHAPER, 227, 228, 229, SPREAD_BACKLASH, 238];
+/// Those of them that turn an effect on.
+const SHAPER: u16 = 226;
+const SPREAD_BACKLASH: u16 = 237;
+
+/// Why a machine is not emulated.
+const NO_GRID: &str = "The page emulates machines of which each motor moves one axis, by the same \
+                       steps per mm: penup preview computes this one.";
 
 /// The name of the option for the size of the page.
 const PAGE: &str = "page";
@@ -225,7 +236,6 @@ impl NamedValues {
     /// A sentence for the user: values contradict each other, or the file.
     pub fn settings_for(&self, source: &Source) -> Result<Settings, String> {
         self.retracing()?;
-        self.machine()?;
         let mut page = source.page;
         if let (Some(named), false) = (self.page()?, source.is_arranged) {
             page.sheet = named;
@@ -247,33 +257,86 @@ impl NamedValues {
         Ok(Retracing { passes, reloops: self.given(RELOOP).is_some() })
     }
 
-    /// The settings of the machine that the page emulates.
+    /// The settings that the user gives a machine.
+    ///
+    /// # Errors
+    /// A sentence for the user: one of them has a wrong form.
+    fn assigned(&self) -> Result<Vec<AssignedSetting>, String> {
+        let words = self.given(SET).unwrap_or_default().split([',', ' ', ';']);
+        let words = words.map(str::trim).filter(|word| !word.is_empty());
+        let assigned = words.map(AssignedSetting::parse).collect::<Result<_, _>>();
+        assigned.map_err(|reason| sentence(&reason))
+    }
+
+    /// The settings of the user's machine, as far as the page knows them.
+    ///
+    /// # Errors
+    /// A sentence for the user: there is no such machine.
+    fn real_machine(&self) -> Result<machine::Settings, String> {
+        let mut assigned = self.assigned()?;
+        assigned.retain(|setting| !LEFT_OUT.contains(&setting.number));
+        let known = |setting: &AssignedSetting| Setting::numbered(setting.number);
+        if let Some(AssignedSetting { number, .. }) = assigned.iter().find(|it| known(it).is_none())
+        {
+            return Err(format!("A machine has no setting {number}: clear it."));
+        }
+        let refused =
+            |reason: NoSuchMachine| sentence(&for_page(&words::for_client(&reason.to_string())));
+        simulated(&assigned).map_err(refused)
+    }
+
+    /// The settings of the machine that the page emulates: that of the user, but its motors turn
+    /// the usual way round and have no backlash, so that the levels of its pins tell where the pen
+    /// is. Its ink is the same; the moments in which backlash is taken up are left out.
     ///
     /// # Errors
     /// A sentence for the user: there is no such machine, or the page cannot show it.
     pub(crate) fn machine(&self) -> Result<machine::Settings, String> {
-        let words = self.given(SET).unwrap_or_default().split([',', ' ', ';']);
-        let words = words.map(str::trim).filter(|word| !word.is_empty());
-        let assigned = words.map(AssignedSetting::parse).collect::<Result<Vec<_>, _>>();
-        let machine = simulated(&assigned.map_err(|reason| sentence(&reason))?);
-        let machine = machine.map_err(|reason| sentence(&reason.to_string()))?;
+        let mut machine = self.real_machine()?;
         if !is_grid(&machine) {
-            return Err("The page emulates machines of which each motor moves one axis, by the \
-                        same steps per mm: penup preview computes this one."
-                .to_owned());
+            return Err(NO_GRID.to_owned());
+        }
+        // The motor of the pen keeps its direction, on which its heights depend.
+        let of_pen = machine.get(Setting::InvertDirections).to_num::<u8>() & 4;
+        for (setting, value) in [
+            (Setting::InvertDirections, Value::from_num(of_pen)),
+            (Setting::BacklashX, Value::ZERO),
+            (Setting::BacklashY, Value::ZERO),
+        ] {
+            machine.set(setting, value).map_err(|_| NO_GRID.to_owned())?;
         }
         Ok(machine)
     }
 
+    /// What the page cannot show of the user's machine, in sentences. It can be plotted on.
+    ///
+    /// # Errors
+    /// A sentence for the user: there is no such machine.
+    pub(crate) fn not_shown(&self) -> Result<Vec<String>, String> {
+        let mut notes = Vec::new();
+        if !is_grid(&self.real_machine()?) {
+            notes.push(NO_GRID.to_owned());
+        }
+        let assigned = self.assigned()?;
+        for (setting, what) in
+            [(SHAPER, "shaped motion"), (SPREAD_BACKLASH, "backlash taken up in strokes")]
+        {
+            if assigned.iter().any(|it| it.number == setting && it.value.parse() != Ok(0.0)) {
+                notes.push(format!("The page does not show {what} (setting {setting})."));
+            }
+        }
+        Ok(notes)
+    }
+
     /// The choices of the user.
     fn choices(&self) -> Result<UserChoices, String> {
-        let flags = OPTIONS.iter().filter(|option| option.flag.get().is_some());
-        let mut values: Vec<_> = flags
-            .filter_map(|option| {
-                let given = self.given(option.name).map(|value| as_sent(option.name, value));
-                Some((option.name, given.or_else(|| default_of(option.name))?))
-            })
-            .collect();
+        let mut values = Vec::new();
+        for option in OPTIONS.iter().filter(|option| option.flag.get().is_some()) {
+            let given = self.given(option.name).map(|value| as_sent(option.name, value));
+            if let Some(value) = given.transpose()?.or_else(|| default_of(option.name)) {
+                values.push((option.name, value));
+            }
+        }
         let angle = |option: ViewOption, most: f64| match self.given(option.name) {
             None => Ok(None),
             Some(text) => match text.parse::<f64>() {
@@ -327,7 +390,18 @@ impl NamedValues {
     }
 }
 
-/// A value as it is sent: the title has escapes for letters beyond ASCII.
-fn as_sent(name: &str, value: &str) -> String {
-    if name == "title" { Escape(value).to_string() } else { value.trim().to_lowercase() }
+/// A value as it is sent: the title has escapes for letters beyond ASCII, and for those on which a
+/// plotter acts at once.
+///
+/// # Errors
+/// A sentence for the user: another value has such letters, which no value of an option needs.
+fn as_sent(name: &str, value: &str) -> Result<String, String> {
+    if name == "title" {
+        return Ok(Escape(value).to_string());
+    }
+    let is_plain = |byte| matches!(byte, b' '..=b'}') && !matches!(byte, b'!' | b'?');
+    if !value.bytes().all(is_plain) {
+        return Err(format!("\u{201c}{name}\u{201d} has a letter that no value has: clear it."));
+    }
+    Ok(value.to_lowercase())
 }

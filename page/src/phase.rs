@@ -27,6 +27,8 @@ pub enum Phase {
     Drawing,
     /// Asks for the report on it.
     Reporting,
+    /// Asks for the settings that tell what lowers the pen by hand.
+    Asking,
     /// Delivers a line that the user sent by hand.
     Commanding,
 }
@@ -42,7 +44,7 @@ impl Phase {
             Phase::Sending | Phase::Comparing => "sending",
             Phase::Starting => "computing",
             Phase::Drawing | Phase::Watching => "drawing",
-            Phase::Reporting | Phase::Commanding => return None,
+            Phase::Reporting | Phase::Asking | Phase::Commanding => return None,
         })
     }
 }

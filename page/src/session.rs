@@ -13,10 +13,13 @@ use crate::options::{NamedValues, text_of};
 use crate::phase::Phase;
 use crate::sheet::Shared;
 use crate::source::Source;
+use crate::words::sentence;
 use penup_job::Job;
+use penup_job::machine_settings::AssignedSetting;
+use penup_job::pen_lines::PenLines;
 use penup_job::protocol::{
-    ABORT, AS_SET, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, HOME, LAST_NUMBER, PEN_DOWN, PEN_UP,
-    RESUME, ReplyReader, SLOWER, STATUS_QUERY, STREAM, UNLOCK, numbered,
+    ABORT, AS_SET, FASTER, GO_ON, GO_ON_AT_ORIGIN, HOLD, HOME, LAST_NUMBER, RESUME, ReplyReader,
+    SETTINGS, SLOWER, STATUS_QUERY, STREAM, UNLOCK, numbered,
 };
 use penup_job::results::JobReport;
 use penup_job::twin;
@@ -35,6 +38,15 @@ const ABSOLUTE: &str = "G90";
 /// The longest time in ms between two ticks that counts. A computer that sleeps, or a browser that
 /// lets a page wait, hears nothing meanwhile.
 const LONGEST_TICK: f64 = 1000.0;
+
+/// What is done by hand with a pen whose machine has told its settings.
+#[derive(Debug, Clone, Copy)]
+enum ByHand {
+    PenDown,
+    PenUp,
+    /// A square with sides of so many mm.
+    Square(f64),
+}
 
 /// The session.
 #[wasm_bindgen]
@@ -60,7 +72,7 @@ pub struct Session {
     messages: Vec<String>,
     delivery: Option<Delivery>,
     /// What is delivered next: what goes on with a job, once it is known that no computer has sent
-    /// it, or the command that homes, once the plotter counts lines anew.
+    /// it, or the command that ends an alarm, once the plotter counts lines anew.
     next: Option<&'static str>,
     /// The number of the last accepted line.
     number: i32,
@@ -70,6 +82,10 @@ pub struct Session {
     contents: Option<[u32; 2]>,
     report: Option<JobReport>,
     strokes: u64,
+    /// What is moved by hand once the plotter has told its settings, in the same lines twice.
+    by_hand: ByHand,
+    settings: Vec<String>,
+    settings_before: Vec<String>,
     /// How often the plotter was asked again for what did not arrive whole.
     questions: u32,
     /// How many reports in succession say that the machine rests and that a job has stopped.
@@ -114,6 +130,9 @@ impl Session {
             contents: None,
             report: None,
             strokes: 0,
+            by_hand: ByHand::PenUp,
+            settings: Vec::new(),
+            settings_before: Vec::new(),
             questions: 0,
             stops: 0,
             reads_no_lines: false,
@@ -206,15 +225,15 @@ impl Session {
     /// # Errors
     /// A sentence for the user: the session is doing something else.
     pub fn test_square(&mut self, mm: f64) -> Result<(), String> {
-        // Where the pen is may be told in another unit, or not at all.
-        let sides = [('X', mm), ('Y', mm), ('X', -mm), ('Y', -mm)];
-        let sides = sides.map(|(axis, by)| format!("G21 G91 G1 {axis}{by:.3}"));
-        let ends = [PEN_UP, ABSOLUTE].map(str::to_owned);
-        let lines = [PEN_DOWN.to_owned()].into_iter().chain(sides).chain(ends);
-        self.begin_lines(lines.collect())?;
-        self.is_relative = true;
-        self.enter(Phase::Commanding);
-        Ok(())
+        self.begin_by_hand(ByHand::Square(mm))
+    }
+
+    /// Lowers the pen where it stands, or raises it.
+    ///
+    /// # Errors
+    /// A sentence for the user: the session is doing something else.
+    pub fn move_pen_by_hand(&mut self, is_down: bool) -> Result<(), String> {
+        self.begin_by_hand(if is_down { ByHand::PenDown } else { ByHand::PenUp })
     }
 
     /// Gives the drawing up: the machine stops with the pen up.
@@ -230,16 +249,10 @@ impl Session {
     /// # Errors
     /// A sentence for the user: the session is doing something else.
     pub fn command(&mut self, text: &str) -> Result<(), String> {
-        if text == UNLOCK && self.phase == Phase::Alarm {
+        let cure = [UNLOCK, HOME].into_iter().find(|cure| *cure == text);
+        if cure.is_some() && self.phase == Phase::Alarm {
             // Once lines have had numbers, the plotter refuses those that have none.
-            (self.delivery, self.next) = (None, None);
-            self.begin_numbers();
-            self.out.extend(format!("{}\n", numbered(Some(1), UNLOCK)).bytes());
-            self.enter(Phase::Finding);
-            return Ok(());
-        }
-        if text == HOME && self.phase == Phase::Alarm {
-            (self.delivery, self.next) = (None, Some(HOME));
+            (self.delivery, self.next) = (None, cure);
             self.begin_numbers();
             self.enter(Phase::Alarm);
             return Ok(());
@@ -391,10 +404,49 @@ impl Session {
         let Some(next) = self.next.take() else { return };
         self.number = 0;
         // An alarm may have left coordinates relative.
-        let behind = (next == HOME).then_some(ABSOLUTE);
+        let behind = [UNLOCK, HOME].contains(&next).then_some(ABSOLUTE);
         let mut lines = vec![JobLine::command(next)];
         lines.extend(behind.map(JobLine::command));
         self.deliver(Rc::new(lines));
+    }
+
+    /// Begins to ask for the settings that tell what lowers the pen, to move it by hand then.
+    ///
+    /// # Errors
+    /// A sentence for the user: the session is doing something else.
+    fn begin_by_hand(&mut self, what: ByHand) -> Result<(), String> {
+        self.begin_lines(vec![SETTINGS.to_owned()])?;
+        (self.by_hand, self.questions) = (what, 0);
+        self.settings.clear();
+        self.settings_before.clear();
+        self.enter(Phase::Asking);
+        Ok(())
+    }
+
+    /// Moves the pen by hand, once the settings are known.
+    fn move_pen(&mut self) {
+        let settings = self.settings.iter().filter_map(|line| AssignedSetting::told(line));
+        let PenLines { down, up } = match PenLines::of(&settings.collect::<Vec<_>>()) {
+            Ok(lines) => lines,
+            Err(reason) => {
+                self.fail(format!("{}.", sentence(reason)));
+                return self.enter(Phase::Ready);
+            }
+        };
+        let lines = match self.by_hand {
+            ByHand::PenDown => vec![down],
+            ByHand::PenUp => vec![up],
+            ByHand::Square(mm) => {
+                self.is_relative = true;
+                // Where the pen is may be told in another unit, or not at all.
+                let sides = [('X', mm), ('Y', mm), ('X', -mm), ('Y', -mm)];
+                let sides = sides.map(|(axis, by)| format!("G21 G91 G1 {axis}{by:.3}"));
+                let ends = [up, ABSOLUTE.to_owned()];
+                [down].into_iter().chain(sides).chain(ends).collect()
+            }
+        };
+        self.deliver(Rc::new(lines.into_iter().map(JobLine::command).collect::<Vec<_>>()));
+        self.enter(Phase::Commanding);
     }
 
     fn begin_job(&mut self) {

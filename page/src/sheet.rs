@@ -202,14 +202,17 @@ impl Sheet {
 impl Sheet {
     /// The settings that `options` choose for the file that is open.
     fn settings(&mut self, options: &str) -> Result<Settings, String> {
-        let settings = NamedValues::parse(options)?.settings_for(&self.source)?;
+        let options = NamedValues::parse(options)?;
+        let settings = options.settings_for(&self.source)?;
+        let not_shown = options.not_shown()?;
         self.page = [settings.page.width, settings.page.height];
         let plan = self.source.bounds.map(|bounds| notes::of_plan(&settings, bounds));
         let idle = notes::idle_options(&settings, self.source.bounds.is_some());
         let known = notes::followed(&settings);
         let of_file = self.source.notes.iter().filter(|note| !known.contains(&note.as_str()));
         let all = of_file.cloned().chain(plan.into_iter().flatten()).chain(idle);
-        self.said = all.map(|note| format!("{}.", sentence(&for_page(&note)))).collect();
+        let all = all.map(|note| format!("{}.", sentence(&for_page(&note))));
+        self.said = all.chain(not_shown).collect();
         Ok(settings)
     }
 
@@ -240,7 +243,7 @@ fn started(room: Room) -> (HostBoard<'static>, Plotter<'static, Number>) {
     // sheet and keeps it; only a larger model takes more.
     let ring = Box::leak(Box::new(EventRing::new()));
     let pins = Box::leak(Box::new(PulserState::new()));
-    (HostBoard::new(ring, pins), Plotter::new(room.lend(), pins))
+    (HostBoard::new(ring, pins), Plotter::new(room.lend(), pins).without_undo())
 }
 
 impl Default for Sheet {

@@ -41,7 +41,8 @@ pub fn for_page(text: &str) -> String {
 
 /// Says why a line was refused, from the number of the error and the messages before it.
 pub fn refusal(line: Option<&JobLine>, number: u16, messages: &[String]) -> String {
-    let reason = words::explained(number, messages);
+    let messages: Vec<_> = messages.iter().map(|it| with_buttons(it, &BUTTONS)).collect();
+    let reason = words::explained(number, &messages);
     let text = match line.map(|line| (&line.origin, &line.sent)) {
         Some((Some(origin), _)) => {
             format!("{}, line {}: {reason}: {}", origin.file, origin.line, origin.shown())
@@ -52,20 +53,27 @@ pub fn refusal(line: Option<&JobLine>, number: u16, messages: &[String]) -> Stri
     for_page(&text)
 }
 
-/// The buttons of the page for the lines that a cure of an alarm tells to send.
-const BUTTONS: [(&str, &str); 4] = [
+/// The buttons of the page for the lines that a plotter tells to send.
+const BUTTONS: [(&str, &str); 6] = [
+    ("'$H'|'$X' to unlock", "press Home or Unlock"),
+    ("send $X to unlock", "press Unlock"),
     ("send $X", "press Unlock"),
     ("send $H", "press Home"),
     ("with $H", "with Home"),
     ("or $X if", "or Unlock if"),
 ];
 
+/// A message of the plotter in the words of the page.
+pub fn message(text: &str) -> String {
+    for_page(&words::for_client(&with_buttons(text, &BUTTONS)))
+}
+
 /// Says what an alarm means and what to do about it.
 pub fn alarm(number: u16, messages: &[String]) -> String {
     let said = if messages.is_empty() {
         String::new()
     } else {
-        format!(" It said: {}.", for_page(&words::for_client(&messages.join("; "))))
+        format!(" It said: {}.", message(&messages.join("; ")))
     };
     let entries = alarm_entries();
     match entries.iter().find(|entry| u16::from(entry.number) == number) {

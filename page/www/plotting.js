@@ -79,6 +79,8 @@ export class Plotting {
     $("go-on").addEventListener("click", () => this.goOn(false));
     $("go-on-origin").addEventListener("click", () => this.goOn(true));
     $("test-square").addEventListener("click", () => this.tell("testSquare", { mm: SQUARE }));
+    $("pen-up").addEventListener("click", () => this.tell("movePen", { isDown: false }));
+    $("pen-down").addEventListener("click", () => this.tell("movePen", { isDown: true }));
     $("heights-read").addEventListener("click", () => this.tell("command", { text: "$$" }));
     for (const field of document.querySelectorAll("[data-setting]")) {
       field.addEventListener("change", () => {
@@ -213,7 +215,12 @@ export class Plotting {
     if (text || this.missing !== missing) this.problem(`${text} ${this.missing}`.trim());
   }
 
-  async plot() {
+  /** Plots the drawing. A second press before that has begun is none. */
+  plot() {
+    this.beginning ??= this.beginPlot().finally(() => (this.beginning = null));
+  }
+
+  async beginPlot() {
     this.missing = "";
     this.problem("");
     try {
@@ -257,7 +264,7 @@ export class Plotting {
   async tell(call, args) {
     if (!this.session) {
       if (this.isFar) return this.problem("Connect the plotter first.");
-      if (!["command", "testSquare"].includes(call)) return;
+      if (!["command", "testSquare", "movePen"].includes(call)) return;
       // The first command by hand starts the emulated plotter, and is sent when that is ready.
       this.waiting = [call, args];
       const job = await this.job().catch(() => null);
@@ -421,16 +428,18 @@ export class Plotting {
 
   /** Offers to go on with a job that has stopped, of which so many strokes are drawn. */
   offer(stopped) {
-    if ($("stopped").hidden === !stopped) return;
     $("stopped").hidden = !stopped;
     if (!stopped) return;
     const [done, all] = stopped;
     // How many there are is not known of a drawing that is computed part by part.
     const count = all === 0 ? `${done}` : `${done} of ${all}`;
     const strokes = `${count} ${(all || done) === 1 ? "stroke" : "strokes"}`;
-    $("stopped").querySelector("p").textContent =
+    const said =
       `A job has stopped after ${strokes}. It can go on once the machine is ` +
       "homed (By hand: Home), or the pen was put at the origin by hand.";
+    const shown = $("stopped").querySelector("p");
+    // A screen reader reads it once.
+    if (shown.textContent !== said) shown.textContent = said;
   }
 
   /** More of the path that the pins of the emulated plotter have made. */
@@ -461,8 +470,9 @@ export class Plotting {
   buttons() {
     const busy = ["sending", "computing", "drawing"].includes(this.phase);
     const joined = Boolean(this.session);
-    $("plot").disabled =
-      busy || this.isHeld || this.phase === "alarm" || (this.isFar && this.phase !== "ready");
+    // The first plot joins an emulated plotter.
+    const canPlot = this.phase === "ready" || (this.phase === "closed" && !this.isFar);
+    $("plot").disabled = !canPlot || this.isHeld;
     const moves = Boolean(this.moves);
     $("hold").disabled = !(this.phase === "drawing" || moves) || this.isHeld;
     $("resume").disabled = !this.isHeld;

@@ -14,6 +14,8 @@ const REPLAY_STEP = 200;
 const SAMPLE = 4;
 
 let sheet, board, session;
+/** Sends what the session has to send, and tells what has happened to it. */
+let flush;
 
 const calls = {
   async start({ module }) {
@@ -71,7 +73,7 @@ const calls = {
   session({ pipe, kind }) {
     session = new Session(SILENCE[kind]);
     session.connect(performance.now());
-    const flush = () => {
+    flush = () => {
       const out = session.take_out();
       if (out.length) pipe.postMessage({ bytes: out }, [out.buffer]);
       const events = JSON.parse(session.take_events());
@@ -94,6 +96,8 @@ const calls = {
   },
   plot({ name, bytes, isRead, options }) {
     session.plot(name, bytes, isRead, options);
+    // The page knows that the plotter is busy before it has this answer.
+    flush();
   },
   override({ by }) {
     session.override_speed(by);
@@ -103,6 +107,9 @@ const calls = {
   },
   testSquare({ mm }) {
     session.test_square(mm);
+  },
+  movePen({ isDown }) {
+    session.move_pen_by_hand(isDown);
   },
   hold() {
     session.hold();
@@ -182,6 +189,8 @@ function drawn([name, bytes, isRead, options], clock, notes) {
         board.change_pen(event.pen);
         session.resume();
       }
+      // Nobody holds it: its pen needs ink, and has it at once.
+      if (event.is_held) session.resume();
       if (event.kind === "drawn") report = event.report;
       if (event.kind === "status" && event.strokes && performance.now() - reported > 100) {
         reported = performance.now();

@@ -5,9 +5,9 @@ use super::{ABSOLUTE, Session};
 use crate::delivery::Outcome;
 use crate::event::Event;
 use crate::phase::Phase;
-use crate::words::{alarm, refusal};
+use crate::words::{alarm, message, refusal, sentence};
 use penup::protocol::CommandError;
-use penup_job::protocol::{ABORT, MODEL, PLOT, Reply, Status, is_penup};
+use penup_job::protocol::{ABORT, MODEL, PLOT, Reply, SETTINGS, Status, is_penup};
 use penup_job::results::JobReport;
 use penup_readers::lines::JobLine;
 use std::rc::Rc;
@@ -28,9 +28,11 @@ impl Session {
             Reply::Message(text) => {
                 self.messages.push(text.clone());
                 let is_note = matches!(self.phase, Phase::Drawing | Phase::Starting | Phase::Ready);
-                // The refusal of a question before what comes next is none.
-                if is_note && self.next.is_none() {
-                    self.events.push(Event::Note { text: text.clone() });
+                // The refusal of a question before what comes next is none, and a wanted pen has an
+                // event of its own.
+                if is_note && self.next.is_none() && !text.starts_with("put in pen") {
+                    let text = format!("{}.", sentence(&message(text)));
+                    self.events.push(Event::Note { text });
                 }
             }
             Reply::Alarm(number) => return self.alarmed(*number),
@@ -48,6 +50,9 @@ impl Session {
             Reply::Done(0) if self.delivery.is_none() => self.begin_next(),
             Reply::Other(line) => {
                 self.report = JobReport::parse(self.strokes, line).or(self.report.take());
+                if self.phase == Phase::Asking {
+                    self.settings.push(line.clone());
+                }
                 if self.phase == Phase::Commanding {
                     self.events.push(Event::Reply { text: line.clone() });
                 }
@@ -143,6 +148,17 @@ impl Session {
                 self.job = None;
                 self.enter(Phase::Drawing);
             }
+            // A line of settings has no checksum: two answers must agree.
+            Phase::Asking if self.settings != self.settings_before => {
+                self.questions += 1;
+                if self.questions > MOST_QUESTIONS {
+                    self.fail("The line damages what the plotter answers: check it.".to_owned());
+                    return self.enter(Phase::Ready);
+                }
+                self.settings_before = std::mem::take(&mut self.settings);
+                self.deliver(Rc::new(vec![JobLine::command(SETTINGS)]));
+            }
+            Phase::Asking => self.move_pen(),
             Phase::Reporting if self.report.is_none() && self.questions < MOST_QUESTIONS => {
                 self.questions += 1;
                 self.deliver(Rc::new(vec![JobLine::command(MODEL)]));
@@ -223,6 +239,7 @@ impl Session {
             state: status.state.clone(),
             position: status.position.split(',').filter_map(|c| c.parse().ok()).collect(),
             percent: self.percent,
+            is_held: status.is_standing && status.pen_wanted.is_none(),
             stopped: status.stopped,
             strokes: status.strokes,
             ink: pair("Ink:"),

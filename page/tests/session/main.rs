@@ -2,11 +2,13 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+mod machine;
+
 use penup::checksum::CRC_16;
 use penup_page::{Board, Session, Sheet};
 use serde_json::Value;
 
-const NOTCHED: &[u8] = include_bytes!("../../scenes/notched.obj");
+const NOTCHED: &[u8] = include_bytes!("../../../scenes/notched.obj");
 const OPTIONS: &str = r#"[["hidden","dashed"],["page","100x80"]]"#;
 
 /// A pipe between a session and a board.
