@@ -18,9 +18,9 @@ pub(crate) type Point = [f64; 2];
 /// resolution.
 const PER_MM: f64 = 1000.0;
 
-/// The length in mm of the line that is drawn for a dot. The plotter takes points less than two motor
-/// steps apart for one, and leaves out a line of one point: this is three steps where a millimetre
-/// has 40, which are few.
+/// The length in mm of the line that is drawn for a dot. The plotter takes points less than two
+/// motor steps apart for one, and leaves out a line of one point. This is three steps where a
+/// millimetre has 40, which are few.
 pub(crate) const DOT: f64 = 0.08;
 
 /// The coordinate in mm from which on a plan is moved: less than the largest that plotters take.
