@@ -171,15 +171,17 @@ fn a_program_that_draws_nothing_or_too_little_says_which_setting_to_change() {
 }
 
 #[test]
-fn a_first_line_that_a_pause_leaves_without_ink_is_told() {
+fn a_first_line_without_ink_is_told() {
     let mut bench = bench("");
-    assert!(!send(&mut bench, "G0 X0 Y0\nG1 X10 F3000\nG1 Y10").contains("MSG"));
-    // The sender has paused for more than a second, and the program counts as a new one.
-    let heard = send(&mut bench, "G1 X0\nG1 Y0");
+    let heard = send(&mut bench, "G1 X10 F3000\nG1 Y10");
     assert!(heard.contains("[MSG:the first line was not inked"), "{heard}");
-    assert!(!inked(&bench).contains(&[5.0 * STEPS, 10.0 * STEPS]));
-    // It is told once.
-    assert!(!send(&mut bench, "G0 X5\nG1 X10\nG1 Y10").contains("MSG"));
+    assert!(!inked(&bench).contains(&[5.0 * STEPS, 0.0]));
+    // The program has drawn by G1, so that it draws on behind a pause of its sender.
+    assert!(!send(&mut bench, "G1 X0\nG1 Y0").contains("MSG"));
+    assert!(inked(&bench).contains(&[5.0 * STEPS, 10.0 * STEPS]));
+    // Behind its end another one begins.
+    let heard = send(&mut bench, "M2\nG1 X10\nG1 Y10");
+    assert!(heard.contains("[MSG:the first line was not inked"), "{heard}");
 }
 
 #[test]

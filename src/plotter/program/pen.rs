@@ -239,7 +239,7 @@ impl Program {
                 }
             })
         } else if pen.first_is_dry && pen.inked > 0 {
-            Some("the first line was not inked: it came alone, or after a second of idleness")
+            Some("the first line was not inked: it might have been typed. Begin with G0 or M3")
         } else if pen.varies && matches!(rule, PenRule::Auto | PenRule::Spindle) {
             Some("S changed while M3 was on: if S moves the pen, set $206=3, and $216 and $217")
         } else if pen.inked > 0 && pen.dry > 8 && pen.dry / 2 > pen.inked {
