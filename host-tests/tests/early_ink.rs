@@ -464,6 +464,17 @@ fn after_a_cut_before_and_while_the_order_is_kept_the_drawing_is_whole() {
     }
 }
 
+/// The flash as it would be if a firmware with other sources had begun the job in it.
+fn with_other_sources(mut flash: CutFlash) -> CutFlash {
+    let (slot, sum) = LAYOUT.job.identify(&mut flash).expect("a job");
+    let (log, mut notes) = (LAYOUT.logs[slot], [0; NOTE_BYTES]);
+    let (length, noted) = log.read(&mut flash, sum, &mut notes).expect("a log");
+    notes[24] ^= 1;
+    log.begin(&mut flash, sum, &notes[..length]).expect("it is taken");
+    log.note(&mut flash, 0, noted.parts).expect("it is taken");
+    flash
+}
+
 /// Another firmware may compute another order, so a stroke with the same number may be another one.
 #[test]
 fn a_job_without_an_order_does_not_go_on_with_other_sources() {
@@ -476,13 +487,7 @@ fn a_job_without_an_order_does_not_go_on_with_other_sources() {
             plotter.order(&lines);
             plotter.finish();
         });
-        let mut flash = flash.powered();
-        let (slot, sum) = LAYOUT.job.identify(&mut flash).expect("a job");
-        let (log, mut notes) = (LAYOUT.logs[slot], [0; NOTE_BYTES]);
-        let (length, noted) = log.read(&mut flash, sum, &mut notes).expect("a log");
-        notes[24] ^= 1;
-        log.begin(&mut flash, sum, &notes[..length]).expect("it is taken");
-        log.note(&mut flash, 0, noted.parts).expect("it is taken");
+        let flash = with_other_sources(flash.powered());
         switch_on_early::<16384>(flash, Some(MILLISECOND), |plotter| {
             let answer = plotter.say("$resume=origin");
             let expected = if is_refused { "error:165\n" } else { "ok\n" };
@@ -503,6 +508,48 @@ fn cut_before_its_order(lines: &[String]) -> (Run, CutFlash, Run) {
         plotter.run(10_000);
     });
     (whole, flash, drawn(&changes))
+}
+
+/// The order that another firmware computes to check a copy must not be kept for the job that has
+/// stopped, whose first strokes were drawn in their own order.
+#[test]
+fn an_order_by_other_sources_is_not_kept_for_the_stopped_job() {
+    let (_, flash, _) = cut_before_its_order(&lattice());
+    let flash = with_other_sources(flash.powered());
+    let early = Some(MILLISECOND);
+    let (flash, _) = switch_on_early::<16384>(flash, early, |plotter| {
+        assert!(plotter.say("$C").ends_with("ok\n"));
+        assert!(plotter.say("$again").ends_with("ok\n"));
+    });
+    switch_on_early::<16384>(flash.powered(), early, |plotter| {
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.ends_with("error:165\n"), "{answer}");
+    });
+}
+
+/// A copy is cut before each page that it writes, and goes on in the order in which it began.
+#[test]
+fn a_copy_of_a_job_without_an_order_goes_on_in_its_order() {
+    let lines = lattice();
+    let (whole, flash, _) = cut_before_its_order(&lines);
+    let flash = with_other_sources(flash.powered());
+    for budget in (0..60 * 256).step_by(3 * 256) {
+        let early = Some(MILLISECOND);
+        let copy = CutFlash { budget, ..flash.clone() };
+        let (flash, before) = switch_on_early::<16384>(copy, early, |plotter| {
+            plotter.say("$again");
+            plotter.finish();
+        });
+        let (_, after) = switch_on_early::<16384>(flash.powered(), early, |plotter| {
+            let answer = plotter.say("$resume=origin");
+            if !answer.ends_with("ok\n") {
+                assert_eq!(drawn(&before), Run::new(), "{budget}: {answer}");
+                assert!(plotter.say("$again").ends_with("ok\n"));
+            }
+            plotter.finish();
+        });
+        assert_one_drawing(&whole, &[drawn(&before), drawn(&after)]);
+    }
 }
 
 /// A job that was cut before its order was kept can be drawn anew without its model.

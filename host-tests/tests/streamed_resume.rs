@@ -291,6 +291,68 @@ fn digits(number: i32) -> String {
     }
 }
 
+/// The header of a job of separate strokes of 400 steps, each below the one before, and its first
+/// lines: one stroke each, drawn by the pen with this number, from 0.
+fn apart(strokes: u32, pens: &[u8]) -> Vec<String> {
+    let head =
+        format!("$stream=5242880,5242880,7,{},400,400,800,16000,{strokes},1,1,1000", 2 * strokes);
+    let stroke = |(number, pen): (usize, &u8)| {
+        let (x, y) = (digits(400), digits(400 * (number as i32 + 1)));
+        format!("$s=/{pen},{x}{y}{x}{}", digits(0))
+    };
+    [head].into_iter().chain(pens.iter().enumerate().map(stroke)).collect()
+}
+
+/// The flash notes strokes by twos here, so the rest begins with one by the pen before the one that
+/// was put in last. Nobody knows which is in the holder.
+#[test]
+fn the_rest_of_a_drawing_whose_strokes_are_noted_by_twos_asks_for_its_pen() {
+    let settings = QUICK_PEN.map(str::to_owned);
+    let strokes = 23_041;
+    let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+        plotter.order(&[&settings[..], &apart(strokes, &[0, 0, 0, 1, 1])].concat());
+        plotter.run(10_000);
+        assert!(plotter.heard().contains("put in pen 2"));
+        plotter.send("~");
+        plotter.run(20);
+    });
+    let (_, changes) = switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
+        let [id, drawn, all, _] = stopped(plotter).expect("it has stopped");
+        assert_eq!((id, drawn, all), (7, 2, strokes));
+        assert!(plotter.say("$resume=origin").ends_with("ok\n"));
+        plotter.order(&apart(strokes - drawn, &[0, 1, 1]));
+        plotter.run(10_000);
+        assert!(plotter.status().contains("|Pen:1|"), "{}", plotter.status());
+        plotter.send("~");
+        plotter.run(10_000);
+        assert!(plotter.status().contains("|Pen:2|"), "{}", plotter.status());
+    });
+    assert_eq!(strokes_of(changes.iter().map(PinChange::from)).len(), 1);
+}
+
+/// Whoever asks the plotter for the rest of a drawing that it does not have is told who has it.
+#[test]
+fn users_are_told_that_the_sender_has_the_rest() {
+    let settings = QUICK_PEN.map(str::to_owned);
+    let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+        plotter.order(&[&settings[..], &apart(9, &[0, 0, 0])].concat());
+        plotter.run(3000);
+    });
+    switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
+        let greeting = plotter.heard();
+        assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
+        assert!(greeting.contains("of 9: its sender sends the rest]"), "{greeting}");
+        for line in ["$resume", "$again"] {
+            let answer = plotter.say(line);
+            assert!(answer.contains("sender"), "{line}: {answer}");
+            // What is advised must not be refused in turn.
+            assert!(!answer.contains("$again") && !answer.contains("$plot"), "{line}: {answer}");
+        }
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.contains("the sender") && answer.ends_with("]\nok\n"), "{answer}");
+    });
+}
+
 /// A stroke that begins where the one before ends is not lifted for, so the machine counts one
 /// stroke less than the drawing has. The drawing is still known to be complete.
 #[test]

@@ -422,8 +422,9 @@ impl<I: Index> Inner<'_, I> {
         true
     }
 
-    /// Computes the order of a job that was loaded, if it is not known, and keeps it. Returns the
-    /// number of strokes then, which was an estimate before.
+    /// Computes the order of a job that was loaded, if it is not known. Returns the number of
+    /// strokes then, which was an estimate before. The caller keeps the order by
+    /// [`Inner::keep_order`] once the job has begun.
     ///
     /// # Errors
     /// The [`CommandError`] to reply with. The job stays kept as it was.
@@ -448,10 +449,15 @@ impl<I: Index> Inner<'_, I> {
             self.machine.end_measuring(measured).strokes
         };
         self.cursor = Cursor::default();
-        let kept = records::add_order(&self.job, strokes, self.words, listener.board);
-        if kept.is_err() {
-            records::say_not_kept(listener.board);
-        }
         Ok(Some(strokes))
+    }
+
+    /// Keeps the order of a job that was loaded without it, and that has so many strokes, before
+    /// anything moves.
+    #[inline(never)] // Keeps its frame off the stack while the stages run.
+    pub(super) fn keep_order<B: Board>(&mut self, strokes: u32, board: &mut B) {
+        if records::add_order(&self.job, strokes, self.words, board).is_err() {
+            records::say_not_kept(board);
+        }
     }
 }

@@ -81,6 +81,7 @@ impl<I: Index> Inner<'_, I> {
                         #[cfg(feature = "early-ink")]
                         if let Some(strokes) = self.complete_order(&mut listener)? {
                             self.resumption.count_strokes(strokes);
+                            self.keep_order(strokes, listener.board);
                         }
                         self.begin_rest(drawn, &mut listener)
                     }
@@ -113,9 +114,15 @@ impl<I: Index> Inner<'_, I> {
         }
         self.load(listener.board)?;
         #[cfg(feature = "early-ink")]
-        self.complete_order(listener)?;
+        let order = self.complete_order(listener)?;
         self.begin(listener)?;
         self.keep_progress(None, listener.board);
+        // Not before the log of this copy has begun: the log before it may tell how much is drawn
+        // in another order, which other sources have computed.
+        #[cfg(feature = "early-ink")]
+        if let Some(strokes) = order.filter(|_| self.machine.state() == State::Run) {
+            self.keep_order(strokes, listener.board);
+        }
         Ok(())
     }
 

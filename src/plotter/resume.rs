@@ -23,10 +23,10 @@ mod with_feature;
 #[cfg(not(feature = "resume"))]
 mod without_feature;
 
-#[cfg(feature = "tiles")]
-pub(super) use with_feature::KeptParts;
 #[cfg(feature = "resume")]
 pub(super) use with_feature::StoppedJob;
+#[cfg(feature = "tiles")]
+pub(super) use with_feature::{KeptParts, are_noted_at_once};
 
 /// What is known of a job that can be resumed.
 #[derive(Debug, Clone, Copy, Default)]
@@ -39,6 +39,9 @@ pub(super) struct Resumption {
     /// and have more strokes than the flash notes.
     #[cfg(feature = "resume")]
     more_at_once: u32,
+    /// Whether the strokes of the job are sent, so that its sender has the rest.
+    #[cfg(feature = "resume")]
+    is_sent: bool,
     /// The number of strokes that were drawn before the job was resumed, of a job that is sent or
     /// that is computed part by part.
     #[cfg(feature = "resume")]

@@ -318,6 +318,12 @@ fn the_travel_must_be_as_it_was_where_its_end_is_homed() {
             assert!(answer.contains(&format!("set {number}={same}")), "{answer}");
             assert!(plotter.say(&format!("{number}={same}")).ends_with("ok\n"));
         }
+        // The travel has not changed, but what it means has.
+        assert!(plotter.say("$22=0").ends_with("ok\n"));
+        let answer = plotter.say("$resume=origin");
+        assert!(answer.contains("set $22=1.000"), "{answer}");
+        assert!(plotter.say("$22=1").ends_with("ok\n"));
+        plotter.say("$X");
         assert_eq!(plotter.say("$resume=origin"), "ok\n");
         // Whoever interrupts that knows where the pen is, and must not say that it is elsewhere.
         plotter.run(3000);

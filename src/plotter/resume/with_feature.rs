@@ -7,7 +7,7 @@ mod parts;
 mod streamed;
 
 #[cfg(feature = "tiles")]
-pub(in crate::plotter) use parts::KeptParts;
+pub(in crate::plotter) use parts::{KeptParts, are_noted_at_once};
 
 use super::{Origin, Resumption};
 use crate::index::Index;
@@ -21,9 +21,9 @@ use crate::stage::Cancel;
 use crate::storage::LogProgress;
 #[cfg(feature = "tiles")]
 use notes::is_in_parts;
-#[cfg(feature = "early-ink")]
-use notes::{IS_ESTIMATE, is_without_order, word};
 use notes::{LAYOUT, all_strokes, begin_notes, done, is_streamed, origin_settings, read};
+#[cfg(feature = "early-ink")]
+use notes::{is_without_order, word};
 #[cfg(feature = "tiles")]
 use parts::noted_in_parts;
 
@@ -117,7 +117,8 @@ impl Resumption {
         if all != u32::MAX {
             reply.part(format_args!(" of {all}"));
         }
-        reply.line(format_args!(": $resume goes on]"));
+        let how = if self.is_sent { "its sender sends the rest" } else { "$resume goes on" };
+        reply.line(format_args!(": {how}]"));
     }
 }
 
@@ -144,6 +145,7 @@ impl<I: Index> Inner<'_, I> {
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(in crate::plotter) fn find_stopped<B: Board>(&mut self, board: &mut B) {
         let found = read(board);
+        self.resumption.is_sent = found.is_some_and(|(notes, _)| is_streamed(&notes));
         self.resumption.progress =
             found.map(|(notes, noted)| [done(&notes, noted), all_strokes(&notes, noted, board)]);
         self.resumption.lose_position();
@@ -166,12 +168,7 @@ impl<I: Index> Inner<'_, I> {
             return;
         }
         let strokes = self.machine.status().job.strokes;
-        let mut more = words_of(contents);
-        #[cfg(feature = "early-ink")]
-        if self.job.unordered().is_some() {
-            more[0] |= IS_ESTIMATE;
-        }
-        let origin = self.resumption.origin;
+        let (more, origin) = (words_of(contents), self.resumption.origin);
         let notes = begin_notes(self.machine.settings(), LAYOUT, strokes, more, origin);
         if board.begin_progress(notes.as_flattened(), strokes).is_err() {
             return refuse(board);
@@ -266,17 +263,17 @@ impl<I: Index> Inner<'_, I> {
         }
         self.check_notes(&notes)?;
         if is_streamed(&notes) {
-            Reply(board).line(format_args!(
-                "[MSG:the job was sent while it was drawn: its sender sends the rest]"
-            ));
             if !at_origin {
-                return Err(CommandError::NothingToResume);
+                return Err(CommandError::RestIsSent);
             }
             if self.resumption.origin(self.machine.settings()) != Origin::Lost {
                 return Err(CommandError::PositionKnown);
             }
             self.machine.declare_origin()?;
             self.resumption.origin = Origin::ByHand;
+            Reply(board).line(format_args!(
+                "[MSG:the pen is taken to be at the origin: the sender of the job sends the rest]"
+            ));
             return Ok(StoppedJob::Sent);
         }
         let is_lost = self.resumption.origin(self.machine.settings()) == Origin::Lost;

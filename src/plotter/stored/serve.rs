@@ -10,7 +10,7 @@ use crate::machine::{JobSize, Path, State, StrokeEnds};
 use crate::model::StoredModel;
 use crate::plotter::listener::Listener;
 use crate::plotter::reply::Reply;
-use crate::plotter::resume::KeptParts;
+use crate::plotter::resume::{KeptParts, are_noted_at_once};
 use crate::plotter::streamed::Streamed;
 use crate::plotter::{BegunJob, Board, Cursor, Inner, Job, VisibilityMode, report, title};
 use crate::protocol::{CommandError, RealTime, StoredModelError, StreamedTarget};
@@ -78,6 +78,7 @@ impl<I: Index> Inner<'_, I> {
         }
         let at = self.machine.end();
         let mut drawn = kept.and_then(|kept| kept.drawn).unwrap_or(0);
+        let may_begin_before_pen = search.pens != 0 && are_noted_at_once(drawn);
         if drawn > 0 {
             Reply(listener.board).line(format_args!(
                 "[MSG:what is drawn is computed again, which may take minutes]"
@@ -104,6 +105,10 @@ impl<I: Index> Inner<'_, I> {
             Self::make_room(listener, 2 * PAGE_BYTES as u32)?;
         }
         self.machine.start_streamed(JobSize::default(), bounds)?;
+        if may_begin_before_pen {
+            // The rest may begin with strokes before the last change of the pen.
+            self.machine.set_pen(u8::MAX);
+        }
         self.keep_parts(model.checksum(), time_model, kept, listener.board);
         self.parts.is_active = true;
         self.parts.last.target.point = at;

@@ -141,6 +141,12 @@ pub enum CommandError {
     OtherSteps,
     /// No job has stopped that could go on.
     NothingToResume,
+    /// The rest of the job that has stopped is with the computer that sent the job.
+    #[cfg(all(feature = "stream", feature = "resume"))]
+    RestIsSent,
+    /// The strokes of the last job are with the computer that sent them.
+    #[cfg(all(feature = "stream", feature = "resume"))]
+    StrokesAreSent,
     /// The position of the pen is not known, so a job cannot go on.
     PositionUnknown,
     /// The position of the pen is known, so it cannot be said to be the origin.
@@ -397,6 +403,16 @@ impl CommandError {
                 error(163, "no job has stopped")
                     .client("no job has stopped: there is nothing to go on with"),
                 format_args!("no job has stopped: $again draws the last one from its beginning"),
+            ),
+            #[cfg(all(feature = "stream", feature = "resume"))]
+            Self::RestIsSent => row(
+                error(163, ""),
+                format_args!("the job was sent while it was drawn: its sender sends the rest"),
+            ),
+            #[cfg(all(feature = "stream", feature = "resume"))]
+            Self::StrokesAreSent => row(
+                error(161, ""),
+                format_args!("the last job was sent while it was drawn: its sender sends it again"),
             ),
             #[cfg(feature = "resume")]
             Self::PositionUnknown => row(

@@ -92,6 +92,10 @@ pub fn error_samples() -> Vec<CommandError> {
         #[cfg(feature = "stream")]
         BeyondBounds,
         NothingToResume,
+        #[cfg(feature = "stream")]
+        RestIsSent,
+        #[cfg(feature = "stream")]
+        StrokesAreSent,
         PositionUnknown,
         PositionKnown,
         OtherVersion,

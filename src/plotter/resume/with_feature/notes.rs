@@ -60,10 +60,6 @@ const _: () = assert!(WORDS * size_of::<u32>() <= crate::storage::NOTE_BYTES);
 /// The notes that are kept with the progress of a job.
 type Notes = [[u8; 4]; WORDS];
 
-/// Set in the word that tells whether the model is known, if the number of strokes is an estimate
-/// as long as the order is not kept.
-pub(super) const IS_ESTIMATE: u32 = 2;
-
 /// The value of a setting as far as it decides where ink falls. The travel does so only where it is
 /// the position of a limit switch, at the high end of an axis.
 fn placed(settings: &Settings, setting: Setting) -> Value {
@@ -77,6 +73,18 @@ fn placed(settings: &Settings, setting: Setting) -> Value {
         return Value::ZERO;
     }
     settings.get(setting)
+}
+
+/// The refusal of a job because of a setting whose value was another one `before`, as far as it
+/// decides where ink falls. The travel of a machine that homes ends where its switch is; of one
+/// that does not, it is no matter. So where only one of the values is 0, homing has changed.
+fn changed(setting: Setting, before: Value, now: Value) -> CommandError {
+    let is_travel = matches!(setting, Setting::TravelX | Setting::TravelY);
+    if is_travel && (before == Value::ZERO) != (now == Value::ZERO) {
+        let before = if before == Value::ZERO { Value::ZERO } else { Value::ONE };
+        return CommandError::OtherSetting { setting: Setting::Homing, before };
+    }
+    CommandError::OtherSetting { setting, before }
 }
 
 /// A number that differs between versions of the firmware.
@@ -163,36 +171,35 @@ pub(super) fn read<B: Board>(board: &mut B) -> Option<(Notes, LogProgress)> {
 }
 
 /// The number of strokes of the kept job. Of a job that began before its order was known, the
-/// notes have an estimate, and the order the number.
+/// order has the number. The notes have an estimate, and there are more strokes than those that are
+/// drawn as long as the order is missing, because the job is not complete then.
 pub(super) fn all_strokes<B: Board>(notes: &Notes, noted: LogProgress, board: &mut B) -> u32 {
+    let strokes = word(notes, 2);
     #[cfg(feature = "early-ink")]
-    if word(notes, 0) == LAYOUT
-        && let Some(strokes) = records::strokes_of_added_order(board)
-    {
-        return strokes;
+    if word(notes, 0) == LAYOUT {
+        return match records::strokes_of_added_order(board) {
+            Some(strokes) => strokes,
+            None if records::is_begun(board) => estimated_strokes(strokes, done(notes, noted)),
+            None => strokes,
+        };
     }
-    let _ = board;
-    strokes_without_order(notes, done(notes, noted))
+    let _ = (board, noted);
+    strokes
+}
+
+/// The number of strokes of a job whose order is not known, by the estimate in its notes. It has
+/// more strokes than those that are `done`.
+#[cfg(feature = "early-ink")]
+fn estimated_strokes(estimate: u32, done: u32) -> u32 {
+    estimate.max(done.saturating_add(1))
 }
 
 /// Whether the order of the job with these notes has to be computed again.
 #[cfg(feature = "early-ink")]
 pub(super) fn is_without_order<B: Board>(notes: &Notes, board: &mut B) -> bool {
     word(notes, 0) == LAYOUT
-        && word(notes, 3) & IS_ESTIMATE != 0
+        && records::is_begun(board)
         && records::strokes_of_added_order(board).is_none()
-}
-
-/// The number of strokes of a job whose order was not added to it. If it is an estimate, it is more
-/// than those that are `done`, because the job is not complete.
-fn strokes_without_order(notes: &Notes, done: u32) -> u32 {
-    let is_estimate = word(notes, 0) == LAYOUT && word(notes, 3) & IS_ESTIMATE != 0;
-    strokes(notes).max(if is_estimate { done.saturating_add(1) } else { 0 })
-}
-
-/// The number of strokes of a job, as its notes have it.
-fn strokes(notes: &Notes) -> u32 {
-    word(notes, 2)
 }
 
 impl<I: Index> Inner<'_, I> {
@@ -206,10 +213,10 @@ impl<I: Index> Inner<'_, I> {
             let (number, bits) = (word(notes, at), word(notes, at + 1));
             let setting = u16::try_from(number).ok().and_then(Setting::numbered);
             let before = Value::from_bits(bits.cast_signed());
-            match setting {
-                Some(setting) if placed(self.machine.settings(), setting) == before => {}
-                Some(setting) => return Err(CommandError::OtherSetting { setting, before }),
-                None => return Err(CommandError::OtherVersion),
+            let Some(setting) = setting else { return Err(CommandError::OtherVersion) };
+            let now = placed(self.machine.settings(), setting);
+            if now != before {
+                return Err(changed(setting, before, now));
             }
         }
         let is_empty = self.model.vertices().is_empty();
@@ -225,25 +232,14 @@ impl<I: Index> Inner<'_, I> {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "early-ink"))]
 mod tests {
     use super::*;
 
     #[test]
     fn no_number_of_strokes_is_all_of_them_while_that_is_an_estimate() {
-        let settings = Settings::default();
-        for (known, done, all) in [
-            (1, 9, 10),
-            (1, 10, 10),
-            (1 | IS_ESTIMATE, 9, 10),
-            (1 | IS_ESTIMATE, 10, 11),
-            (IS_ESTIMATE, 25, 26),
-        ] {
-            let notes = begin_notes(&settings, LAYOUT, 10, [known, 7, 8], Origin::Homed(0));
-            assert_eq!(strokes_without_order(&notes, done), all, "{known}: {done}");
+        for (done, all) in [(0, 10), (9, 10), (10, 11), (25, 26)] {
+            assert_eq!(estimated_strokes(10, done), all, "{done}");
         }
-        // In other notes the word is something else.
-        let notes = begin_notes(&settings, STREAMED, 10, [3, 7, 8], Origin::Homed(0));
-        assert_eq!(strokes_without_order(&notes, 10), 10);
     }
 }

@@ -137,6 +137,11 @@ impl<I: Index> Inner<'_, I> {
     }
 }
 
+/// Whether several strokes of a drawing in parts are noted at once where so many are drawn.
+pub(in crate::plotter) fn are_noted_at_once(drawn: u32) -> bool {
+    drawn >= ONE_BY_ONE
+}
+
 /// The number of bits of the log that say that so many strokes of a drawing in parts are drawn.
 pub(super) fn noted_in_parts(strokes: u32) -> u32 {
     let noted = strokes.min(ONE_BY_ONE) + strokes.saturating_sub(ONE_BY_ONE) / LATER_AT_ONCE;

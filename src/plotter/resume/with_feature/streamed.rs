@@ -34,9 +34,15 @@ impl<I: Index> Inner<'_, I> {
             && (drawn > 0 || self.resumption.origin.is_homed() == began_homed(&notes))
         {
             self.machine.log_strokes(0);
+            let more_at_once = word(&notes, 3).saturating_sub(1);
+            if more_at_once > 0 {
+                // The rest may begin with strokes before the last change of the pen.
+                self.machine.set_pen(u8::MAX);
+            }
             self.resumption = Resumption {
                 progress: Some([drawn, all]),
-                more_at_once: word(&notes, 3).saturating_sub(1),
+                more_at_once,
+                is_sent: true,
                 drawn_before: drawn,
                 ..self.resumption
             };
@@ -55,6 +61,7 @@ impl<I: Index> Inner<'_, I> {
             if board.begin_progress(notes.as_flattened(), parts).is_ok() {
                 self.machine.log_strokes(0);
                 self.resumption.more_at_once = at_once - 1;
+                self.resumption.is_sent = true;
                 self.resumption.progress = Some([0, strokes]);
                 return;
             }
