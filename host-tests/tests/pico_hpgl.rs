@@ -88,6 +88,54 @@ fn by_usb_the_host_waits_and_nothing_is_lost() -> TestResult {
     Ok(())
 }
 
+/// The error of the transmission that the next program finds after this file was sent and the port
+/// was closed.
+fn error_behind(file: &str) -> Result<String, Box<dyn Error>> {
+    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    uart.emulator.plug_usb_in()?;
+    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
+    line.hear_greeting()?;
+    line.emulator.send(format!("IN;OA;{file}").as_bytes())?;
+    assert_eq!(answer(&mut *line.emulator)?, "0,0,0");
+    let wait = || std::thread::sleep(Duration::from_millis(200));
+    wait();
+    line.emulator.0.open_usb(false, 115_200)?;
+    wait();
+    line.emulator.0.open_usb(true, 115_200)?;
+    wait();
+    line.emulator.send(b"\x1B.E")?;
+    // A greeting comes first.
+    loop {
+        let answer = answer(&mut *line.emulator)?;
+        if answer.parse::<u8>().is_ok() {
+            return Ok(answer);
+        }
+    }
+}
+
+#[test]
+fn a_port_that_is_closed_behind_an_instruction_has_lost_nothing() -> TestResult {
+    assert_eq!(error_behind("PU1000,1000;PD1500,1000;")?, "0");
+    assert_eq!(error_behind("PU1000,1000;PD15")?, "15");
+    Ok(())
+}
+
+/// HP-GL has no ends of lines, and the host sends all of it without a pause.
+#[test]
+fn the_other_port_is_answered_while_hpgl_comes() -> TestResult {
+    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    uart.emulator.plug_usb_in()?;
+    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
+    line.hear_greeting()?;
+    line.emulator.send(&spiral())?;
+    let mut uart = Line::silent(Box::new(line.emulator.0));
+    uart.emulator.send(b"$model\n")?;
+    while !uart.hear()?.starts_with("error:8") {}
+    // All of the file has come much later.
+    assert!(uart.status()?.starts_with("<Run"));
+    Ok(())
+}
+
 #[test]
 fn by_the_uart_a_sender_asks_for_room() -> TestResult {
     let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;

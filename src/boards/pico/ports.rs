@@ -50,9 +50,8 @@ pub struct ReceiveSide {
 pub struct Ports {
     /// The main loop's ends of the receiving queues.
     lines: [SerialInput; COUNT],
-    /// The number of the port where the next byte is looked for first: the same port until its line
-    /// ends.
-    last: usize,
+    /// The number of the port where the next byte is looked for first.
+    next: usize,
     /// Whether replies go to USB alone, because a program has just opened that port.
     only_to_opened: bool,
     /// The ports to which replies go otherwise.
@@ -121,22 +120,18 @@ impl Ports {
 
     /// Combines the parts that the set-up of the ports has returned.
     pub fn new(lines: [SerialInput; COUNT], uart: serial::Sender, usb: usb::Sender) -> Self {
-        Self { lines, last: 0, only_to_opened: false, replies: Replies::All, uart, usb }
+        Self { lines, next: 0, only_to_opened: false, replies: Replies::All, uart, usb }
     }
 
     /// Returns the next ordinary byte and the number of its port: see [`SerialInput::read_byte`].
-    /// It keeps reading a port until nothing waits there or its line ends, then it is the other
-    /// port's turn.
+    /// The ports take turns, so that neither waits for a line of the other, which need not end.
     pub fn read_byte(&mut self) -> Option<(usize, u8)> {
         for _ in 0..COUNT {
-            let port = self.last % COUNT;
+            let port = self.next % COUNT;
+            self.next = (port + 1) % COUNT;
             if let Some(byte) = self.lines[port].read_byte() {
-                if byte == b'\n' {
-                    self.last = (port + 1) % COUNT;
-                }
                 return Some((port, byte));
             }
-            self.last = (port + 1) % COUNT;
         }
         usb::go_on();
         None

@@ -99,8 +99,8 @@ struct UsbLine {
     frame: Frame,
     /// The received bytes that wait for room in the queue of the main loop.
     waiting: Deque<u8, WAITING_SLOTS>,
-    /// Whether the last received byte does not end a line.
-    is_in_line: bool,
+    /// The last received byte, or the end of a line before the first one.
+    last: u8,
     /// The value of [`ReceiveSide::aborts`] when it was last read.
     aborts: u32,
     /// The bytes to send, as the handler takes them from the queue.
@@ -133,7 +133,7 @@ pub fn set_up(nvic: &mut NVIC, number: &'static str) -> Sender {
         awaits_bus: false,
         frame: Frame::new(),
         waiting: Deque::new(),
-        is_in_line: false,
+        last: b'\n',
         aborts: 0,
         to_send,
         packet: Vec::new(),
@@ -293,13 +293,17 @@ impl UsbLine {
         HOST_IS_GONE.store(true, Ordering::Relaxed);
         self.forget_sent();
         self.device.buffers().take_back();
-        if self.is_in_line {
+        if !matches!(self.last, b'\n' | b'\r') {
             // The unfinished line is refused, and the next one is a separate line. There is room,
             // because packets are read only while there are two slots more than they need.
             receive_side.end_line(Port::Usb);
-            let _ = self.waiting.push_back(DAMAGED);
+            // Behind `;` nothing is missing: it ends an instruction of HP-GL, and begins a comment
+            // in G-code.
+            if self.last != b';' {
+                let _ = self.waiting.push_back(DAMAGED);
+            }
             let _ = self.waiting.push_back(b'\n');
-            self.is_in_line = false;
+            self.last = b'\n';
         }
         if self.device.line_coding().data_rate() == TOUCH_RATE {
             WAS_TOUCHED.store(true, Ordering::Relaxed);
@@ -329,7 +333,7 @@ impl UsbLine {
     fn drop_void(&mut self, receive_side: &ReceiveSide) {
         if self.aborts != receive_side.aborts {
             self.aborts = receive_side.aborts;
-            self.is_in_line = false;
+            self.last = b'\n';
             self.waiting.clear();
         }
     }
@@ -354,10 +358,10 @@ impl UsbLine {
                 HOST_IS_GONE.store(false, Ordering::Relaxed);
             }
             for &byte in packet.iter().take(count) {
-                let (waiting, is_in_line) = (&mut self.waiting, &mut self.is_in_line);
+                let (waiting, last) = (&mut self.waiting, &mut self.last);
                 receive_side.take(Port::Usb, |receiver| match receiver.sort_out(byte) {
                     Ok(byte) => {
-                        *is_in_line = byte != b'\n' && byte != b'\r';
+                        *last = byte;
                         let _ = waiting.push_back(byte); // There is room.
                         RealTime::default()
                     }

@@ -224,8 +224,8 @@ const BUSY: ErrorEntry = error(8, "the plotter is busy")
 /// The entry of the errors about a number outside the range that is allowed or can be stored.
 const OUT_OF_RANGE: ErrorEntry = error(102, "number out of range");
 
-/// What to do while the plotter is busy.
-const WAIT: &str = "wait for the plot to end, or send ctrl-X";
+/// What to do while the plotter is busy, which it is in check mode and where it is locked, too.
+const WAIT: &str = "wait for the plot to end, or send ctrl-X; $C ends a check, and $X a lock";
 
 /// Receives the row of an error: its entry, and the sentence that tells the user what to do.
 type Row<'a> = &'a mut dyn FnMut(ErrorEntry, fmt::Arguments<'_>);
