@@ -838,12 +838,20 @@ function idle() {
   return core.waiting && pioDue === Infinity && !uart.busy && !events.length && !bounces.length;
 }
 
+/** Ends the emulation. A model says all in its message; any other error is a mistake in here. */
+function end(error) {
+  takeLog();
+  flush();
+  console.error(error.constructor === Error ? `the emulation ends: ${error.message}` : error);
+  process.exit(1);
+}
+
 function turn() {
   const sleeps = idle();
   try {
     run(sleeps ? MILLISECOND : SLICE);
   } catch (error) {
-    if (!(error instanceof PowerCut)) throw error;
+    if (!(error instanceof PowerCut)) end(error);
     cutPower();
   }
   takeLog();
