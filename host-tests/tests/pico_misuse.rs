@@ -27,6 +27,21 @@ const fn read(address: u32) -> Step {
     [2, address, 0, 0, 0]
 }
 
+/// Calls a function with three arguments.
+const fn call(function: u32, first: u32, second: u32, third: u32) -> Step {
+    [3, function, first, second, third]
+}
+
+/// The addresses of functions of the emulated boot ROM, which stand in the order of its table.
+mod rom {
+    pub const CONNECT: u32 = 0x81;
+    pub const EXIT_XIP: u32 = 0x85;
+    pub const ERASE: u32 = 0x89;
+    pub const PROGRAM: u32 = 0x8D;
+    pub const FLUSH_CACHE: u32 = 0x91;
+    pub const ENTER_XIP: u32 = 0x95;
+}
+
 /// Copies the code in RAM and the steps there, and jumps to that code. It stands behind the initial
 /// stack pointer and the vector of the reset.
 const START: [u16; 18] = [
@@ -231,4 +246,49 @@ fn no_byte_arrives_at_another_rate() -> TestResult {
         "{end:?}"
     );
     Ok(())
+}
+
+/// Where the last sector of the flash begins, and the same as memory.
+const SECTOR: u32 = 0x1F_F000;
+const READ_FLASH: Step = read(0x1000_0000 + SECTOR);
+/// A page in RAM.
+const PAGE: u32 = 0x2000_0400;
+
+#[test]
+fn flash_is_used_only_as_the_chip_can_bear_it() -> TestResult {
+    let connect = call(rom::CONNECT, 0, 0, 0);
+    let exit = call(rom::EXIT_XIP, 0, 0, 0);
+    let erase = call(rom::ERASE, SECTOR, 4096, 0);
+    let program = call(rom::PROGRAM, SECTOR, PAGE, 256);
+    let flush = call(rom::FLUSH_CACHE, 0, 0, 0);
+    let enter = call(rom::ENTER_XIP, 0, 0, 0);
+    let works = [connect, exit, erase, program, flush, enter, READ_FLASH];
+    let right = [&works, &UART[..]].concat();
+    let erases = |from, bytes| with(&right, erase, call(rom::ERASE, from, bytes, 0));
+    let programs = |to, page, bytes| with(&right, program, call(rom::PROGRAM, to, page, bytes));
+    let early = |place| {
+        let mut early = right.clone();
+        early.insert(place, READ_FLASH);
+        early
+    };
+    let not_mapped = "flash is read at 0x101ff000 while it is not mapped to memory";
+    assert_only_right(
+        &right,
+        &[
+            (early(2), not_mapped),
+            (early(5), not_mapped),
+            (without(&right, enter), not_mapped),
+            // The boot ROM still holds the pad that selects the chip.
+            (without(&right, flush), not_mapped),
+            (without(&right, exit), "erased, 4096 bytes from 0x1ff000 on, without flash_exit_xip"),
+            (erases(SECTOR + 256, 4096), "whole units of 4096 bytes"),
+            (erases(SECTOR, 256), "whole units of 4096 bytes"),
+            (erases(SECTOR, 8192), "the chip ends at 0x200000"),
+            (erases(0x10_0000, 1 << 16), "erased by a block at 0x100000"),
+            (programs(SECTOR + 4, PAGE, 256), "whole units of 256 bytes"),
+            (programs(SECTOR, PAGE, 100), "whole units of 256 bytes"),
+            (programs(SECTOR, 0x1000_0000, 256), "flash is read at 0x10000000"),
+            (with(&right, READ_FLASH, write(READ_FLASH[1], 0)), "written at 0x101ff000 as memory"),
+        ],
+    )
 }

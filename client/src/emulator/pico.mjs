@@ -51,7 +51,7 @@
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
-import { attachFlashChip } from './pico/flash_chip.mjs';
+import { FlashPort } from './pico/flash_chip.mjs';
 import { FlashRecord } from './pico/flash_record.mjs';
 import { InterruptTimes } from './pico/interrupt_times.mjs';
 import { clearCountAtAbort } from './pico/aborted_dma.mjs';
@@ -148,12 +148,18 @@ function report(what, value, cycle) {
 
 // --- The boot ROM --------------------------------------------------------------------------------
 
+const CONNECT = 1;
+const EXIT_MAPPING = 2;
 const ERASE = 3;
 const PROGRAM = 4;
 const FLUSH_CACHE = 5;
-/** The breakpoints' numbers by the functions' codes. */
+const ENTER_MAPPING = 6;
 const USB_BOOT = 7;
-const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: FLUSH_CACHE, CX: 6, UB: USB_BOOT };
+/** The breakpoints' numbers by the functions' codes. */
+const FUNCTIONS = {
+  IF: CONNECT, EX: EXIT_MAPPING, RE: ERASE, RP: PROGRAM, FC: FLUSH_CACHE, CX: ENTER_MAPPING,
+  UB: USB_BOOT,
+};
 const LOOK_UP = 0x20;
 const TABLE = 0x40;
 const CODE = 0x80;
@@ -240,6 +246,7 @@ function serveRom(number) {
   const [first, second, third] = core.registers;
   if (number === ERASE) {
     const erase = () => 0xff;
+    flashPort.beginErasure(first, second);
     if (asksInErasures) {
       cable.bytes.push({ value: QUESTION, errors: 0 });
       uart.listen();
@@ -247,9 +254,17 @@ function serveRom(number) {
     noteFlash(true, first, second, sectorMicroseconds, erase);
     changeFlash(first, second, erase);
     flashNanos += (second / 4096) * sectorMicroseconds * 1000;
+  } else if (number === CONNECT) {
+    flashPort.connect();
+  } else if (number === EXIT_MAPPING) {
+    flashPort.exitMapping();
+  } else if (number === ENTER_MAPPING) {
+    flashPort.enterMapping();
   } else if (number === FLUSH_CACHE) {
     quick.flush();
+    flashPort.releaseSelect();
   } else if (number === PROGRAM) {
+    flashPort.beginPages(first, third);
     const write = (at, before) => before & chip.readUint8(second + at - first);
     noteFlash(false, first, third, PAGE_MICROSECONDS, write);
     changeFlash(first, third, write);
@@ -264,7 +279,7 @@ function serveRom(number) {
 // --- The chip ------------------------------------------------------------------------------------
 
 const quick = new QuickCore(readFileSync(corePath), CALL_CYCLES);
-let chip, clock, core, uart, machines, contacts;
+let chip, clock, core, uart, machines, contacts, flashPort;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
@@ -352,7 +367,7 @@ function start(flash, kind) {
   chip.pio.forEach(followPio);
   schedule();
   usb.attach(chip);
-  attachFlashChip(chip);
+  flashPort = new FlashPort(chip);
   interruptTimes?.attach(core);
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
@@ -364,7 +379,7 @@ function start(flash, kind) {
 }
 
 function unusedStack() {
-  const end = chip.readUint32(VECTORS);
+  const end = chip.flashView.getUint32(VECTORS - FLASH, true);
   let at = RAM;
   while (at < end && chip.readUint8(at) === PAINT) at++;
   return at - RAM;
@@ -795,7 +810,9 @@ function executeUntil(due) {
   do {
     if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
     const alarm = clock.nextAlarm ? clock.nextAlarm.nanos : Infinity;
-    const cycles = quick.run((Math.min(alarm, nanos) - clock.nanosCounter) / NANOS);
+    // While flash is not mapped, rp2040js executes all: each of its reads is watched.
+    const most = flashPort.isMapped ? (Math.min(alarm, nanos) - clock.nanosCounter) / NANOS : 0;
+    const cycles = quick.run(most);
     if (quick.takeGarbled()) report(GARBLED, 0, now());
     if (cycles !== 0) {
       pass(cycles * NANOS);
