@@ -193,10 +193,12 @@ fn with(program: &[Step], step: Step, other: Step) -> Vec<Step> {
     program.iter().map(|it| if *it == step { other } else { *it }).collect()
 }
 
-const RELEASE: Step = write(0x4000_F000, UART0 | IO_BANK0 | PADS_BANK0);
+const RELEASE: Step = write(0x4000_F000, UART0 | USBCTRL | IO_BANK0 | PADS_BANK0);
 const UART0: u32 = 1 << 22;
+const USBCTRL: u32 = 1 << 24;
 const IO_BANK0: u32 = 1 << 5;
 const PADS_BANK0: u32 = 1 << 8;
+const HOLD_UART: Step = write(0x4000_E000, UART0);
 const SEE_RELEASED: Step = read(0x4000_C008);
 /// The peripherals' clock is the crystal's of 12 MHz.
 const START_CLOCK: Step = write(0x4000_8048, 1 << 11 | 4 << 5);
@@ -246,6 +248,35 @@ fn no_byte_arrives_at_another_rate() -> TestResult {
         "{end:?}"
     );
     Ok(())
+}
+
+#[test]
+fn what_is_held_in_reset_or_has_no_clock_is_not_used() -> TestResult {
+    let mut held_again = UART.to_vec();
+    held_again.insert(8, HOLD_UART);
+    let then = |steps: &[Step]| [&without(&UART, SEND), steps].concat();
+    let start_ticks = write(0x4005_802C, 1 << 9 | 12);
+    let crystal = write(0x4000_8030, 2);
+    let timer = read(0x4005_4028);
+    let usb_clock = write(0x4000_8054, 1 << 11);
+    let usb = write(0x5011_0040, 1);
+    let memory = read(0x5010_0000);
+    let right = then(&[crystal, start_ticks, timer, usb_clock, usb, memory, SEND]);
+    let only_uart = with(&right, RELEASE, write(RELEASE[1], UART0 | IO_BANK0));
+    assert_only_right(
+        &right,
+        &[
+            (without(&right, RELEASE), "uses IO_BANK0 at 0x4001400c, which is held in reset"),
+            (without(&right, SEE_RELEASED), "before it has seen its bit in RESET_DONE"),
+            (held_again, "uses UART0 at 0x40034000, which is held in reset"),
+            (without(&right, START_CLOCK), "uses UART0 at 0x40034024, which has no clock"),
+            (without(&right, start_ticks), "uses TIMER at 0x40054028, which has no clock"),
+            (without(&right, crystal), "uses TIMER at 0x40054028, which has no clock"),
+            (without(&right, usb_clock), "uses USBCTRL at 0x50110040, which has no clock"),
+            (only_uart.clone(), "uses USBCTRL at 0x50110040, which is held in reset"),
+            (without(&only_uart, usb), "at 0x50100000, which is held in reset"),
+        ],
+    )
 }
 
 /// Where the last sector of the flash begins, and the same as memory.

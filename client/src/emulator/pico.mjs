@@ -53,6 +53,7 @@ import { pathToFileURL } from 'node:url';
 import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
 import { FlashPort } from './pico/flash_chip.mjs';
 import { FlashRecord } from './pico/flash_record.mjs';
+import { holdInReset } from './pico/held_in_reset.mjs';
 import { InterruptTimes } from './pico/interrupt_times.mjs';
 import { clearCountAtAbort } from './pico/aborted_dma.mjs';
 import { joinQueues } from './pico/joined_queue.mjs';
@@ -368,6 +369,7 @@ function start(flash, kind) {
   schedule();
   usb.attach(chip);
   flashPort = new FlashPort(chip);
+  holdInReset(chip);
   interruptTimes?.attach(core);
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
