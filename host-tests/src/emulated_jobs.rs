@@ -131,7 +131,8 @@ impl<E: EmulatedBoard + ?Sized> Line<E> {
                 return Ok(String::from_utf8(line)?.trim().to_owned());
             }
             let mut buffer = [0; 256];
-            let count = self.emulator.receive(&mut buffer, TIMEOUT)?;
+            let received = self.emulator.receive(&mut buffer, TIMEOUT);
+            let count = received.map_err(|error| format!("{error}: {}", self.emulator.said()))?;
             if count == 0 {
                 return Err("the board is silent".into());
             }

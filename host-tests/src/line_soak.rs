@@ -30,6 +30,8 @@ pub const ANSWER_LIMIT: Duration = Duration::from_millis(20);
 /// The longest time to an answer while a sector of flash is erased, which nothing does while steps
 /// run.
 pub const ERASE_LIMIT: Duration = Duration::from_millis(420);
+/// The maximum time to write a page of the Pico's flash, which happens behind each stroke.
+const SLOWEST_PAGE: Duration = Duration::from_millis(3);
 /// The emergency stop, after which nobody knows the position. The line makes none.
 const STOP: u8 = 0xFD;
 /// A pen that takes little time. Pulses for the servo come every 20 ms, so with less the pins show
@@ -115,7 +117,9 @@ impl DamagedLine {
     pub fn start(row: &'static BoardRow, seed: u64) -> Result<Self, Box<dyn Error>> {
         let image = image_path(row.name);
         let board = if row == &PICO {
-            Board::Pico(Line::to(Box::new(Pico::start(&image)?))?.emulator)
+            let mut pico = Line::to(Box::new(Pico::start(&image)?))?.emulator;
+            pico.set_page_time(SLOWEST_PAGE)?;
+            Board::Pico(pico)
         } else {
             let started = Emulator::start(&image, Options::default())?;
             Board::Lm3s6965(Line::to(Box::new(started))?.emulator)

@@ -15,9 +15,21 @@ type TestResult = Result<(), Box<dyn Error>>;
 const WINDOW: usize = 240;
 /// The maximum time to erase a sector of flash.
 const SLOWEST_ERASE: Duration = Duration::from_millis(400);
+/// The maximum time to write a page of flash.
+const SLOWEST_PAGE: Duration = Duration::from_millis(3);
+/// How long a status may take beside an erasure.
+const ANSWER: Duration = Duration::from_millis(20);
 
 fn start() -> Result<Line<Pico>, Box<dyn Error>> {
     Line::to(Box::new(Pico::start(&image_path("pico"))?))
+}
+
+/// Starts a board whose flash takes as long as it may for each change.
+fn start_with_slowest_flash() -> Result<Line<Pico>, Box<dyn Error>> {
+    let mut line = start()?;
+    line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    line.emulator.set_page_time(SLOWEST_PAGE)?;
+    Ok(line)
 }
 
 /// The output before the reply to a line, and the reply.
@@ -70,12 +82,10 @@ fn stream(line: &mut Line<Pico>, lines: &[String]) -> TestResult {
     Ok(())
 }
 
-/// Settings and a job are saved while a full window is in transit, and erasing each sector of flash
-/// takes 400 ms.
+/// Settings and a job are saved while a full window is in transit, by the slowest flash.
 #[test]
 fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
-    let mut line = start()?;
-    line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    let mut line = start_with_slowest_flash()?;
     let mut lines: Vec<String> = (0..3).map(|number| format!("$130={}", 300 + number)).collect();
     lines.extend(job_lines("cube.obj", &["$page=60x60", "$margin=5", "$100=160", "$101=160"]));
     // These lines follow the job's own line, which computes the job and saves it in flash.
@@ -97,12 +107,11 @@ fn a_full_window_across_every_flash_write_loses_no_byte() -> TestResult {
 /// answered, so nobody waits for more than one of them.
 #[test]
 fn the_status_waits_for_one_sector_at_most() -> TestResult {
-    let mut line = start()?;
-    line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    let mut line = start_with_slowest_flash()?;
     let lines = job_lines("lattice3.obj", &["$page=60x60", "$margin=5"]);
     let (plot, model) = lines.split_last().ok_or("a job")?;
     stream(&mut line, model)?;
-    line.emulator.ask_in_erasures(true)?;
+    line.emulator.ask_in_flash_changes(true)?;
     line.emulator.take_status_waits();
     line.emulator.send(format!("{plot}\n").as_bytes())?;
     loop {
@@ -113,8 +122,27 @@ fn the_status_waits_for_one_sector_at_most() -> TestResult {
     }
     let [_, answered] = line.emulator.take_status_waits();
     let longest = answered.into_iter().max().unwrap_or_default();
+    eprintln!("the longest wait: {longest:?}");
     assert!(longest > SLOWEST_ERASE / 2, "{longest:?}");
-    assert!(longest < SLOWEST_ERASE + Duration::from_millis(20), "{longest:?}");
+    assert!(longest < SLOWEST_ERASE + ANSWER, "{longest:?}");
+    Ok(())
+}
+
+/// A page is written behind each stroke. The answer begins in time; the one to the question before
+/// may still be leaving.
+#[test]
+fn the_status_comes_in_time_while_pages_are_written() -> TestResult {
+    let mut line = start_with_slowest_flash()?;
+    stream(&mut line, &job_lines("lattice2.obj", &["$page=45x45", "$margin=3", "$212=1"]))?;
+    while line.status()?.contains("|Stage:") {}
+    line.emulator.ask_in_flash_changes(true)?;
+    line.emulator.take_status_waits();
+    while !line.status()?.starts_with("<Idle") {}
+    let waits = line.emulator.take_status_waits();
+    let [first_byte, whole] = waits.map(|waits| waits.into_iter().max().unwrap_or_default());
+    eprintln!("the longest wait: {first_byte:?}, for the whole answer {whole:?}");
+    assert!(first_byte > SLOWEST_PAGE, "{first_byte:?}");
+    assert!(first_byte < ANSWER, "{first_byte:?}");
     Ok(())
 }
 
@@ -126,7 +154,8 @@ fn so_it_does_while_defaults_are_restored() -> TestResult {
         assert_eq!(ask_all(&mut line, text)?, ["ok"], "{text}");
     }
     line.emulator.set_erase_time(SLOWEST_ERASE)?;
-    line.emulator.ask_in_erasures(true)?;
+    line.emulator.set_page_time(SLOWEST_PAGE)?;
+    line.emulator.ask_in_flash_changes(true)?;
     line.emulator.take_status_waits();
     let begun = line.emulator.clock()?;
     line.emulator.send(b"$RST=*\n")?;
@@ -135,9 +164,10 @@ fn so_it_does_while_defaults_are_restored() -> TestResult {
     line.hear_greeting()?;
     let [_, answered] = line.emulator.take_status_waits();
     let longest = answered.into_iter().max().unwrap_or_default();
+    eprintln!("the longest wait: {longest:?}");
     assert!(longest > SLOWEST_ERASE / 2, "{longest:?}");
-    assert!(longest < SLOWEST_ERASE + Duration::from_millis(20), "{longest:?}");
-    line.emulator.ask_in_erasures(false)?;
+    assert!(longest < SLOWEST_ERASE + ANSWER, "{longest:?}");
+    line.emulator.ask_in_flash_changes(false)?;
     // Ctrl-X between both leaves nothing that is in force, but not kept.
     line.emulator.send(b"$130=300\nG10 L2 P1 X5\n$RST=*\n")?;
     while !line.hear()?.starts_with("[MSG:Restoring defaults") {}
@@ -156,8 +186,7 @@ fn so_it_does_while_defaults_are_restored() -> TestResult {
 #[test]
 fn bytes_beyond_every_window_are_refused_not_mistaken() -> TestResult {
     const LINES: usize = 1200;
-    let mut line = start()?;
-    line.emulator.set_erase_time(SLOWEST_ERASE)?;
+    let mut line = start_with_slowest_flash()?;
     let mut flood = String::from("$130=300\n");
     (0..LINES).for_each(|number| flood.push_str(&format!("v {number:04}\n")));
     // Each wrong line is refused with its own number, so two lines that were merged are detected,

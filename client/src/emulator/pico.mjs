@@ -17,29 +17,30 @@
 // is fitted to a pin, which closes where its axis has gone to so many steps (+ 2^40) or below, and
 // bounces; 8 a function (its number, its address in the cycle's place) is timed; 9 how much of the
 // stack is unused is asked; 10 where x has gone to so many steps, the main loop stands still for so
-// many hundredths of a second, 12 how long a sector of flash takes to be erased, in microseconds
-// (in the cycle's place), 13 a read of the records in flash returns garbage, after so many (in the
-// cycle's place) from now on (0) or from the next reset on (1), 14 how often the records were read
-// since the chip began is asked, 18 from now on the status is asked for at the serial line whenever
-// an erasure of flash begins (1), or no longer (0). 32 the pin RUN is pulled low for a moment, 33
-// the image is copied onto the drive that the board shows with BOOTSEL held, 34 and 35 bits (the
-// value) of a byte of flash (the cycle) stay low or high from now on, 36 the main loop goes on at
-// an address, with the stack used up (1) or as it is (0), 37 the host opens the USB port (1) or
-// closes it (0) at a rate (the cycle), 38 the host resets the bus so many times (the value) at
-// random (a seed in the cycle's place), 48 the next setting of the clock's alarm is late by so many
-// milliseconds, 49 from now on the longest handlers and masks of interrupts are measured (1), or
-// told (0). Out: 0 a byte of the serial line, 1 a pin's new level, 2 the time, 3 a byte of the
-// log, 4 the chip was reset (0 by the loss of power, 1 by the watchdog, 2 by the pin RUN), 5 a byte
-// of USB, 6 a timed function has returned (its number, the cycles in the cycle's place), 7 so many
-// bytes of the stack have not been used since the chip began (in the cycle's place), 32 the boot
-// ROM shows its drive, 33 a character of the serial number that the USB host reads, after a 0, 34
-// flash has returned garbage, 35 the status was asked for at the serial line, and so many cycles
-// later (in the cycle's place) the first byte of the answer (0) or all of it (1) had left, 36 so
-// often the records in flash were read, 37 a recorded operation of the flash, an erasure (1) or a
-// page (0), began at that cycle, 38 from which place it goes on (the upper 32 bits) and how many
-// bytes it changes (the lower 16), 39 so many operations were recorded, 40 the longest cycles of an
-// exception's handler (its number), 41 and for which an interrupt was masked (its number, 255 for
-// all by PRIMASK, or 254 for all while the flash was changed), 42 all of these have been told.
+// many hundredths of a second, 11 and 12 how long a page of flash takes to be written and a sector
+// to be erased, in microseconds (in the cycle's place), 13 a read of the records in flash returns
+// garbage, after so many (in the cycle's place) from now on (0) or from the next reset on (1), 14
+// how often the records were read since the chip began is asked, 18 from now on the status is asked
+// for at the serial line whenever a change of flash begins and no answer is awaited (1), or no
+// longer (0). 32 the pin RUN is pulled low for a moment, 33 the image is copied onto the drive that
+// the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the cycle) stay
+// low or high from now on, 36 the main loop goes on at an address, with the stack used up (1) or as
+// it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle), 38 the host
+// resets the bus so many times (the value) at random (a seed in the cycle's place), 48 the next
+// setting of the clock's alarm is late by so many milliseconds, 49 from now on the longest handlers
+// and masks of interrupts are measured (1), or told (0). Out: 0 a byte of the serial line, 1 a
+// pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by the loss of power, 1
+// by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function has returned (its number,
+// the cycles in the cycle's place), 7 so many bytes of the stack have not been used since the chip
+// began (in the cycle's place), 32 the boot ROM shows its drive, 33 a character of the serial
+// number that the USB host reads, after a 0, 34 flash has returned garbage, 35 the status was asked
+// for at the serial line, and so many cycles later (in the cycle's place) the first byte of the
+// answer (0) or all of it (1) had left, 36 so often the records in flash were read, 37 a recorded
+// operation of the flash, an erasure (1) or a page (0), began at that cycle, 38 from which place it
+// goes on (the upper 32 bits) and how many bytes it changes (the lower 16), 39 so many operations
+// were recorded, 40 the longest cycles of an exception's handler (its number), 41 and for which an
+// interrupt was masked (its number, 255 for all by PRIMASK, or 254 for all while the flash was
+// changed), 42 all of these have been told.
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -51,8 +52,9 @@
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
 import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
-import { attachFlashChip } from './pico/flash_chip.mjs';
+import { FlashPort } from './pico/flash_chip.mjs';
 import { FlashRecord } from './pico/flash_record.mjs';
+import { holdInReset } from './pico/held_in_reset.mjs';
 import { InterruptTimes } from './pico/interrupt_times.mjs';
 import { clearCountAtAbort } from './pico/aborted_dma.mjs';
 import { joinQueues } from './pico/joined_queue.mjs';
@@ -98,6 +100,7 @@ const TIMED = 8;
 const RETURNED = 6;
 const STACK = 9;
 const STALL = 10;
+const PAGE_TIME = 11;
 const ERASE_TIME = 12;
 const GARBLE = 13;
 const GARBLED = 34;
@@ -110,7 +113,7 @@ const BOOT_SCATTERED = 17;
 const OPERATION_BEGAN = 37;
 const OPERATION_CHANGES = 38;
 const OPERATIONS = 39;
-const ASK_IN_ERASURES = 18;
+const ASK_IN_CHANGES = 18;
 const GO_ON = -1;
 const TIME_INTERRUPTS = 49;
 const HANDLER_TOOK = 40;
@@ -148,12 +151,18 @@ function report(what, value, cycle) {
 
 // --- The boot ROM --------------------------------------------------------------------------------
 
+const CONNECT = 1;
+const EXIT_MAPPING = 2;
 const ERASE = 3;
 const PROGRAM = 4;
 const FLUSH_CACHE = 5;
-/** The breakpoints' numbers by the functions' codes. */
+const ENTER_MAPPING = 6;
 const USB_BOOT = 7;
-const FUNCTIONS = { IF: 1, EX: 2, RE: ERASE, RP: PROGRAM, FC: FLUSH_CACHE, CX: 6, UB: USB_BOOT };
+/** The breakpoints' numbers by the functions' codes. */
+const FUNCTIONS = {
+  IF: CONNECT, EX: EXIT_MAPPING, RE: ERASE, RP: PROGRAM, FC: FLUSH_CACHE, CX: ENTER_MAPPING,
+  UB: USB_BOOT,
+};
 const LOOK_UP = 0x20;
 const TABLE = 0x40;
 const CODE = 0x80;
@@ -190,9 +199,10 @@ function bootRom() {
 
 /** Flash takes 45 ms to erase a sector typically, and 400 ms at most. */
 let sectorMicroseconds = 45_000;
-/** Whether the status is asked for at the serial line whenever an erasure begins. */
-let asksInErasures = false;
-const PAGE_MICROSECONDS = 400;
+/** To write a page it takes 0.4 ms typically, and 3 ms at most. */
+let pageMicroseconds = 400;
+/** Whether the status is asked for at the serial line whenever a change of flash begins. */
+let asksInChanges = false;
 /** Bytes of flash until the power goes. */
 let flashBudget = Infinity;
 /** The core waits for the flash for so many nanoseconds. */
@@ -211,7 +221,12 @@ function changeFlash(from, count, change) {
 /** What is done to the flash. */
 const flashRecord = new FlashRecord();
 
+/** A change of flash begins: it is recorded, and the status may be asked for. */
 function noteFlash(isErasure, from, count, microseconds, change) {
+  if (asksInChanges && asked === null && answeredFor === null) {
+    cable.bytes.push({ value: QUESTION, errors: 0 });
+    uart.listen();
+  }
   const [begins, lasts] = [now() + flashNanos / NANOS, (microseconds * 1000) / NANOS];
   flashRecord.note(isErasure, from, count, Math.round(begins), lasts, chip.flash, change);
 }
@@ -240,20 +255,25 @@ function serveRom(number) {
   const [first, second, third] = core.registers;
   if (number === ERASE) {
     const erase = () => 0xff;
-    if (asksInErasures) {
-      cable.bytes.push({ value: QUESTION, errors: 0 });
-      uart.listen();
-    }
+    flashPort.beginErasure(first, second);
     noteFlash(true, first, second, sectorMicroseconds, erase);
     changeFlash(first, second, erase);
     flashNanos += (second / 4096) * sectorMicroseconds * 1000;
+  } else if (number === CONNECT) {
+    flashPort.connect();
+  } else if (number === EXIT_MAPPING) {
+    flashPort.exitMapping();
+  } else if (number === ENTER_MAPPING) {
+    flashPort.enterMapping();
   } else if (number === FLUSH_CACHE) {
     quick.flush();
+    flashPort.releaseSelect();
   } else if (number === PROGRAM) {
+    flashPort.beginPages(first, third);
     const write = (at, before) => before & chip.readUint8(second + at - first);
-    noteFlash(false, first, third, PAGE_MICROSECONDS, write);
+    noteFlash(false, first, third, pageMicroseconds, write);
     changeFlash(first, third, write);
-    flashNanos += (third / 256) * PAGE_MICROSECONDS * 1000;
+    flashNanos += (third / 256) * pageMicroseconds * 1000;
   } else if (number === USB_BOOT) {
     const { scratchData } = chip.peripherals[WATCHDOG];
     scratchData.set([first, second]);
@@ -264,7 +284,7 @@ function serveRom(number) {
 // --- The chip ------------------------------------------------------------------------------------
 
 const quick = new QuickCore(readFileSync(corePath), CALL_CYCLES);
-let chip, clock, core, uart, machines, contacts;
+let chip, clock, core, uart, machines, contacts, flashPort;
 /** The cycle at which what happens now happens, while a state machine executes. */
 let stamp = -1;
 /** Cycles before the chip was last reset. */
@@ -352,7 +372,8 @@ function start(flash, kind) {
   chip.pio.forEach(followPio);
   schedule();
   usb.attach(chip);
-  attachFlashChip(chip);
+  flashPort = new FlashPort(chip);
+  holdInReset(chip);
   interruptTimes?.attach(core);
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
@@ -364,7 +385,7 @@ function start(flash, kind) {
 }
 
 function unusedStack() {
-  const end = chip.readUint32(VECTORS);
+  const end = chip.flashView.getUint32(VECTORS - FLASH, true);
   let at = RAM;
   while (at < end && chip.readUint8(at) === PAINT) at++;
   return at - RAM;
@@ -596,8 +617,9 @@ process.stdin.on('data', (data) => {
   for (; at + 8 <= rest.length; at += 8) {
     const entry = { value: rest[at + 1], cycle: rest.readUIntLE(at + 2, 6) };
     if (rest[at] === SERIAL) cable.bytes.push({ value: entry.value, errors: entry.cycle });
+    else if (rest[at] === PAGE_TIME) pageMicroseconds = entry.cycle;
     else if (rest[at] === ERASE_TIME) sectorMicroseconds = entry.cycle;
-    else if (rest[at] === ASK_IN_ERASURES) asksInErasures = entry.value !== 0;
+    else if (rest[at] === ASK_IN_CHANGES) asksInChanges = entry.value !== 0;
     else if (rest[at] === GARBLE) {
       if (entry.value) garbleNext = entry.cycle;
       else quick.garble(board.records, entry.cycle);
@@ -795,7 +817,9 @@ function executeUntil(due) {
   do {
     if (core.interruptsUpdated && core.checkForInterrupts()) core.waiting = false;
     const alarm = clock.nextAlarm ? clock.nextAlarm.nanos : Infinity;
-    const cycles = quick.run((Math.min(alarm, nanos) - clock.nanosCounter) / NANOS);
+    // While flash is not mapped, rp2040js executes all: each of its reads is watched.
+    const most = flashPort.isMapped ? (Math.min(alarm, nanos) - clock.nanosCounter) / NANOS : 0;
+    const cycles = quick.run(most);
     if (quick.takeGarbled()) report(GARBLED, 0, now());
     if (cycles !== 0) {
       pass(cycles * NANOS);
@@ -838,12 +862,20 @@ function idle() {
   return core.waiting && pioDue === Infinity && !uart.busy && !events.length && !bounces.length;
 }
 
+/** Ends the emulation. A model says all in its message; any other error is a mistake in here. */
+function end(error) {
+  takeLog();
+  flush();
+  console.error(error.constructor === Error ? `the emulation ends: ${error.message}` : error);
+  process.exit(1);
+}
+
 function turn() {
   const sleeps = idle();
   try {
     run(sleeps ? MILLISECOND : SLICE);
   } catch (error) {
-    if (!(error instanceof PowerCut)) throw error;
+    if (!(error instanceof PowerCut)) end(error);
     cutPower();
   }
   takeLog();

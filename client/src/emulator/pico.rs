@@ -16,8 +16,8 @@ use process::{
     PROGRAM, State, check_version, command, function, listen, log_address, spawn_and_read,
 };
 use record::{
-    ASK_IN_ERASURES, CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG,
-    JUMP, PIN, READS, RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH,
+    ASK_IN_CHANGES, CUT_FLASH, CUT_POWER, CYCLE_NANOS, DELAY_ALARM, ERASE_TIME, GARBLE, HANG, JUMP,
+    PAGE_TIME, PIN, READS, RUN_PIN, Record, SERIAL, STACK, STALL, STAYS_HIGH, STAYS_LOW, SWITCH,
     SWITCH_ZERO, TIMED, UF2, USB, USB_HOST, USB_LINE, USB_RESETS, at,
 };
 
@@ -450,13 +450,22 @@ impl Pico {
         self.send(ERASE_TIME, 0, time.as_micros() as u64)
     }
 
-    /// Asks for the status at the serial line whenever an erasure of flash begins, from now on or
-    /// no longer. The question comes in the board's own time, however late the computer is.
+    /// Sets the time that writing a page of flash takes from now on. It is 0.4 ms at first, the
+    /// typical value; the maximum is 3 ms.
     ///
     /// # Errors
     /// The emulator has ended.
-    pub fn ask_in_erasures(&mut self, asks: bool) -> io::Result<()> {
-        self.send(ASK_IN_ERASURES, u8::from(asks), 0)
+    pub fn set_page_time(&mut self, time: Duration) -> io::Result<()> {
+        self.send(PAGE_TIME, 0, time.as_micros() as u64)
+    }
+
+    /// Asks for the status at the serial line whenever an erasure of flash or the writing of a page
+    /// begins while no answer is awaited, from now on or no longer. The question comes in the board's own time, however late the computer is.
+    ///
+    /// # Errors
+    /// The emulator has ended.
+    pub fn ask_in_flash_changes(&mut self, asks: bool) -> io::Result<()> {
+        self.send(ASK_IN_CHANGES, u8::from(asks), 0)
     }
 
     /// Sends bytes to one of the serial lines of the board.

@@ -154,6 +154,8 @@ pub mod reset {
     pub const PIO0: u32 = 1 << 10;
     /// The bit of the PWM unit.
     pub const PWM: u32 = 1 << 14;
+    /// The bit of the chip's identification.
+    pub const SYSINFO: u32 = 1 << 19;
     /// The bit of the timer.
     pub const TIMER: u32 = 1 << 21;
     /// The bit of the first UART.

@@ -38,7 +38,7 @@ use self::driver::{Controller, PACKET, Register};
 use self::frame::Frame;
 pub use self::frame::forget as forget_frame;
 use super::ports::{self, Port, ReceiveSide};
-use super::registers::{self, Get, Put, USB, USB_MEMORY};
+use super::registers::{self, Get, Put, USB, USB_MEMORY, reset};
 use super::{clock, critical, divider};
 use crate::boards::fault::once;
 use crate::boards::handler::Owned;
@@ -123,7 +123,7 @@ pub struct Sender {
 /// Connects the device to the host, with this serial number. `ports` must be set up, the clock of
 /// the controller must run at 48 MHz, and the pins must be out of reset.
 pub fn set_up(nvic: &mut NVIC, number: &'static str) -> Sender {
-    registers::restart(registers::reset::USBCTRL);
+    registers::restart(reset::USBCTRL | reset::SYSINFO);
     let (sent, to_send) = once(QUEUE.try_init(ByteQueue::new())).split();
     let line = UsbLine {
         device: device::Device::new(Chip, number),

@@ -37,14 +37,11 @@ export class FlashRecord {
   }
 
   /**
-   * Bytes from `from` on are about to become what `change` says. A page begins `duration` cycles
-   * after the one before, and so does a sector.
+   * Whole pages or sectors from `from` on are about to become what `change` says. Each begins
+   * `duration` cycles after the one before.
    */
   note(isErasure, from, count, cycle, duration, flash, change) {
     const unit = isErasure ? SECTOR : PAGE;
-    if (from % unit !== 0 || count % unit !== 0) {
-      throw new Error(`the flash is not worked on in whole units: ${count} bytes from ${from} on`);
-    }
     if (!this.isRecording) return;
     for (let start = from; start < from + count; start += unit, cycle += duration) {
       const changes = [];

@@ -43,6 +43,7 @@ const MODULES: &[(&str, &str)] = &[
     ("./pico/core_cycles.mjs", include_str!("core_cycles.mjs")),
     ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
     ("./pico/flash_record.mjs", include_str!("flash_record.mjs")),
+    ("./pico/held_in_reset.mjs", include_str!("held_in_reset.mjs")),
     ("./pico/interrupt_times.mjs", include_str!("interrupt_times.mjs")),
     ("./pico/joined_queue.mjs", include_str!("joined_queue.mjs")),
     ("./pico/late_alarm.mjs", include_str!("late_alarm.mjs")),

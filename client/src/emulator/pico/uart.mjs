@@ -4,8 +4,12 @@
 // register, so this takes its place: both FIFOs of 32 places, the time that a byte takes each way,
 // overrun, framing and parity errors and breaks, the interrupts with their trigger levels and the
 // receive timeout, and the requests to DMA. The sources are Arm's manual DDI 0183 and the RP2040's
-// data sheet,
-// 4.2. Not modelled: other frames than 8N1, flow control, loopback.
+// data sheet, 4.2. Not modelled: flow control, loopback.
+//
+// The other end of the cable has 115200 baud, 8 bits, no parity and one stop bit. Where a byte goes
+// either way while the UART has another format, which would lose or damage it, the emulation ends.
+// The PL011 takes the divider of the rate over only when the line control is written, and neither
+// may change while it is enabled (DDI 0183, 3.3.6 and 3.3.7).
 //
 // Until the first byte is sent to it, nothing is connected: GP1 has the level to which its pad
 // pulls it. A low level that lasts is a break, as it is on the chip. A UART input that no pin is
@@ -15,10 +19,16 @@ const UART_FIFO = 32;
 const UART_BASE = 0x40034;
 const UART_PIN = 1;
 const UART_FUNCTION = 2;
-const UART_NANOS_PER_BIT = 1e9 / 115200;
+const UART_BAUD = 115200;
+const UART_NANOS_PER_BIT = 1e9 / UART_BAUD;
 const UART_BITS_PER_BYTE = 10;
-/** The chip's peripheral clock. */
-const UART_HERTZ = 125e6;
+/**
+ * By how much the rate may differ: the middle of the last bit is 9.5 bits from the start, and both
+ * ends and the sampling share the half bit by which it may be missed.
+ */
+const UART_RATE_TOLERANCE = 0.02;
+/** The line control of 8 bits, no parity and one stop bit, with FIFOs. */
+const UART_LINE_CONTROL = 0x70;
 
 const UART_REGISTER = {
   DATA: 0x00,
@@ -82,6 +92,8 @@ export class Uart {
     this.control = UART_CONTROL.SENDS | UART_CONTROL.RECEIVES;
     this.lineControl = this.baudInteger = this.baudFraction = this.mask = this.raw = this.dma = 0;
     this.levels = 0b010010;
+    /** What divides the clock, since the line control was last written. */
+    this.divisor = 0;
     this.arrival = chip.clock.createAlarm(() => this.arrive());
     this.departure = chip.clock.createAlarm(() => this.depart());
     this.timeout = chip.clock.createAlarm(() => this.timeOut());
@@ -132,6 +144,7 @@ export class Uart {
     const { value, errors } = this.arriving;
     this.arriving = null;
     if (this.receives && this.isRouted) {
+      this.checkFormat('receives');
       this.came(value);
       this.receive(value | errors);
     }
@@ -220,9 +233,23 @@ export class Uart {
   // --- Sending
   // -------------------------------------------------------------------------------------
 
-  get nanosPerByte() {
-    const divisor = this.baudInteger + this.baudFraction / 64;
-    return (UART_BITS_PER_BYTE * 16 * divisor * 1e9) / UART_HERTZ;
+  /** Bits per second; 0 without a clock or a divider. */
+  get baud() {
+    return this.divisor === 0 ? 0 : this.chip.clocks.periFreq / (16 * this.divisor);
+  }
+
+  /** rp2040js tells of it; the rate is computed for each byte. */
+  clkPeriChanged() {}
+
+  /** Ends the emulation unless the format is that of the other end. */
+  checkFormat(does) {
+    const isRate = Math.abs(this.baud / UART_BAUD - 1) <= UART_RATE_TOLERANCE;
+    if (isRate && this.lineControl === UART_LINE_CONTROL) return;
+    throw new Error(
+      `UART0 ${does} a byte at ${Math.round(this.baud)} baud with the line control ` +
+        `0x${this.lineControl.toString(16)}; the other end has ${UART_BAUD} baud and ` +
+        `0x${UART_LINE_CONTROL.toString(16)}`,
+    );
   }
 
   put(byte) {
@@ -240,7 +267,8 @@ export class Uart {
   shift() {
     this.shifted = this.toSend.shift() ?? null;
     if (this.shifted === null) return;
-    this.departure.schedule(wholeCycles(this.nanosPerByte));
+    this.checkFormat('sends');
+    this.departure.schedule(wholeCycles((UART_BITS_PER_BYTE * 1e9) / this.baud));
     if (this.toSend.length === UART_TRIGGER[this.levels & 7]) this.raw |= UART_INTERRUPT.SENT;
   }
 
@@ -312,6 +340,13 @@ export class Uart {
     this.writeUint32(offset, [value, before ^ value, before | value, before & ~value][type]);
   }
 
+  /** Ends the emulation if the format changes while it may be used. */
+  refuseIfEnabled() {
+    if (this.control & UART_CONTROL.ENABLED) {
+      throw new Error('the rate or the line control of UART0 is written while it is enabled');
+    }
+  }
+
   writeUint32(offset, value) {
     switch (offset) {
       case UART_REGISTER.DATA:
@@ -319,13 +354,17 @@ export class Uart {
       case UART_REGISTER.ERROR_CLEAR:
         return;
       case UART_REGISTER.BAUD_INTEGER:
+        this.refuseIfEnabled();
         this.baudInteger = value & 0xffff;
         return;
       case UART_REGISTER.BAUD_FRACTION:
+        this.refuseIfEnabled();
         this.baudFraction = value & 0x3f;
         return;
       case UART_REGISTER.LINE_CONTROL:
+        this.refuseIfEnabled();
         this.lineControl = value & 0xff;
+        this.divisor = this.baudInteger + this.baudFraction / 64;
         return;
       case UART_REGISTER.CONTROL:
         this.control = value & 0xffff;
