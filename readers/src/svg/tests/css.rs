@@ -108,6 +108,36 @@ fn the_dashes_of_a_stroke_of_fixed_width_are_measured_on_the_page() {
 }
 
 #[test]
+fn dashes_are_measured_in_the_length_that_a_path_says_it_has() {
+    let dashes = |shape: &str| {
+        let svg = in_mm(&format!("<g transform='scale(2)' stroke='red' fill='none'>{shape}</g>"));
+        positions(&svg)
+    };
+    let half = "stroke-dasharray='50'";
+    let line = dashes(&format!("<path d='M5 5H25' pathLength='100' {half}/>"));
+    assert_eq!(line, [[[10.0, 90.0], [30.0, 90.0]]]);
+    let later = format!("<line x1='5' y1='5' x2='25' y2='5' pathLength=' 200 ' {half}/>");
+    let ends = [[[10.0, 90.0], [20.0, 90.0]], [[30.0, 90.0], [40.0, 90.0]]];
+    assert_eq!(dashes(&later), ends);
+    let shifted = later.replace("/>", " stroke-dashoffset='50'/>");
+    assert_eq!(dashes(&shifted), [[[20.0, 90.0], [30.0, 90.0]], [[40.0, 90.0], [50.0, 90.0]]]);
+    let circle = dashes(&format!("<circle cx='25' cy='25' r='10' pathLength='100' {half}/>"));
+    let ink: f64 = circle.iter().map(|line| crate::region::length(line)).sum();
+    assert!((ink - 20.0 * std::f64::consts::PI).abs() < 0.05, "{ink}");
+    // A stroke of fixed width has the same dashes then.
+    let fixed = line_of("pathLength='100' vector-effect='non-scaling-stroke'");
+    assert_eq!(dashes(&fixed), line);
+    // Of a path of no length, each dash is endless; a negative length is none.
+    assert_eq!(dashes(&line_of("pathLength='0'")), [[[10.0, 90.0], [50.0, 90.0]]]);
+    assert_eq!(dashes(&line_of("pathLength='-1'")), dashes(&line_of("")));
+}
+
+/// A line of 20 units with dashes of 50 units.
+fn line_of(attributes: &str) -> String {
+    format!("<path d='M5 5H25' stroke-dasharray='50' {attributes}/>")
+}
+
+#[test]
 fn a_browser_text_in_html_is_replaced_by_what_the_file_has_for_others() {
     const FEATURES: &str = "requiredFeatures='http://www.w3.org/TR/SVG11/feature#Extensibility'";
     let html = |text: &str, features: &str| {
