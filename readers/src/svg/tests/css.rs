@@ -96,6 +96,20 @@ fn a_paint_that_is_not_read_leaves_the_one_before_it() {
     let (count, notes) = read(sheet);
     assert_eq!(count, 1);
     assert!(notes.contains("has a stroke that is no name of a colour, #rrggbb"), "{notes}");
+    // So it is with an attribute, which has none before it.
+    for paint in ["fill='oklch(0.6 0.2 30)'", "stroke='lab(50% 40 59)'", "fill='rouge'"] {
+        let shape = format!("<path d='M1 1H9V9' {paint}/>");
+        let (count, notes) = read(&format!("{shape}<path fill='none' stroke='red'"));
+        let name = paint.split('=').next().unwrap_or_default();
+        let said = format!("has a {name} that is no name of a colour, #rrggbb");
+        assert!(count <= 2 && notes.contains(&said), "{paint}: {notes}");
+    }
+    for paint in ["context-fill", "transparent", " red ", "hwb(9 9% 9%)"] {
+        let shape = format!("<g fill='{paint}'/><path fill='none' stroke='red'");
+        assert_eq!(read(&shape), (1, String::new()), "{paint}");
+    }
+    let animated = "<animate fill='freeze'/><path fill='none' stroke='red'";
+    assert!(!read(animated).1.contains("colour"));
 }
 
 #[test]
