@@ -8,7 +8,10 @@
 
 #![cfg_attr(not(feature = "svg"), expect(dead_code, reason = "only SVG files have clip paths"))]
 
+mod mapped;
+
 use crate::plan::Point;
+pub(crate) use mapped::MappedRegions;
 use std::cell::RefCell;
 use std::collections::HashSet;
 use std::sync::Arc;

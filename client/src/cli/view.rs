@@ -27,7 +27,11 @@ const PAGE: &str = "page";
 const TITLE: &str = "title";
 /// The name of the option for the height of the title.
 const TITLE_SIZE: &str = "title-size";
-/// The units in which the size of a page may be written, and their lengths in mm.
+/// The name of the option that says who chooses the pens, and the value with which nobody does.
+const PENS: &str = "pens";
+const ONE: &str = "one";
+/// The name of the option that gives the layers their pens.
+const LAYER_ORDER: &str = "layer-order";
 /// The name of the option for the margin of the page. A file that sets its own page needs no
 /// margin.
 const MARGIN: &str = "margin";
@@ -117,6 +121,11 @@ impl FromArgMatches for ViewArgs {
             Some((option.name, value?))
         };
         let settings = Settings { page, values: flags().filter_map(value).collect() };
+        if settings.value(PENS) == Some(ONE) && is_given(LAYER_ORDER) {
+            let reason = "--pens one draws all layers with one pen: leave out --layer-order, or \
+                          --pens one\n";
+            return Err(Error::raw(ErrorKind::ArgumentConflict, reason));
+        }
         let margin = settings.value(MARGIN).and_then(|margin| margin.parse().ok());
         let mut arrangement = Arrangement::on(
             is_given(PAGE).then_some(page),

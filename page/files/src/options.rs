@@ -9,7 +9,7 @@ const DEFAULT_TITLE_SIZE: f64 = 5.0;
 /// What `options`, pairs of name and value, say about a plan.
 ///
 /// # Errors
-/// A value is refused; the sentence names its option.
+/// A value is refused, or two options contradict each other; the sentence names the options.
 pub fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> {
     let given = |name: &str| {
         let option = options.iter().rfind(|(own, _)| own == name);
@@ -22,6 +22,13 @@ pub fn arrangement(options: &[(String, String)]) -> Result<Arrangement, String> 
         Some(_) => Turn::Landscape,
     };
     let margin = given("margin").and_then(|margin| margin.parse().ok());
+    if given("pens") == Some("one") && given("layer-order").is_some() {
+        return Err(
+            "--pens one draws all layers with one pen: leave out --layer-order, or --pens \
+                    one"
+            .to_owned(),
+        );
+    }
     let mut arrangement = Arrangement::on(page, turn, margin);
     if given("fit").is_some() {
         let size = given("title-size").and_then(|size| size.parse().ok());

@@ -72,5 +72,8 @@ mod tests {
         assert_eq!((page.width, page.height), (200.0, 100.0));
         let refused = bounds(r#"[["hatch","nought"]]"#).expect_err("refused");
         assert!(refused.starts_with("--hatch: "), "{refused}");
+        let refused = bounds(r#"[["pens","one"],["layer-order","1"]]"#).expect_err("refused");
+        assert!(refused.contains("leave out --layer-order, or --pens one"), "{refused}");
+        assert!(bounds(r#"[["pens","auto"],["layer-order","1"]]"#).is_ok());
     }
 }

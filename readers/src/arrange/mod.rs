@@ -27,6 +27,7 @@ use crate::files::Files;
 use crate::fonts::Fonts;
 use crate::page::{A4, Page};
 use crate::plan::{DOT, Plan, Point};
+use crate::region::MappedRegions;
 use penup::drawing::Title;
 use penup::fixed::Millimetres;
 
@@ -288,9 +289,12 @@ pub fn sine_cosine(degrees: f64) -> (f64, f64) {
 /// Applies `map` to every point of the plan. Dots keep their length.
 fn transform(plan: &mut Plan, map: impl Fn(Point) -> Point) {
     let strokes = plan.strokes.iter_mut().flat_map(|stroke| &mut stroke.points);
-    let areas = plan.areas.iter_mut().flatten();
-    let outlines = areas.flat_map(|area| area.outlines.iter_mut().flatten());
-    strokes.chain(outlines).for_each(|point| *point = map(*point));
+    strokes.for_each(|point| *point = map(*point));
+    let mut known = MappedRegions::default();
+    for area in plan.areas.iter_mut().flatten() {
+        area.outlines.iter_mut().flatten().for_each(|point| *point = map(*point));
+        area.within.transform(&map, &mut known);
+    }
     plan.strokes.iter_mut().for_each(|stroke| stroke.keep_dot(DOT));
 }
 

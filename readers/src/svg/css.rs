@@ -266,7 +266,7 @@ fn edit_of_declaration(
 }
 
 /// A paint as `usvg` reads it, which is the light one of two; `None` if it reads none.
-fn plain_paint(paint: &str) -> Option<&str> {
+pub(super) fn plain_paint(paint: &str) -> Option<&str> {
     let pair = paint.strip_prefix("light-dark(");
     let light = pair.and_then(|pair| pair.get(..find_outside_brackets(pair, |it| it == ',')?));
     let paint = light.unwrap_or(paint).trim();

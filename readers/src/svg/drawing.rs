@@ -2,7 +2,7 @@
 
 use super::areas::rectangle;
 use super::clip::ConvexArea;
-use super::flatten::{Arcs, Polyline, TooManyPoints, flatten};
+use super::flatten::{Arcs, Polyline, TooManyPoints, flatten, path_length};
 use super::markup::Markup;
 use super::pens::Marks;
 use crate::arrange::clip_outline;
@@ -288,10 +288,14 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             Some((lengths, offset)) => {
                 // Lengths along a curve are measured to within a small part of a motor step.
                 let scale = to_page.determinant().abs().sqrt() * 100.0;
+                // A file may say the length of a path, in which its dashes are measured then.
+                let said = own.and_then(|own| self.markup.path_length(own));
+                let unit = said.map_or(unit, |said| (path_length(&path_data, scale) / said) as f32);
                 let lengths = lengths.iter().map(|length| length * unit).collect();
                 let dash = StrokeDash::new(lengths, offset * unit);
                 let dashed = dash.and_then(|dash| path_data.dash(&dash, scale as f32));
-                self.undashed += count * usize::from(dashed.is_none());
+                let is_endless = unit.is_infinite();
+                self.undashed += count * usize::from(dashed.is_none() && !is_endless);
                 dashed
             }
         };

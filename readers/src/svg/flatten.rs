@@ -7,7 +7,7 @@
 //! a large page. Where the source has an arc, the ellipse is computed from the Bézier again.
 
 use crate::region::TooMuch;
-use kurbo::{Affine, BezPath, PathEl, Point};
+use kurbo::{Affine, BezPath, ParamCurveArclen as _, PathEl, Point};
 use usvg::tiny_skia_path::{Path, PathSegment};
 
 /// The tolerance of flattening curves, in mm. Together with [`COARSE`] and the rounding to
@@ -124,6 +124,19 @@ pub(super) fn flatten(
     }
     end(&mut points);
     Ok(polylines)
+}
+
+/// The length of a path in its own units, of which `1 / scale` is a length that may be neglected.
+pub(super) fn path_length(path: &Path, scale: f64) -> f64 {
+    let point = |it: usvg::tiny_skia_path::Point| Point::new(it.x.into(), it.y.into());
+    let elements = path.segments().map(|segment| match segment {
+        PathSegment::MoveTo(to) => PathEl::MoveTo(point(to)),
+        PathSegment::LineTo(to) => PathEl::LineTo(point(to)),
+        PathSegment::QuadTo(by, to) => PathEl::QuadTo(point(by), point(to)),
+        PathSegment::CubicTo(by, then, to) => PathEl::CurveTo(point(by), point(then), point(to)),
+        PathSegment::Close => PathEl::ClosePath,
+    });
+    kurbo::segments(elements).map(|segment| segment.arclen(0.1 / scale)).sum()
 }
 
 /// Appends the points of a curve with these control points, without its first.

@@ -376,6 +376,12 @@ impl<'a, 'input> Markup<'a, 'input> {
         value == Some("linearRGB")
     }
 
+    /// The length that an element says its path has, 0 or more.
+    pub(super) fn path_length(&self, element: NodeId) -> Option<f64> {
+        let said = self.node(element)?.attribute("pathLength")?;
+        said.trim().parse().ok().filter(|length: &f64| length.is_finite() && *length >= 0.0)
+    }
+
     /// Whether the width of an element's stroke, and with it the length of its dashes, is the same
     /// whatever transforms there are.
     pub(super) fn has_fixed_stroke(&self, element: NodeId) -> bool {

@@ -1,7 +1,7 @@
 //! What an SVG asks for by means that are not read: properties and rules of CSS, scripts,
 //! animations, and paints of other programs. All of it is counted, for the user.
 
-use super::css::{UNREAD, VARIABLE, without_comments};
+use super::css::{UNREAD, VARIABLE, plain_paint, without_comments};
 use super::lengths;
 use super::markup::{Count, SHAPES, is_one_of};
 use std::collections::{BTreeMap, BTreeSet};
@@ -141,9 +141,7 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
     if name == UNREAD {
         return Some(match value {
             VARIABLE => "a variable of CSS".to_owned(),
-            "fill" | "stroke" => {
-                format!("a {value} that is no name of a colour, #rrggbb, rgb() or hsl()")
-            }
+            "fill" | "stroke" => no_colour(value),
             name => format!("the property {name} of CSS"),
         });
     }
@@ -159,7 +157,23 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
     if value.contains("var(") {
         return Some("a variable of CSS".to_owned());
     }
+    if !is_style && is_unread_paint(name, value.trim()) {
+        return Some(no_colour(name));
+    }
     lengths::unread(name, value, is_shape)
+}
+
+/// What is said of a `fill` or a `stroke` whose value is not read.
+fn no_colour(name: &str) -> String {
+    format!("a {name} that is no name of a colour, #rrggbb, rgb() or hsl()")
+}
+
+/// Whether an attribute is a paint that is not read. The `fill` of an animation is no paint.
+fn is_unread_paint(name: &str, value: &str) -> bool {
+    matches!(name, "fill" | "stroke")
+        && !matches!(value, "freeze" | "remove")
+        && !value.starts_with("url(")
+        && plain_paint(value).is_none()
 }
 
 /// What is not read of a style sheet of a picture in which elements with these selectors are

@@ -186,15 +186,17 @@ fn a_direction_that_contradicts_another_choice_is_refused() {
 }
 
 #[test]
-fn options_of_plans_reach_the_file_and_contradict_a_scale_to_the_page() {
+fn options_of_plans_reach_the_file_and_contradict_others() {
     let plan = "v 0 0 0\nv 9 5 0\nl 1 2\n";
     let page = |options: &[&str]| settings_of(plan, options).map(|settings| settings.page.width);
     assert_eq!(page(&["--landscape=auto"]), Ok(297.0));
     assert_eq!(page(&["--landscape=auto", "--rotate", "90"]), Ok(210.0));
     assert_eq!(page(&["--landscape"]), Ok(297.0));
+    assert_eq!(page(&["--pens", "auto", "--layer-order", "1"]), Ok(210.0));
     for (options, reason) in [
         (&["--scale", "2", "--fit"][..], "cannot be used with"),
         (&["--center", "--fit"], "cannot be used with"),
+        (&["--pens", "one", "--layer-order", "1"], "leave out --layer-order, or --pens one"),
         (&["--scale", "0"], "a factor is 0.001 to 1000"),
         (&["--crop", "500,500,5,5"], "nothing left to draw after --crop"),
         (&["--landscape=sometimes"], "possible values: always, auto"),

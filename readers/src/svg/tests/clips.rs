@@ -1,6 +1,7 @@
 //! Tests of clip paths, and of the page.
 
 use super::*;
+use crate::Turn;
 use crate::region::length;
 
 /// A dent of the shape that clips, a hole, two shapes, and a text are no different.
@@ -54,6 +55,48 @@ fn the_clip_path_is_a_part_of_the_outline_of_what_is_only_filled() {
     assert!(hatches.len() >= 9, "{hatches:?}");
     for (_, line) in hatches {
         assert!((length(&line) - 20.0).abs() < 0.01, "{line:?}");
+    }
+}
+
+/// A shape that is cut to a square is hatched as that square is, wherever the square comes to lie.
+#[test]
+fn what_fills_a_clipped_shape_goes_with_it_when_the_plan_is_scaled_and_turned() {
+    let mark = "<path d='M2 2H90' stroke='red' fill='none'/>";
+    let square = "<rect x='20' y='20' width='20' height='20'";
+    let clipped = format!(
+        "<clipPath id='outer'><rect x='20' width='90' height='40'/></clipPath>\
+         <clipPath id='c' clip-path='url(#outer)'><path d='M-9 20H40V200H-9Z'/></clipPath>\
+         <mask id='m' maskUnits='userSpaceOnUse' width='100' height='100'>{square} fill='#fff'/>\
+         </mask>"
+    );
+    let hatches = |shapes: &str, arrangement: &Arrangement| {
+        let text = in_mm(&format!("{mark}{clipped}{shapes}"));
+        let file = SourceFile::arranged("a.svg".to_owned(), text.into(), arrangement);
+        let lines = polylines(&file.expect("a plan")).into_iter().map(|(_, points)| points);
+        lines.filter(|points| points.len() == 2).skip(1).collect::<Vec<_>>()
+    };
+    for options in [
+        &[("scale", "2,-0.5"), ("rotate", "30"), ("hatch", "0.7,0")][..],
+        &[("rotate", "-90"), ("hatch", "0.7,0"), ("center", "")],
+        &[("hatch", "0.7,0")],
+    ] {
+        let mut arrangement = Arrangement::default();
+        if options.len() == 1 {
+            arrangement = Arrangement::on(None, Turn::AsItIs, None).fitted("", 5.0);
+        }
+        for (name, value) in options {
+            arrangement.set(name, value).expect("a value");
+        }
+        let expected = hatches(&format!("{square}/>"), &arrangement);
+        assert!(expected.len() > 9, "{options:?}: {expected:?}");
+        for cut in ["clip-path='url(#c)'", "mask='url(#m)'"] {
+            let own = hatches(&format!("<rect {cut} width='95' height='95'/>"), &arrangement);
+            assert_eq!(own.len(), expected.len(), "{options:?} {cut}: {own:?}");
+            for (line, expected) in own.iter().flatten().zip(expected.iter().flatten()) {
+                let off = (line[0] - expected[0]).hypot(line[1] - expected[1]);
+                assert!(off < 0.01, "{options:?} {cut}: {line:?} is not {expected:?}");
+            }
+        }
     }
 }
 

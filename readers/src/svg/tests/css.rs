@@ -96,6 +96,20 @@ fn a_paint_that_is_not_read_leaves_the_one_before_it() {
     let (count, notes) = read(sheet);
     assert_eq!(count, 1);
     assert!(notes.contains("has a stroke that is no name of a colour, #rrggbb"), "{notes}");
+    // So it is with an attribute, which has none before it.
+    for paint in ["fill='oklch(0.6 0.2 30)'", "stroke='lab(50% 40 59)'", "fill='rouge'"] {
+        let shape = format!("<path d='M1 1H9V9' {paint}/>");
+        let (count, notes) = read(&format!("{shape}<path fill='none' stroke='red'"));
+        let name = paint.split('=').next().unwrap_or_default();
+        let said = format!("has a {name} that is no name of a colour, #rrggbb");
+        assert!(count <= 2 && notes.contains(&said), "{paint}: {notes}");
+    }
+    for paint in ["context-fill", "transparent", " red ", "hwb(9 9% 9%)"] {
+        let shape = format!("<g fill='{paint}'/><path fill='none' stroke='red'");
+        assert_eq!(read(&shape), (1, String::new()), "{paint}");
+    }
+    let animated = "<animate fill='freeze'/><path fill='none' stroke='red'";
+    assert!(!read(animated).1.contains("colour"));
 }
 
 #[test]
@@ -105,6 +119,36 @@ fn the_dashes_of_a_stroke_of_fixed_width_are_measured_on_the_page() {
                   vector-effect='non-scaling-stroke'/></g>";
     let sent = positions(&in_mm(dashed));
     assert_eq!(sent, [[[10.0, 90.0], [15.292, 90.0]]]);
+}
+
+#[test]
+fn dashes_are_measured_in_the_length_that_a_path_says_it_has() {
+    let dashes = |shape: &str| {
+        let svg = in_mm(&format!("<g transform='scale(2)' stroke='red' fill='none'>{shape}</g>"));
+        positions(&svg)
+    };
+    let half = "stroke-dasharray='50'";
+    let line = dashes(&format!("<path d='M5 5H25' pathLength='100' {half}/>"));
+    assert_eq!(line, [[[10.0, 90.0], [30.0, 90.0]]]);
+    let later = format!("<line x1='5' y1='5' x2='25' y2='5' pathLength=' 200 ' {half}/>");
+    let ends = [[[10.0, 90.0], [20.0, 90.0]], [[30.0, 90.0], [40.0, 90.0]]];
+    assert_eq!(dashes(&later), ends);
+    let shifted = later.replace("/>", " stroke-dashoffset='50'/>");
+    assert_eq!(dashes(&shifted), [[[20.0, 90.0], [30.0, 90.0]], [[40.0, 90.0], [50.0, 90.0]]]);
+    let circle = dashes(&format!("<circle cx='25' cy='25' r='10' pathLength='100' {half}/>"));
+    let ink: f64 = circle.iter().map(|line| crate::region::length(line)).sum();
+    assert!((ink - 20.0 * std::f64::consts::PI).abs() < 0.05, "{ink}");
+    // A stroke of fixed width has the same dashes then.
+    let fixed = line_of("pathLength='100' vector-effect='non-scaling-stroke'");
+    assert_eq!(dashes(&fixed), line);
+    // Of a path of no length, each dash is endless; a negative length is none.
+    assert_eq!(dashes(&line_of("pathLength='0'")), [[[10.0, 90.0], [50.0, 90.0]]]);
+    assert_eq!(dashes(&line_of("pathLength='-1'")), dashes(&line_of("")));
+}
+
+/// A line of 20 units with dashes of 50 units.
+fn line_of(attributes: &str) -> String {
+    format!("<path d='M5 5H25' stroke-dasharray='50' {attributes}/>")
 }
 
 #[test]
