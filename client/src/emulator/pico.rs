@@ -460,7 +460,8 @@ impl Pico {
     }
 
     /// Asks for the status at the serial line whenever an erasure of flash or the writing of a page
-    /// begins while no answer is awaited, from now on or no longer. The question comes in the board's own time, however late the computer is.
+    /// begins while no answer is awaited, from now on or no longer. The question comes in the
+    /// board's own time, however late the computer is.
     ///
     /// # Errors
     /// The emulator has ended.
