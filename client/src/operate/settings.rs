@@ -24,14 +24,32 @@ const SHOWN: f64 = 0.0006;
 /// keeps more, so one that it shows may be another.
 ///
 /// # Errors
-/// A setting is refused, or as [`Sender::ask`].
+/// A setting is given twice or refused, or as [`Sender::ask`].
 pub fn set(args: &SetArgs, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    fail_if_given_twice(&args.settings)?;
     let (changed, all) = converse(&args.plotter, interrupt, |sender| {
         let changed = differing(&read(sender)?, &args.settings).len();
         assign(sender, &args.settings)?;
         Ok((changed, read(sender)?))
     })?;
     Ok(told(changed, &args.settings, &all))
+}
+
+/// Checks that the command line gives each setting once: of two values one is a slip, and nobody
+/// but the user knows which.
+///
+/// # Errors
+/// A setting is given twice.
+pub fn fail_if_given_twice(given: &[AssignedSetting]) -> Result<(), Error> {
+    for (index, second) in given.iter().enumerate() {
+        if let Some(first) = given.iter().take(index).find(|it| it.number == second.number) {
+            return Err(Error::SettingTwice {
+                number: second.number,
+                values: [&first.value, &second.value].map(String::clone),
+            });
+        }
+    }
+    Ok(())
 }
 
 /// Lists the settings.
