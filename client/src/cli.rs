@@ -222,9 +222,15 @@ fn file_help(what: &str) -> String {
     format!("{what}: {}; {STANDARD_INPUT} is the standard input", penup_readers::list())
 }
 
+/// The options for an emulated board, with which none for a real plotter can be used.
+///
+/// What needs a port must name them itself: of two options that exclude each other, clap asks for
+/// neither.
+const EMULATED: [&str; 3] = ["board", "svg", "png"];
+
 /// Options of `penup plot`.
 #[derive(Debug, Args)]
-#[command(mut_arg("rejoin", |rejoin| rejoin.requires("port").conflicts_with("board")))]
+#[command(mut_arg("rejoin", |rejoin| rejoin.requires("port").conflicts_with_all(EMULATED)))]
 pub struct PlotArgs {
     /// How the answer is printed.
     #[command(flatten)]
@@ -248,7 +254,7 @@ pub struct PlotArgs {
         long,
         value_name = "DEVICE",
         help = machine::port_help(),
-        conflicts_with_all = ["board", "svg", "png"],
+        conflicts_with_all = EMULATED,
         help_heading = "Plotter"
     )]
     pub port: Option<String>,
@@ -276,11 +282,18 @@ pub struct PlotArgs {
         long,
         requires = "port",
         conflicts_with_all = ["from", "multipass"],
+        conflicts_with_all = EMULATED,
         help_heading = "Plotter"
     )]
     pub resume: bool,
     /// The pen has been put at the origin of the page by hand, for machines that cannot be homed
-    #[arg(long, requires = "resume", help_heading = "Plotter")]
+    #[arg(
+        long,
+        requires = "resume",
+        conflicts_with_all = ["from", "multipass"],
+        conflicts_with_all = EMULATED,
+        help_heading = "Plotter"
+    )]
     pub at_origin: bool,
     /// The camera, the page and the order of the strokes.
     #[command(flatten)]

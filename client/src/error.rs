@@ -183,6 +183,18 @@ pub enum Error {
         /// The number of the setting.
         number: u16,
     },
+    /// The command line gives a setting twice.
+    #[error(
+        "setting {number} is given twice, as {} and as {}: give it once",
+        values[0],
+        values[1]
+    )]
+    SettingTwice {
+        /// The number of the setting.
+        number: u16,
+        /// Its values, in the order of the command line.
+        values: [String; 2],
+    },
     /// The plotter's library, running on this computer, refuses to draw the model.
     #[error("cannot draw it: {}", explained(refusal.number(), &[refusal.to_string()]))]
     NotDrawn {
@@ -450,7 +462,7 @@ pub const EXIT_CODES: [ExitCode; 7] = [
         number: NOT_DONE,
         meaning: "a file cannot be read, drawn or written, or the emulator fails",
     },
-    ExitCode { number: 2, meaning: "the command line is not understood" },
+    ExitCode { number: NOT_UNDERSTOOD, meaning: "the command line is not understood" },
     ExitCode {
         number: NO_PLOTTER,
         meaning: "there is no plotter, its port is in use, or something else answers",
@@ -461,6 +473,8 @@ pub const EXIT_CODES: [ExitCode; 7] = [
 ];
 
 const NOT_DONE: u8 = 1;
+/// The exit code with which clap refuses a command line, too.
+const NOT_UNDERSTOOD: u8 = 2;
 const NO_PLOTTER: u8 = 3;
 const REFUSED: u8 = 4;
 const BROKEN_OFF: u8 = 5;
@@ -496,6 +510,7 @@ impl Error {
             Self::Interrupted
             | Self::InterruptedUnconfirmed
             | Self::SetupBrokenOff { is_interrupted: true, .. } => EXIT_CODE,
+            Self::SettingTwice { .. } => NOT_UNDERSTOOD,
             Self::Port { .. }
             | Self::Ports { .. }
             | Self::NoPlotter { .. }

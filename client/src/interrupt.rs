@@ -14,19 +14,30 @@ use std::sync::{Mutex, PoisonError};
 pub const EXIT_CODE: u8 = 130;
 
 static MOVING: AtomicUsize = AtomicUsize::new(0);
+/// How many of them guard an emulated plotter, which ends with the program.
+static EMULATED: AtomicUsize = AtomicUsize::new(0);
 /// The file that is being written and is deleted if the program ends early.
 static UNFINISHED: Mutex<Option<PathBuf>> = Mutex::new(None);
 
 /// A guard: while at least one exists, a plotter may be moving and must be stopped before the
 /// program ends.
 #[derive(Debug)]
-pub struct MovingPlotter(());
+pub struct MovingPlotter {
+    is_emulated: bool,
+}
 
 impl MovingPlotter {
     /// Marks a plotter as possibly moving until the guard is dropped.
     pub fn new() -> Self {
         MOVING.fetch_add(1, Ordering::SeqCst);
-        Self(())
+        Self { is_emulated: false }
+    }
+
+    /// Does the same for an emulated plotter.
+    pub fn emulated() -> Self {
+        EMULATED.fetch_add(1, Ordering::SeqCst);
+        MOVING.fetch_add(1, Ordering::SeqCst);
+        Self { is_emulated: true }
     }
 }
 
@@ -39,6 +50,9 @@ impl Default for MovingPlotter {
 impl Drop for MovingPlotter {
     fn drop(&mut self) {
         MOVING.fetch_sub(1, Ordering::SeqCst);
+        if self.is_emulated {
+            EMULATED.fetch_sub(1, Ordering::SeqCst);
+        }
     }
 }
 
@@ -52,10 +66,16 @@ pub fn while_unfinished<T>(file: &Path, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The handler of Ctrl-C. `interrupt` is the flag that the sender polls.
-pub fn ctrl_c(interrupt: &AtomicBool) {
+/// The handler of Ctrl-C. `interrupt` is the flag that the sender polls. If the user wants quiet, it
+/// does not say that a plotter is being stopped.
+pub fn ctrl_c(interrupt: &AtomicBool, is_quiet: bool) {
     let is_first = !interrupt.swap(true, Ordering::SeqCst);
-    if is_first && MOVING.load(Ordering::SeqCst) > 0 {
+    let moving = MOVING.load(Ordering::SeqCst);
+    let is_real = moving > EMULATED.load(Ordering::SeqCst);
+    if is_first && moving > 0 {
+        if is_real && !is_quiet {
+            crate::stderr::say("penup: stopping the plotter; Ctrl-C again does not wait for that");
+        }
         return;
     }
     // The lock is held until the process exits, so that no other file can be started.
@@ -65,6 +85,12 @@ pub fn ctrl_c(interrupt: &AtomicBool) {
         let _ = fs::remove_file(file);
     }
     crate::keyboard::restore();
-    crate::stderr::say("penup: given up");
+    crate::stderr::say(match is_real {
+        true => {
+            "penup: given up, without waiting until the plotter stopped: it may still be moving\n\
+             Look after it: `penup status` says what it does, and `penup abort` stops it"
+        }
+        false => "penup: given up",
+    });
     std::process::exit(i32::from(EXIT_CODE));
 }

@@ -16,8 +16,9 @@ static INTERRUPT: AtomicBool = AtomicBool::new(false);
 
 fn main() -> ExitCode {
     let cli = Cli::parse();
+    let is_quiet = cli.quiet;
     // A failure is ignored: without a handler, Ctrl-C still ends the process.
-    let _ = ctrlc::set_handler(|| interrupt::ctrl_c(&INTERRUPT));
+    let _ = ctrlc::set_handler(move || interrupt::ctrl_c(&INTERRUPT, is_quiet));
     match run(&cli, &INTERRUPT).and_then(|outcome| say(&cli, &outcome)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {

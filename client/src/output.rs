@@ -4,15 +4,16 @@
 
 use crate::error::Error;
 use crate::interrupt::while_unfinished;
-use std::fs;
+use std::fs::{self, File};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf, is_separator};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
 /// Checks that all outputs can be written, before the work that produces them.
 ///
 /// No two of the `outputs` may be the same file, and none may be the `input`, even under different
-/// names. An ordinary output is tested by writing an empty file beside it, which is removed again.
+/// names. An ordinary output is tested by an empty file, which is removed again: under the name of
+/// the output, which the folder may refuse, or beside a file that is there.
 ///
 /// # Errors
 /// The first problem that is found, with the name of the file.
@@ -109,20 +110,20 @@ fn try_to_write(path: &Path) -> io::Result<()> {
         // Pipes are not tested, because opening one would wait for its reader.
         Way::Standard | Way::Direct => Ok(()),
         Way::Beside(path) => {
-            let unfinished = unfinished(&path)?;
-            while_unfinished(&unfinished, || {
-                fs::write(&unfinished, []).and_then(|()| fs::remove_file(&unfinished))
+            let tried = if path.exists() { unfinished(&path) } else { path };
+            while_unfinished(&tried, || {
+                File::create_new(&tried).map(drop).and_then(|()| fs::remove_file(&tried))
             })
         }
     }
 }
 
-/// The temporary name of an output that is not complete yet.
-fn unfinished(path: &Path) -> io::Result<PathBuf> {
-    let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
-    let mut unfinished = name.to_owned();
-    unfinished.push(format!(".{}.part", std::process::id()));
-    Ok(path.with_file_name(unfinished))
+/// The temporary name of an output that is not complete yet. It is short, whatever the name of the
+/// output, because a folder takes no longer name than that may be.
+fn unfinished(path: &Path) -> PathBuf {
+    static COUNT: AtomicUsize = AtomicUsize::new(0);
+    let number = COUNT.fetch_add(1, Ordering::Relaxed);
+    path.with_file_name(format!("penup-{}-{number}.part", std::process::id()))
 }
 
 /// Writes `bytes` to `path`. An existing file stays unchanged until the new one is complete.
@@ -150,7 +151,7 @@ pub fn write(path: &Path, bytes: &[u8]) -> Result<(), Error> {
 
 /// Writes a file under another name beside `path`, and renames it when it is complete.
 fn write_beside(path: &Path, bytes: &[u8]) -> io::Result<()> {
-    let unfinished = unfinished(path)?;
+    let unfinished = unfinished(path);
     let result = while_unfinished(&unfinished, || {
         fs::write(&unfinished, bytes).and_then(|()| fs::rename(&unfinished, path))
     });
@@ -172,6 +173,32 @@ mod tests {
         write(&path, b"old").expect("written");
         write(&path, b"new").expect("written");
         assert_eq!(fs::read(&path).expect("readable"), b"new");
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
+    }
+
+    #[test]
+    fn each_name_that_a_folder_takes_is_written_and_a_longer_one_is_refused_before_the_work() {
+        let folder = tempfile::tempdir().expect("a folder");
+        for length in [1, 245, 246, 255] {
+            let path = folder.path().join("n".repeat(length));
+            for bytes in [b"old", b"new"] {
+                check_outputs(&[&path]).expect("it can be written");
+                write(&path, bytes).expect("written");
+            }
+            assert_eq!(fs::read(&path).expect("readable"), b"new", "{length}");
+        }
+        assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 4);
+        let error = check_outputs(&[&folder.path().join("n".repeat(256))]).expect_err("too long");
+        assert!(matches!(error, Error::Write { .. }), "{error}");
+    }
+
+    #[test]
+    fn a_file_that_is_there_is_left_as_it_is_by_the_check() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("plot.svg");
+        fs::write(&path, b"old").expect("written");
+        check_outputs(&[&path]).expect("it can be written");
+        assert_eq!(fs::read(&path).expect("readable"), b"old");
         assert_eq!(fs::read_dir(folder.path()).expect("listed").count(), 1);
     }
 

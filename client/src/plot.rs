@@ -92,9 +92,9 @@ fn plot_file(
     }
     // On Linux the kernel ends the emulator together with this program. On other systems this
     // program must end it, so Ctrl-C must not exit at once.
-    let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::new);
+    let booting = (!cfg!(target_os = "linux")).then(MovingPlotter::emulated);
     let mut board = machines::emulate(args.board)?;
-    let moving = MovingPlotter::new();
+    let moving = MovingPlotter::emulated();
     drop(booting);
     let known = Known {
         capacity: Capacity::of(args.board),

@@ -92,6 +92,7 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
 }
 
 fn preview(args: &PreviewArgs, quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
+    operate::fail_if_given_twice(&args.set)?;
     let outputs = Outputs::of(&args.pictures, Some(args));
     output::check(&args.file, &outputs.files())?;
     let (job, source) = read(&args.file, &args.view, quiet)?;

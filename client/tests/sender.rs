@@ -1,15 +1,19 @@
 //! A sender and a plotter that misbehaves.
+//!
+//! The file is longer than 500 lines, because it is a list of tests, which share a few short
+//! functions.
 
 #![allow(clippy::expect_used, reason = "a test fails with the words of what it expected")]
 
 use penup_client::error::Error;
 use penup_client::fake::{FakePlotter, Fault};
-use penup_client::link::{Answer, UserRequest};
+use penup_client::link::{Answer, Link, UserRequest};
 use penup_client::progress::{Progress, Quiet};
 use penup_client::sender::{Sender, Timeouts};
 use penup_job::protocol::Status;
 use penup_readers::lines::{JobLine, Origin};
 use std::collections::VecDeque;
+use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
@@ -453,4 +457,91 @@ fn a_pen_that_nobody_can_put_in_ends_the_waiting() {
     let error = job(&mut plotter, 3).expect_err("nobody is there");
     assert!(matches!(error, Error::WaitsForPen { pen: 2 }), "{error}");
     assert_eq!((error.exit_code(), plotter.aborts), (5, 1));
+}
+
+/// A plotter that answers each status query with the next of these reports, and the last one again
+/// and again.
+struct Reporting {
+    reports: VecDeque<&'static str>,
+    output: VecDeque<u8>,
+}
+
+impl Link for Reporting {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for _ in bytes.iter().filter(|byte| **byte == b'?') {
+            let is_last = self.reports.len() == 1;
+            let next =
+                if is_last { self.reports.front().copied() } else { self.reports.pop_front() };
+            self.output.extend(next.unwrap_or_default().bytes().chain(*b"\r\n"));
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<usize> {
+        io::Read::read(&mut self.output, buffer)
+    }
+
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
+    }
+}
+
+/// The plotter reports a job that has stopped as long as it keeps it, whatever it does meanwhile.
+#[test]
+fn a_job_that_stopped_before_is_no_failure_of_what_is_watched() {
+    for (reports, has_stopped) in [
+        // A program of G-code, and one that only moves the raised pen.
+        (
+            &[
+                "<Run|MPos:1.000,2.000,0.000|Drawn:1/1|Ink:0/37|Left:0>",
+                "<Idle|MPos:0.000,0.000,0.000|Stopped:119/500|Drawn:1/1|Ink:37/37|Left:0>",
+            ][..],
+            false,
+        ),
+        (
+            &[
+                "<Run|MPos:1.000,2.000,0.000|Drawn:0/0|Ink:0/0|Left:0>",
+                "<Idle|MPos:0.000,0.000,0.000|Stopped:119/500|Drawn:0/0|Ink:0/0|Left:0>",
+            ],
+            false,
+        ),
+        // Moves by hand.
+        (
+            &[
+                "<Jog|MPos:1.000,2.000,0.000|Stopped:119/500|Drawn:120/500|Ink:9/50|Left:41>",
+                "<Idle|MPos:0.000,0.000,0.000|Stopped:119/500|Drawn:120/500|Ink:9/50|Left:41>",
+            ],
+            false,
+        ),
+        // A job that is given up, one in its last stroke, and one that the power leaves.
+        (
+            &[
+                "<Run|MPos:1.000,2.000,0.000|Drawn:119/500|Ink:8/50|Left:42>",
+                "<Idle|MPos:0.000,0.000,0.000|Stopped:119/500|Drawn:120/500|Ink:9/50|Left:41>",
+            ],
+            true,
+        ),
+        (
+            &[
+                "<Run|MPos:1.000,2.000,0.000|Drawn:3/3|Ink:60/90|Left:0>",
+                "<Idle|MPos:0.000,0.000,0.000|Stopped:2/3|Drawn:3/3|Ink:75/90|Left:0>",
+            ],
+            true,
+        ),
+        (
+            &[
+                "<Run|MPos:1.000,2.000,0.000|Drawn:119/500|Ink:8/50|Left:42>",
+                "<Idle|MPos:0.000,0.000,0.000|Stopped:119/500|Drawn:0/0|Ink:0/0|Left:0>",
+            ],
+            true,
+        ),
+    ] {
+        let mut plotter =
+            Reporting { reports: reports.iter().copied().collect(), output: VecDeque::new() };
+        let interrupt = AtomicBool::new(false);
+        let (mut sender, _) = Sender::join(&mut plotter, TIMEOUTS, &interrupt).expect("it answers");
+        let watched = sender.watch(&mut Quiet);
+        let is_told = matches!(watched, Err(Error::JobStopped { .. }));
+        assert_eq!((is_told, watched.is_ok()), (has_stopped, !has_stopped), "{reports:?}");
+    }
 }

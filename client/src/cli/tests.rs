@@ -41,6 +41,15 @@ fn an_option_that_needs_another_one_is_refused_without_it() {
         ("penup plot f.obj --board pico --rejoin 9", "cannot be used with"),
         ("penup plot f.obj --resume", "--port <DEVICE>"),
         ("penup plot f.obj --port auto --at-origin", "--resume"),
+        ("penup plot f.obj --rejoin 9 --svg f.svg", "cannot be used with"),
+        ("penup plot f.obj --rejoin 9 --png f.png", "cannot be used with"),
+        ("penup plot f.obj --resume --svg f.svg", "cannot be used with"),
+        ("penup plot f.obj --resume --png f.png", "cannot be used with"),
+        ("penup plot f.obj --resume --board pico", "cannot be used with"),
+        ("penup plot f.obj --at-origin --svg f.svg", "cannot be used with"),
+        ("penup plot f.obj --at-origin --board pico", "cannot be used with"),
+        ("penup plot f.obj --port auto --at-origin --from 3", "cannot be used with"),
+        ("penup plot f.obj --port auto --at-origin --multipass 2", "cannot be used with"),
     ] {
         let error = parse(line).expect_err(line);
         assert!(error.contains(needed), "{error}");
@@ -50,6 +59,7 @@ fn an_option_that_needs_another_one_is_refused_without_it() {
         "penup preview f.obj --json f.json --repeat 3",
         "penup plot f.obj --board pico",
         "penup plot f.obj --port auto --rejoin 9",
+        "penup plot f.obj --port auto --resume --at-origin",
         "penup watch --rejoin 9",
     ] {
         assert_eq!(parse(line), Ok(()), "{line}");

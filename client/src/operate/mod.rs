@@ -15,7 +15,7 @@ pub use console::console;
 pub use orders::{abort, again, home, jog, pause, pen, resume, unlock, watch};
 pub use rehearsal::limits;
 pub(crate) use settings::read as read_settings;
-pub use settings::{restore, save, set, show};
+pub use settings::{fail_if_given_twice, restore, save, set, show};
 pub use settings_file::{SavedSettings, SettingsFileError};
 pub use setup::setup;
 pub use shake::shake;

@@ -58,6 +58,29 @@ pub(super) struct FollowedDrawing {
     /// The byte that the user of this program asked for last, until a report shows its effect, and
     /// the number of reports since it was sent.
     asked: Option<(u8, u32)>,
+    /// The number of strokes in the last report while something was drawn, at least 1 if the
+    /// plotter computed; `None` if nothing was drawn.
+    strokes: Option<u64>,
+}
+
+impl FollowedDrawing {
+    /// Notes what is drawn according to a status report.
+    fn note(&mut self, status: &Status) {
+        if matches!(status.state.as_str(), "Run" | "Hold") {
+            let known = status.strokes.map_or(0, |(_, all)| all);
+            self.strokes = Some(known.max(u64::from(status.is_computing)));
+        }
+    }
+
+    /// Whether what was drawn has stopped before its end, if a job has, according to the `last`
+    /// report. A job that stopped earlier is reported all the time, also after a program of G-code,
+    /// whose moves are not kept.
+    fn has_stopped(&self, last: &Status) -> bool {
+        let Some(strokes) = self.strokes else { return false };
+        let is_left = |(done, all): (u64, u64)| done < all;
+        let has_restarted = strokes > 0 && last.strokes.is_none_or(|(_, all)| all == 0);
+        has_restarted || last.strokes.is_some_and(is_left) || last.ink.is_some_and(is_left)
+    }
 }
 
 /// Whether a line may be sent beside the drawing.
@@ -86,7 +109,7 @@ impl Sender<'_> {
         let lines = [JobLine::command(PLOT)];
         self.begin_plot(&lines, progress)?;
         let base = self.done - 1;
-        self.follow_drawing(Some(&lines), None, progress)?;
+        self.follow_drawing(Some(&lines), None, &mut FollowedDrawing::default(), progress)?;
         self.confirm(&lines, base)?;
         self.fail_if_stopped().map(drop)
     }
@@ -119,7 +142,7 @@ impl Sender<'_> {
         }
         begun?;
         let base = self.done - 1;
-        self.follow_drawing(Some(&lines), None, progress)?;
+        self.follow_drawing(Some(&lines), None, &mut FollowedDrawing::default(), progress)?;
         self.confirm(&lines, base)?;
         self.fail_if_stopped().map(drop)
     }
@@ -131,20 +154,30 @@ impl Sender<'_> {
     /// The machine stops with an alarm or before the end of the job, stays in feed hold, or falls
     /// silent.
     pub fn watch(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
-        self.watch_sent(None, progress)
-    }
-
-    /// As [`Sender::watch`], where this program has `sent` the drawing as G-code.
-    pub(super) fn watch_sent(
-        &mut self,
-        sent: Option<&mut Streaming<'_>>,
-        progress: &mut dyn Progress,
-    ) -> Result<Status, Error> {
-        let status = self.follow_drawing(None, sent, progress)?;
-        if status.stopped.is_some() {
+        let mut followed = FollowedDrawing::default();
+        followed.note(&self.last_status);
+        let status = self.follow_drawing(None, None, &mut followed, progress)?;
+        if status.stopped.is_some() && followed.has_stopped(&status) {
             return self.fail_if_stopped();
         }
         Ok(status)
+    }
+
+    /// As [`Sender::watch`], where this program has sent the drawing as strokes. The plotter keeps
+    /// how far it comes, in place of any job that has stopped before.
+    pub(super) fn watch_strokes(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
+        self.follow_drawing(None, None, &mut FollowedDrawing::default(), progress)?;
+        self.fail_if_stopped()
+    }
+
+    /// As [`Sender::watch`], where this program has `sent` the drawing as G-code. The plotter does
+    /// not keep how far it comes, so a job that has stopped is another one.
+    pub(super) fn watch_gcode(
+        &mut self,
+        sent: &mut Streaming<'_>,
+        progress: &mut dyn Progress,
+    ) -> Result<Status, Error> {
+        self.follow_drawing(None, Some(sent), &mut FollowedDrawing::default(), progress)
     }
 
     /// Returns the status, in which no job has stopped that could go on. The plotter notes the last
@@ -164,21 +197,21 @@ impl Sender<'_> {
 
     /// Asks for the status until the machine is idle, and lets it go on after pauses. `began` are
     /// the lines that began the drawing, if this program has sent them. The plotter knows less than
-    /// this program of a drawing that was `sent` as G-code.
+    /// this program of a drawing that was `sent` as G-code. What is seen is noted in `followed`.
     fn follow_drawing(
         &mut self,
         began: Option<&[JobLine; 1]>,
         mut sent: Option<&mut Streaming<'_>>,
+        followed: &mut FollowedDrawing,
         progress: &mut dyn Progress,
     ) -> Result<Status, Error> {
         let command = &|| began.map(|[line]| line.clone());
-        let mut followed = FollowedDrawing::default();
         self.last_heard = self.link.now();
         self.query()?;
         loop {
             self.stop_if_interrupted()?;
             let numbers = if began.is_some() { Numbers::Free } else { Numbers::Unknown };
-            self.obey(&mut followed, numbers, progress)?;
+            self.obey(followed, numbers, progress)?;
             match self.listen()? {
                 Some(Reply::Status(status)) => {
                     let status = match &mut sent {
@@ -191,7 +224,8 @@ impl Sender<'_> {
                         self.strokes = all;
                     }
                     self.fail_if_alarm(&status)?;
-                    self.wait_or_resume(&status, &mut followed)?;
+                    self.wait_or_resume(&status, followed)?;
+                    followed.note(&status);
                     if status.is_idle() {
                         self.position.clone_from(&status.position);
                         return Ok(status);

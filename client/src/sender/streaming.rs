@@ -240,9 +240,9 @@ impl<'a> Sender<'a> {
         self.arrival = streaming.arrival;
         delivered?;
         match job.form() {
-            Form::Strokes => self.watch(progress)?,
+            Form::Strokes => self.watch_strokes(progress)?,
             // The plotter knows only of what it has not drawn yet, and not of the pens.
-            Form::GCode => self.watch_sent(Some(&mut streaming), &mut Quiet)?,
+            Form::GCode => self.watch_gcode(&mut streaming, &mut Quiet)?,
         };
         Ok(())
     }

@@ -114,6 +114,40 @@ fn an_interrupt_stops_the_plotter() {
     assert_eq!(plotter.unplug().aborts, 2);
 }
 
+/// Whoever does not wait until the plotter has stopped is told that it may go on.
+#[test]
+fn a_second_interrupt_says_that_the_plotter_may_be_moving() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+    // It does not confirm that it stops, for which the program waits some seconds.
+    let mut fake = FakePlotter::new(Fault::IgnoresAbort);
+    fake.strokes = 1_000_000;
+    let plotter = Plugged::new(fake);
+    let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
+        .args(["plot", "cube.obj", "--port", &plotter.device])
+        .current_dir(folder.path())
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    while !plotter.drawing.load(Ordering::Relaxed) {
+        let ended = program.try_wait().expect("a state");
+        assert_eq!(ended, None, "it ended before the drawing began");
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    for _ in 0..2 {
+        let sent = Command::new("kill").args(["-INT", &program.id().to_string()]).status();
+        assert!(sent.expect("a signal").success());
+        std::thread::sleep(Duration::from_millis(500));
+    }
+    let output = program.wait_with_output().expect("it ends");
+    assert_eq!(output.status.code(), Some(130));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(said.contains("penup: stopping the plotter"), "{said}");
+    assert!(said.contains("may still be moving"), "{said}");
+    assert!(said.contains("`penup abort` stops it"), "{said}");
+    plotter.unplug();
+}
+
 #[test]
 fn a_model_that_the_plotter_cannot_hold_is_not_sent() {
     let folder = tempfile::tempdir().expect("a folder");

@@ -293,6 +293,12 @@ fn settings_are_saved_changed_and_restored() {
     let anchors = ["set", "230=2", "231=300", "232=100", "233=1200"];
     let (code, said, error) = run(&anchors);
     assert_eq!(code, Some(0), "{said}{error}");
+    // A setting that is given twice is meant once: nothing is set.
+    let (_, before, _) = run(&["settings", "show"]);
+    let (code, _, error) = run(&["set", "101=81", "100=90", "$100=91"]);
+    assert_eq!(code, Some(2), "{error}");
+    assert!(error.contains("setting 100 is given twice, as 90 and as 91"), "{error}");
+    assert_eq!(run(&["settings", "show"]).1, before);
     fs::write(folder.path().join("bad.toml"), "[settings]\nspeed = 1\n").expect("written");
     let (code, _, error) = run(&["settings", "restore", "bad.toml"]);
     assert_eq!(code, Some(1));
@@ -559,6 +565,12 @@ fn a_preview_tells_how_long_the_machine_draws() {
         fs::read_to_string(folder.path().join("a.svg")).expect("readable")
     };
     assert_eq!(picture(&polargraph), picture(&[]));
+    let (code, _, error) = penup(
+        folder.path(),
+        &["preview", "a.obj", "--page", "A3", "--set", "204=20", "--set", "204=30"],
+    );
+    assert_eq!(code, Some(2), "{error}");
+    assert!(error.contains("setting 204 is given twice, as 20 and as 30"), "{error}");
     let (code, _, error) = penup(folder.path(), &["preview", "a.obj", "--set", "100=1"]);
     assert_eq!(code, Some(1));
     assert!(error.contains("setting 100 cannot be 1: "), "{error}");
