@@ -5,9 +5,9 @@ use crate::plan::Point;
 use std::collections::HashMap;
 use std::sync::Arc;
 
-/// The regions that are mapped already, so that one in which many shapes lie is mapped, and stays in
-/// memory, once. Each is found by its address, and is kept with its image, so that no other region
-/// gets that address meanwhile.
+/// The regions that are mapped already, so that one in which many shapes lie is mapped, and stays
+/// in memory, once. Each is found by its address, and is kept with its image, so that no other
+/// region gets that address meanwhile.
 #[derive(Debug, Default)]
 pub(crate) struct MappedRegions(HashMap<*const Region, [Arc<Region>; 2]>);
 
