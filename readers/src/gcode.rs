@@ -28,7 +28,7 @@ use super::format::{Contents, Format};
 use super::plan::Plan;
 use crate::lines::Origin;
 use extruder::Extruder;
-use moves::{Moves, Signals};
+use moves::{Move, Moves, Signals};
 use pens::Changes;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
@@ -527,9 +527,11 @@ impl Format for GCode {
         let is_code = |line: &str| !matches!(parse(line), Ok(Line::Skipped));
         let behind = lines.filter(|(_, line)| is_code(line)).count();
         let mut plan = Plan::new(file.clone());
-        let drawn = signals::inked(&interpreter.moves, interpreter.has_absolute_heights);
-        let mut inked = interpreter.moves.iter().zip(&drawn).filter(|(_, draws)| **draws);
-        let unplaced = inked.find_map(|(it, _)| Some((it.line as usize, it.signals.unplaced?)));
+        let Interpreter { moves, signals, has_absolute_heights, .. } = &interpreter;
+        let inked = signals::inked(moves, signals, *has_absolute_heights);
+        let drawn = moves.iter().zip(&inked.draws).filter(|(_, draws)| **draws);
+        let place = |(it, _): (Move<'_>, _)| Some((it.line as usize, it.signals.unplaced?));
+        let unplaced = drawn.filter_map(place).next();
         if let Some((number, by)) = unplaced {
             let line = text.lines().nth(number - 1).unwrap_or_default();
             let reason = format!(
@@ -552,7 +554,8 @@ impl Format for GCode {
             // Temperatures, fans and the like.
             interpreter.unknown.retain(|word, _| word.starts_with('G'));
         }
-        notes.extend(interpreter.changes.draw(&interpreter.moves, drawn, &text, &mut plan));
+        notes.extend(inked.note);
+        notes.extend(interpreter.changes.draw(&interpreter.moves, inked.draws, &text, &mut plan));
         notes.extend(interpreter.notes());
         if let Some(end) = end.filter(|_| behind > 0) {
             let lines = counted(behind, ["line is", "lines are"]);

@@ -35,6 +35,7 @@ mod runs;
 #[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
 mod text;
 mod unread;
+mod uses;
 
 use super::arrange::Arrangement;
 use super::counted;

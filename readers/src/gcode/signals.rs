@@ -4,15 +4,17 @@
 //! power S, where the spindle is on from the first move that draws to the last; the spindle or
 //! laser (`M3`, `M4`, `M5`), which with the power 0 does not draw, nor before the first power if
 //! the program says one; or, if none of these changes between moves, G1 to G3 draw and G0 does not.
-//! A height that only sets the focus of a laser is down during G0 with the laser off: then the
-//! laser must be on, too, for a move to draw. A laser that stays on over G0 does not burn there.
-//! But if any move extrudes, as on a 3D printer, those that do draw, and no others.
+//! A height that only sets the focus of a laser is down also while the laser is off: then the laser
+//! must be on, too, for a move to draw. A laser that stays on over G0 does not burn there. But if
+//! any move extrudes, as on a 3D printer, those that do draw, and no others.
 //!
 //! A signal has levels at which the pen is up and others at which it is down. They are divided
 //! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may
-//! travel at several heights. Without moves by G0, the two levels that come most often are divided;
-//! the higher Z is up then, and for a servo the level of the first move. Where Z is only moved by
-//! distances that do not cancel out, whether it has grown or fallen last says where the pen is.
+//! travel at several heights. Without moves by G0, they are divided where the signal goes to and
+//! fro most often, and the pen is up on the side where the program begins and ends. If it shows no
+//! such side, the higher Z is taken to be up, and for a servo the first level, which is told. Where
+//! Z is only moved by distances that do not cancel out, whether it has grown or fallen last says
+//! where the pen is.
 
 use super::moves::{Move, Moves, Signals};
 
@@ -26,23 +28,58 @@ struct Division {
     high_is_up: bool,
 }
 
-/// Decides for each move whether it draws. `has_absolute_heights` says whether a Z was given as a
-/// height.
-pub(super) fn inked(moves: &Moves, has_absolute_heights: bool) -> Vec<bool> {
-    let servo = || by_level(moves, |signals| signals.servo, None);
-    let height =
-        || by_level(moves, |signals| signals.height.filter(|_| !signals.is_parked), Some(true));
-    let growth = || by_level(moves, |signals| signals.growth, Some(true));
-    let drifts = !has_absolute_heights && drift(moves);
-    if moves.iter().any(|it| it.signals.extrudes) {
-        return moves.iter().map(|it| it.signals.extrudes).collect();
+impl Division {
+    fn is_up(&self, level: f64) -> bool {
+        (level > self.middle) == self.high_is_up
     }
-    let draws = servo()
-        .or_else(|| if drifts { growth() } else { height() }.map(|draws| while_on(moves, draws)))
-        .or_else(|| by_power(moves))
-        .or_else(|| by_spindle(moves))
-        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect());
-    draws.into_iter().zip(moves.iter()).map(|(draws, it)| draws && !it.signals.is_parked).collect()
+}
+
+/// A signal that has levels.
+struct Signal {
+    name: &'static str,
+    /// Whether the pen is taken to be up at the high levels; `None` if at the first level.
+    high_is_up: Option<bool>,
+}
+
+const SERVO: Signal = Signal { name: "level of the servo", high_is_up: None };
+const HEIGHT: Signal = Signal { name: "Z", high_is_up: Some(true) };
+const POWER: Signal = Signal { name: "S", high_is_up: None };
+
+/// Which moves draw.
+#[derive(Default)]
+pub(super) struct Inked {
+    /// For each move whether it draws.
+    pub draws: Vec<bool>,
+    /// What was taken, if the program does not show when the pen is up.
+    pub note: Option<String>,
+}
+
+impl From<Vec<bool>> for Inked {
+    fn from(draws: Vec<bool>) -> Self {
+        Self { draws, note: None }
+    }
+}
+
+/// Decides for each move whether it draws. `end` has the signals at the end of the program, and
+/// `has_absolute_heights` says whether a Z was given as a height.
+pub(super) fn inked(moves: &Moves, end: &Signals, has_absolute_heights: bool) -> Inked {
+    let height = |signals: &Signals| signals.height.filter(|_| !signals.is_parked);
+    let by_height = || match !has_absolute_heights && drift(moves) {
+        true => by_level(moves, |signals| signals.growth, end.growth, HEIGHT),
+        false => by_level(moves, height, height(end), HEIGHT),
+    };
+    if moves.iter().any(|it| it.signals.extrudes) {
+        return moves.iter().map(|it| it.signals.extrudes).collect::<Vec<bool>>().into();
+    }
+    let mut inked = by_level(moves, |signals| signals.servo, end.servo, SERVO)
+        .or_else(|| by_height().map(|inked| while_on(moves, inked)))
+        .or_else(|| by_power(moves, end))
+        .or_else(|| by_spindle(moves).map(Inked::from))
+        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect::<Vec<bool>>().into());
+    for (draws, it) in inked.draws.iter_mut().zip(moves.iter()) {
+        *draws &= !it.signals.is_parked;
+    }
+    inked
 }
 
 /// The line of the first move by G1 to G3 of which it is not known whether the pen is down, and the
@@ -63,33 +100,30 @@ fn drift(moves: &Moves) -> bool {
     heights.len() > 2
 }
 
-/// Whether the spindle is on during a move, with a power above 0.
-fn is_on(it: &Move) -> bool {
-    it.signals.spindle == Some(true) && it.signals.power != Some(0.0)
+/// Whether the spindle is on, with a power above 0.
+fn is_on(signals: &Signals) -> bool {
+    signals.spindle == Some(true) && signals.power != Some(0.0)
 }
 
-/// Of moves that `draws` says to draw, those with the spindle on, if it is off during some of those
-/// by G0 and on during some by G1 to G3. Otherwise all of them.
-fn while_on(moves: &Moves, mut draws: Vec<bool>) -> Vec<bool> {
-    let has = |is_rapid: bool, on: bool| {
-        let mut drawn = moves.iter().zip(&draws).filter(|(it, draws)| {
-            **draws && it.is_rapid == is_rapid && it.signals.spindle.is_some()
-        });
-        drawn.any(|(it, _)| is_on(&it) == on && it.length() > SAME)
-    };
-    if has(true, false) && has(false, true) {
-        for (draws, it) in draws.iter_mut().zip(moves.iter()) {
-            *draws &= is_on(&it);
+/// Of the moves that draw, those with the spindle on, if it is on during some of those by G1 to G3
+/// and off during some. Otherwise all of them.
+fn while_on(moves: &Moves, mut inked: Inked) -> Inked {
+    let drawn = moves.iter().zip(&inked.draws).filter(|(_, draws)| **draws).map(|(it, _)| it);
+    let mut told = drawn.filter(|it| it.signals.spindle.is_some() && it.length() > SAME);
+    if told.clone().any(|it| is_on(it.signals) && !it.is_rapid) && told.any(|it| !is_on(it.signals))
+    {
+        for (draws, it) in inked.draws.iter_mut().zip(moves.iter()) {
+            *draws &= is_on(it.signals);
         }
     }
-    draws
+    inked
 }
 
 /// Of a program with G1 to G3 while the spindle is on, G0 does not draw: it is a laser, or a pen
 /// that is up then anyway.
 fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
     let has_powers = moves.iter().any(|it| it.signals.power.is_some());
-    let is_on = |it: &Move| is_on(it) && (it.signals.power.is_some() || !has_powers);
+    let is_on = |it: &Move| is_on(it.signals) && (it.signals.power.is_some() || !has_powers);
     let feeds = moves.iter().any(|it| is_on(&it) && !it.is_rapid);
     let draws = moves.iter().map(|it| is_on(&it) && !(feeds && it.is_rapid));
     let draws: Vec<bool> = draws.collect();
@@ -98,54 +132,90 @@ fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
 }
 
 /// By the power of a spindle that is not switched off between moves, as servos are set.
-fn by_power(moves: &Moves) -> Option<Vec<bool>> {
-    let first = moves.iter().position(|it| is_on(&it))?;
-    let last = moves.iter().rposition(|it| is_on(&it))?;
+fn by_power(moves: &Moves, end: &Signals) -> Option<Inked> {
+    let first = moves.iter().position(|it| is_on(it.signals))?;
+    let last = moves.iter().rposition(|it| is_on(it.signals))?;
     let between = moves.iter().take(last + 1).skip(first);
-    if !between.clone().all(|it| is_on(&it)) {
+    if !between.clone().all(|it| is_on(it.signals)) {
         return None;
     }
-    let power = |signals: &Signals| signals.power.filter(|_| signals.spindle == Some(true));
-    let draws = by_level(moves, power, None)?;
+    let power = |signals: &Signals| signals.power.filter(|_| is_on(signals));
+    let inked = by_level(moves, power, end.power, POWER)?;
     // During G0 a laser does not burn, and during G1 to G3 it does, whatever its power. A pen is up
     // during the one and down during the others, unless it travels by G1 alone.
     let travels = between.clone().any(|it| it.is_rapid);
-    let mut divided = between.zip(draws.get(first..=last)?);
+    let mut divided = between.zip(inked.draws.get(first..=last)?);
     let is_laser =
         travels && divided.any(|(it, draws)| it.is_rapid == *draws && it.length() > SAME);
-    (!is_laser).then_some(draws)
+    (!is_laser).then_some(inked)
 }
 
-/// Decides by the levels of a signal; `None` if it does not change.
+/// Decides by the levels of a signal, of which `end` is that at the end of the program; `None` if
+/// it does not change.
 fn by_level(
     moves: &Moves,
     level: impl Fn(&Signals) -> Option<f64>,
-    high_is_up: Option<bool>,
-) -> Option<Vec<bool>> {
+    end: Option<f64>,
+    signal: Signal,
+) -> Option<Inked> {
     let levels: Vec<Option<f64>> = moves.iter().map(|it| level(it.signals)).collect();
-    let first = levels.iter().copied().flatten().next()?;
     let has = |is_rapid: bool| {
         moves.iter().zip(&levels).any(|(it, level)| it.is_rapid == is_rapid && level.is_some())
     };
     // A program may draw by G0, and need no other word.
-    let division = match has(true) && has(false) {
-        true => by_rapids(moves, &levels)?,
-        false => {
-            let middle = between_most_visited(&levels)?;
-            Division { middle, high_is_up: high_is_up.unwrap_or(first > middle) }
-        }
+    let (division, note) = match has(true) && has(false) {
+        true => (by_rapids(moves, &levels)?, None),
+        false => by_ends(moves, &levels, end, signal)?,
     };
     // Before the first level the pen is up.
-    let draws = |level: f64| (level > division.middle) != division.high_is_up;
-    Some(levels.iter().map(|level| level.is_some_and(draws)).collect())
+    let draws = levels.iter().map(|level| level.is_some_and(|level| !division.is_up(level)));
+    Some(Inked { draws: draws.collect(), note })
+}
+
+/// The division where the signal goes to and fro most often. The pen is up on the side of the level
+/// of the first move and of that at the end; before the first level it is up, too. Says what is
+/// taken if these are on both sides.
+fn by_ends(
+    moves: &Moves,
+    levels: &[Option<f64>],
+    end: Option<f64>,
+    signal: Signal,
+) -> Option<(Division, Option<String>)> {
+    let first = levels.iter().copied().flatten().next()?;
+    let middle = most_crossed(levels)?;
+    let mut travels = moves.iter().zip(levels).filter(|(it, _)| it.length() > SAME);
+    let begin = travels.next().and_then(|(_, level)| *level);
+    let is_shown = |high_is_up: &bool| {
+        let division = Division { middle, high_is_up: *high_is_up };
+        begin.map_or(!division.is_up(first), |level| division.is_up(level))
+            && end.or(begin).is_some_and(|level| division.is_up(level))
+    };
+    if let Some(high_is_up) = [true, false].into_iter().find(is_shown) {
+        return Some((Division { middle, high_is_up }, None));
+    }
+    let high_is_up = signal.high_is_up.unwrap_or(first > middle);
+    let name = signal.name;
+    let [side, other] = if high_is_up { ["higher", "lower"] } else { ["lower", "higher"] };
+    let note = format!(
+        "the program does not show at which {name} the pen is up, which is taken to be the {side}: \
+         if it is the {other}, let the program begin and end with the pen up"
+    );
+    Some((Division { middle, high_is_up }, Some(note)))
 }
 
 /// The division with the longest way by G0 at the levels that are up, and by G1 to G3 at the
-/// others.
+/// others. What comes by G1 after the last change of the level may be the way home, and counts for
+/// neither.
 fn by_rapids(moves: &Moves, levels: &[Option<f64>]) -> Option<Division> {
     let mut lengths: Vec<(f64, [f64; 2])> = Vec::new();
-    for (it, level) in moves.iter().zip(levels) {
-        let length = if it.is_rapid { [it.length(), 0.0] } else { [0.0, it.length()] };
+    let last = levels.last().copied()?;
+    let home = levels.iter().rposition(|level| *level != last).map_or(0, |index| index + 1);
+    for (index, (it, level)) in moves.iter().zip(levels).enumerate() {
+        let length = match it.is_rapid {
+            true => [it.length(), 0.0],
+            false if index >= home => [0.0; 2],
+            false => [0.0, it.length()],
+        };
         lengths.extend(level.map(|level| (level, length)));
     }
     lengths.sort_by(|one, other| one.0.total_cmp(&other.0));
@@ -180,22 +250,27 @@ fn by_rapids(moves: &Moves, levels: &[Option<f64>]) -> Option<Division> {
     best.map(|(_, _, division)| division)
 }
 
-/// Returns the middle between the two levels to which a signal is set most often; `None` if there
-/// are not two.
-fn between_most_visited(levels: &[Option<f64>]) -> Option<f64> {
-    let mut visited: Vec<f64> = Vec::new();
+/// Returns the middle between the two neighbouring levels between which the signal passes most
+/// often, and of those the ones that are farthest apart; `None` if there are not two.
+fn most_crossed(levels: &[Option<f64>]) -> Option<f64> {
+    // At each level, how many passes begin or end as the levels grow.
+    let mut turns: Vec<(f64, i32)> = Vec::new();
+    let mut before = None;
     for level in levels.iter().copied().flatten() {
-        if visited.last().is_none_or(|last| (level - last).abs() >= SAME) {
-            visited.push(level);
+        let from = before.replace(level).unwrap_or(level);
+        turns.extend([(from.min(level), 1), (from.max(level), -1)]);
+    }
+    turns.sort_by(|one, other| one.0.total_cmp(&other.0));
+    let mut passes = 0;
+    let mut best: Option<(i32, f64, f64)> = None;
+    for pair in turns.windows(2) {
+        let &[(level, turn), (next, _)] = pair else { continue };
+        passes += turn;
+        let gap = next - level;
+        let is_better = best.is_none_or(|(most, widest, _)| (passes, gap) > (most, widest + SAME));
+        if gap >= SAME && is_better {
+            best = Some((passes, gap, f64::midpoint(level, next)));
         }
     }
-    visited.sort_by(f64::total_cmp);
-    let groups = visited.chunk_by(|one, other| (one - other).abs() < SAME);
-    let mut counts: Vec<(usize, f64)> =
-        groups.filter_map(|group| Some((group.len(), *group.first()?))).collect();
-    counts.sort_by_key(|(count, _)| std::cmp::Reverse(*count));
-    match counts.as_slice() {
-        [(_, one), (_, other), ..] => Some(f64::midpoint(*one, *other)),
-        _ => None,
-    }
+    best.map(|(_, _, middle)| middle)
 }

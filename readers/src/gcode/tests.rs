@@ -625,3 +625,101 @@ fn what_is_left_out_or_drawn_by_choice_is_told() {
     }
     strokes(&format!("{}G0 X0\n{line}", "/".repeat(1_000_000)));
 }
+
+/// The program of a laser or plotter that moves by G1 alone, of one stroke or two.
+fn by_feeds(up: &str, down: &str, strokes: usize, end: &str) -> String {
+    let stroke = ["X10 Y10", "X20", "X30 Y5", "X40"].map(|to| format!("G1 {to} F3000\n"));
+    let strokes = stroke.chunks(2).take(strokes);
+    let drawn: String = strokes.map(|it| format!("{}{down}\n{}{up}\n", it[0], it[1])).collect();
+    format!("{drawn}{end}")
+}
+
+/// On the iDraw 2.0, Z5 is down, and there is no G0.
+#[test]
+fn the_pen_is_up_where_the_program_begins_and_ends() {
+    let line = [[[10.0, 10.0], [20.0, 10.0]], [[30.0, 5.0], [40.0, 5.0]]];
+    for (up, down) in [
+        ("G1G90 Z0.5F5000", "G1G90 Z5.0F5000"),
+        ("G1 Z3", "G1 Z-1"),
+        ("G91 G1 Z-4 F900\nG90", "G91 G1 Z4.5 F900\nG90"),
+        ("M280 P0 S10", "M280 P0 S60"),
+        ("M280 P0 S60", "M280 P0 S10"),
+        ("M3 S0", "M3 S255"),
+        ("M4 S30", "M4 S90"),
+        ("M3 S90", "M3 S30"),
+    ] {
+        for count in [1, 2] {
+            let begun = format!("G21\n{up}\n");
+            for (begin, end) in [
+                (&*begun, "G1 X0 Y0\n"),
+                (&*begun, ""),
+                (&*begun, "G1 X90 Y99\nM5\n"),
+                ("G21\n", "G1 X0 Y0\n"),
+            ] {
+                let program = format!("{begin}{}", by_feeds(up, down, count, end));
+                assert_eq!(strokes(&program), line[..count], "{program}");
+                assert_eq!(notes("a.nc", program.as_bytes()), [""; 0], "{program}");
+            }
+        }
+    }
+}
+
+/// Neither the beginning nor the end shows which level is up, or they do not agree.
+#[test]
+fn where_the_pen_is_taken_to_be_up_is_told() {
+    let said = |name: &str, side: &str, other: &str| {
+        format!(
+            "the program does not show at which {name} the pen is up, which is taken to be the \
+             {side}: if it is the {other}, let the program begin and end with the pen up"
+        )
+    };
+    for (up, down, note) in [
+        ("G1 Z5", "G1 Z0", said("Z", "higher", "lower")),
+        ("M280 P0 S10", "M280 P0 S60", said("level of the servo", "lower", "higher")),
+        ("M3 S90", "M3 S30", said("S", "higher", "lower")),
+    ] {
+        let program = format!("{up}\nG1 X10 Y10\n{down}\nG1 X20\n");
+        assert_eq!(strokes(&program), [[[10.0, 10.0], [20.0, 10.0]]], "{program}");
+        assert_eq!(notes("a.nc", program.as_bytes()), [note], "{program}");
+    }
+    let inverted = "G1 Z0\nG1 X10 Y10\nG1 Z5\nG1 X20\n";
+    assert_eq!(strokes(inverted), [[[0.0, 0.0], [10.0, 10.0]]]);
+    assert_eq!(notes("a.nc", inverted.as_bytes()), [said("Z", "higher", "lower")]);
+    assert_eq!(strokes(&format!("{inverted}G1 Z0\n")), [[[10.0, 10.0], [20.0, 10.0]]]);
+}
+
+/// The profile `ninja` of vpype-gcode draws at Z6, and goes home at Z0, by G1.
+#[test]
+fn the_way_home_is_not_drawn_however_small_the_drawing() {
+    for strokes_of in [1, 2] {
+        let line = [[[150.0, 150.0], [151.0, 150.0]], [[152.0, 150.0], [152.0, 151.0]]];
+        let mut program = "G21\nG17\nG90\nG28\n".to_owned();
+        for [[x, y], [to_x, to_y]] in &line[..strokes_of] {
+            program += &format!(
+                "G1 Z3 F10000\nG0 X{x} Y{y} F15000\nG1 Z6 F6000\nG1 X{to_x} Y{to_y} F10000\n"
+            );
+        }
+        program += "\nG1 Z0 F1000\nG1 X0 Y0 F1000\nM2\n";
+        assert_eq!(strokes(&program), line[..strokes_of], "{program}");
+    }
+}
+
+/// Z is the focus, and the power 0 is the way, by G1.
+#[test]
+fn a_laser_that_travels_by_g1_draws_with_power_alone() {
+    let line = [[[10.0, 10.0], [20.0, 10.0]], [[30.0, 5.0], [40.0, 5.0]]];
+    for (up, down) in [("M3 S0", "M3 S255"), ("S0", "S255"), ("M5", "M4 S9")] {
+        for begin in ["M3 S0", "M3 S0\nG0 Z10\nG0 X1 Y1\nG0 Z0", "M5\nG1 Z10\nG1 X1 Y1\nG1 Z0"] {
+            for count in [1, 2] {
+                for end in ["M5\n", "G1 X0 Y0\nM5\n", "G1 Z10\nG1 X0 Y0\nM5\n"] {
+                    let program = by_feeds(up, down, count, end);
+                    let program = format!("{begin}\nM3 S0\n{program}");
+                    assert_eq!(strokes(&program), line[..count], "{program}");
+                }
+            }
+        }
+    }
+    // The first stroke begins where the laser stands.
+    let here = "M3 S255\nG1 X10\nM3 S0\nG1 X0\nM5\n";
+    assert_eq!(strokes(here), [[[0.0, 0.0], [10.0, 0.0]]]);
+}

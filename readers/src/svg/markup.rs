@@ -2,12 +2,11 @@
 //!
 //! `usvg` keeps nothing of an element but its `id`. So every group, shape and text without one is
 //! given an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
-//!
-//! The file is longer than 500 lines, because most of it are short questions about elements.
 
 use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
+use super::uses::Symbols;
 use super::{css, lengths, runs, unread};
 use crate::page::Page;
 use std::borrow::Cow;
@@ -87,7 +86,7 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     let own: HashSet<&str> =
         document.descendants().filter_map(|node| node.attribute("id")).collect();
     let names_root = css::names_root(document);
-    let symbols = sized_symbols(document);
+    let symbols = Symbols::of(document);
     let mut copy = String::with_capacity(text.len() + text.len() / 4);
     let (mut copied, mut number) = (0, 0_u32);
     for node in document.descendants() {
@@ -97,7 +96,8 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         let is_traced = is_traced && node.attribute("id").is_none() && !is_root;
         let is_named = is_root && names_root && node.attribute(css::ROOT).is_none();
         let mut edits = edits_of(node, text);
-        let sizes = sizes_of_use(node, &symbols);
+        edits.extend(symbols.edits_of(node));
+        let sizes = symbols.sizes_for(node);
         let is_foreign = is_one_of(node, &["foreignObject"]);
         let is_left_out = is_foreign && node.attribute("requiredExtensions").is_none();
         if !is_traced && !is_left_out && !is_named && sizes.is_empty() && edits.is_empty() {
@@ -140,26 +140,6 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
     }
     copy.push_str(text.get(copied..).unwrap_or_default());
     copy
-}
-
-/// The symbols with a size of their own, by their `id`.
-fn sized_symbols<'a, 'input>(document: &'a Document<'input>) -> HashMap<&'a str, Node<'a, 'input>> {
-    let symbols = document.descendants().filter(|node| is_one_of(*node, &["symbol"]));
-    let is_sized = |it: &Node<'_, '_>| it.has_attribute("width") || it.has_attribute("height");
-    symbols.filter(is_sized).filter_map(|it| Some((it.attribute("id")?, it))).collect()
-}
-
-/// The attributes that a `use` lacks because its symbol has the size. `usvg` takes none from there.
-fn sizes_of_use(node: Node<'_, '_>, symbols: &HashMap<&str, Node<'_, '_>>) -> String {
-    let address = node.attributes().find(|it| it.name() == "href").map(|it| it.value());
-    let id = address.filter(|_| is_one_of(node, &["use"])).and_then(|it| it.strip_prefix('#'));
-    let Some(symbol) = id.and_then(|id| symbols.get(id)) else { return String::new() };
-    let lacking = ["width", "height"].into_iter().filter(|name| !node.has_attribute(*name));
-    let size = |name| {
-        let size = lengths::plain_length(symbol.attribute(name)?)?;
-        Some(format!(" {name}=\"{size}\""))
-    };
-    lacking.filter_map(size).collect()
 }
 
 /// The corrections of an element that is not only given an `id`.

@@ -142,7 +142,7 @@ pub enum CommandError {
     /// No job has stopped that could go on.
     NothingToResume,
     /// The rest of the job that has stopped is with the computer that sent the job.
-    #[cfg(all(feature = "stream", feature = "resume"))]
+    #[cfg(feature = "resume")]
     RestIsSent,
     /// The strokes of the last job are with the computer that sent them.
     #[cfg(all(feature = "stream", feature = "resume"))]
@@ -404,7 +404,7 @@ impl CommandError {
                     .client("no job has stopped: there is nothing to go on with"),
                 format_args!("no job has stopped: $again draws the last one from its beginning"),
             ),
-            #[cfg(all(feature = "stream", feature = "resume"))]
+            #[cfg(feature = "resume")]
             Self::RestIsSent => row(
                 error(163, ""),
                 format_args!("the job was sent while it was drawn: its sender sends the rest"),

@@ -92,7 +92,6 @@ pub fn error_samples() -> Vec<CommandError> {
         #[cfg(feature = "stream")]
         BeyondBounds,
         NothingToResume,
-        #[cfg(feature = "stream")]
         RestIsSent,
         #[cfg(feature = "stream")]
         StrokesAreSent,

@@ -139,3 +139,40 @@ fn a_symbol_with_a_size_has_it_where_it_is_used() {
     assert_eq!(used(size, "width='10' height='10'"), [[[1.0, 99.0], [9.0, 99.0]]]);
     assert_eq!(used("width='20'", "height='20'"), used("", size));
 }
+
+#[test]
+fn a_percentage_of_a_use_of_a_symbol_is_that_of_the_picture() {
+    let path = "<path d='M1 1H9V9' stroke='red'/>";
+    let used = |own: &str| {
+        format!("<symbol id='s' viewBox='0 0 10 10'>{path}</symbol><use href='#s' {own}/>")
+    };
+    for (parts, lengths) in [
+        ("width='50%' height='50%'", "width='50' height='50'"),
+        ("width='50%' height='20'", "width='50' height='20'"),
+        ("height=' 3e1% '", "height='30'"),
+        ("x='40%' y='20%' width='50' height='50'", "x='40' y='20' width='50' height='50'"),
+        ("x='10%' y='10%' width='20%' height='20%'", "x='10' y='10' width='20' height='20'"),
+    ] {
+        let expected = positions(&in_mm(&used(lengths)));
+        assert_eq!(expected.len(), 1, "{lengths}");
+        assert_eq!(positions(&in_mm(&used(parts))), expected, "{parts}");
+        // Of a picture without a viewBox, and of one within another.
+        let sized = |own: &str| {
+            let svg = "<svg xmlns='http://www.w3.org/2000/svg' width='100mm' height='1e2MM'>";
+            positions(&format!("{svg}{}</svg>", used(&own.replace("0'", "0mm'"))))
+        };
+        assert_eq!(sized(parts), sized(lengths), "{parts}");
+        let nested = |own: &str| {
+            let inner = used(own);
+            in_mm(&format!("<svg width='40' height='40' viewBox='0 0 100 100'>{inner}</svg>"))
+        };
+        assert_eq!(positions(&nested(parts)), positions(&nested(lengths)), "{parts}");
+    }
+    // The symbol has a part of the picture as its size.
+    let part = format!(
+        "<symbol id='s' viewBox='0 0 10 10' width='50%' height='50%'>{path}</symbol>\
+         <use href='#s'/>"
+    );
+    let expected = positions(&in_mm(&used("width='50' height='50'")));
+    assert_eq!(positions(&in_mm(&part)), expected);
+}
