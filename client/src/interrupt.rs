@@ -66,8 +66,8 @@ pub fn while_unfinished<T>(file: &Path, work: impl FnOnce() -> T) -> T {
     result
 }
 
-/// The handler of Ctrl-C. `interrupt` is the flag that the sender polls. If the user wants quiet, it
-/// does not say that a plotter is being stopped.
+/// The handler of Ctrl-C. `interrupt` is the flag that the sender polls. If the user wants quiet,
+/// it does not say that a plotter is being stopped.
 pub fn ctrl_c(interrupt: &AtomicBool, is_quiet: bool) {
     let is_first = !interrupt.swap(true, Ordering::SeqCst);
     let moving = MOVING.load(Ordering::SeqCst);
