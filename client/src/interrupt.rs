@@ -90,7 +90,7 @@ pub fn ctrl_c(interrupt: &AtomicBool, is_quiet: bool) {
             "penup: given up, without waiting until the plotter stopped: it may still be moving\n\
              Look after it: `penup status` says what it does, and `penup abort` stops it"
         }
-        false => "penup: given up",
+        false => "penup: ended by Ctrl-C",
     });
     std::process::exit(i32::from(EXIT_CODE));
 }

@@ -378,7 +378,7 @@ fn ctrl_c_ends_every_command_at_once() {
         assert!(sent.success());
         let output = program.wait_with_output().expect("it ends");
         assert_eq!(output.status.code(), Some(130), "{arguments:?}");
-        assert_eq!(String::from_utf8_lossy(&output.stderr), "penup: given up\n");
+        assert_eq!(String::from_utf8_lossy(&output.stderr), "penup: ended by Ctrl-C\n");
         drop(writer);
     }
     assert_eq!(files(folder.path()), ["endless.obj"]);
