@@ -160,7 +160,7 @@ fn every_row_of_every_document_has_as_many_cells_as_its_heading() {
     }
 }
 
-/// The files below `folder` that are source, but for what is built or installed.
+/// The files below `folder` that are source or documents, but for what is built or installed.
 fn sources_below(folder: &Path, found: &mut Vec<PathBuf>) {
     for entry in std::fs::read_dir(folder).expect("a folder of source") {
         let path = entry.expect("an entry").path();
@@ -169,7 +169,7 @@ fn sources_below(folder: &Path, found: &mut Vec<PathBuf>) {
             if !["target", "node_modules", ".git", "corpus", "artifacts"].contains(&name) {
                 sources_below(&path, found);
             }
-        } else if ["rs", "mjs", "js", "toml", "css", "html", "py", "sh", "x"]
+        } else if ["rs", "mjs", "js", "toml", "css", "html", "py", "sh", "x", "md"]
             .iter()
             .any(|end| path.extension().is_some_and(|extension| extension == *end))
         {
@@ -178,9 +178,9 @@ fn sources_below(folder: &Path, found: &mut Vec<PathBuf>) {
     }
 }
 
-/// `cargo fmt` breaks no comment and no string.
+/// `cargo fmt` breaks no comment and no string. Only the row of a table must be one line.
 #[test]
-fn no_line_of_the_source_has_more_than_100_columns() {
+fn no_line_has_more_than_100_columns() {
     let mut sources = Vec::new();
     sources_below(&root(), &mut sources);
     assert!(sources.len() > 300, "{} files", sources.len());
@@ -188,7 +188,7 @@ fn no_line_of_the_source_has_more_than_100_columns() {
     for source in sources {
         let text = std::fs::read_to_string(&source).expect("a source in UTF-8");
         for (number, line) in (1..).zip(text.lines()) {
-            if line.chars().count() > 100 {
+            if line.chars().count() > 100 && !line.starts_with('|') {
                 long += &format!("{}:{number}\n", source.display());
             }
         }

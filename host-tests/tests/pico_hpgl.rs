@@ -16,6 +16,15 @@ use std::time::Duration;
 
 type TestResult = Result<(), Box<dyn Error>>;
 
+/// Starts a board that a host has plugged in, and opens the port.
+fn plugged_in() -> Result<Line<PicoByUsb>, Box<dyn Error>> {
+    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    uart.emulator.plug_usb_in()?;
+    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
+    line.hear_greeting()?;
+    Ok(line)
+}
+
 /// A spiral in one `PD` without a line end, as vpype writes it.
 fn spiral() -> Vec<u8> {
     let mut text = String::from("IN;DF;PS4;SP1;PU1000,1000;PD");
@@ -70,10 +79,7 @@ fn answer<E: EmulatedBoard + ?Sized>(emulator: &mut E) -> Result<String, Box<dyn
 
 #[test]
 fn by_usb_the_host_waits_and_nothing_is_lost() -> TestResult {
-    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
-    uart.emulator.plug_usb_in()?;
-    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    line.hear_greeting()?;
+    let mut line = plugged_in()?;
     let file = spiral();
     line.emulator.send(&file)?;
     line.emulator.send(b"OE;")?;
@@ -91,10 +97,7 @@ fn by_usb_the_host_waits_and_nothing_is_lost() -> TestResult {
 /// The error of the transmission that the next program finds after this file was sent and the port
 /// was closed.
 fn error_behind(file: &str) -> Result<String, Box<dyn Error>> {
-    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
-    uart.emulator.plug_usb_in()?;
-    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    line.hear_greeting()?;
+    let mut line = plugged_in()?;
     line.emulator.send(format!("IN;OA;{file}").as_bytes())?;
     assert_eq!(answer(&mut *line.emulator)?, "0,0,0");
     let wait = || std::thread::sleep(Duration::from_millis(200));
@@ -123,10 +126,7 @@ fn a_port_that_is_closed_behind_an_instruction_has_lost_nothing() -> TestResult 
 /// HP-GL has no ends of lines, and the host sends all of it without a pause.
 #[test]
 fn the_other_port_is_answered_while_hpgl_comes() -> TestResult {
-    let mut uart = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
-    uart.emulator.plug_usb_in()?;
-    let mut line = Line::silent(Box::new(PicoByUsb(*uart.emulator)));
-    line.hear_greeting()?;
+    let mut line = plugged_in()?;
     line.emulator.send(&spiral())?;
     let mut uart = Line::silent(Box::new(line.emulator.0));
     uart.emulator.send(b"$model\n")?;

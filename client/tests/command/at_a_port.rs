@@ -5,6 +5,7 @@ use penup_client::fake::{FakePlotter, Fault};
 use penup_client::link::Link as _;
 use serialport::{SerialPort as _, TTYPort};
 use std::io::{Read as _, Write as _};
+use std::process::{Child, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
@@ -90,16 +91,12 @@ fn a_line_that_the_plotter_refuses_is_shown() {
     plotter.unplug();
 }
 
-#[test]
-fn an_interrupt_stops_the_plotter() {
-    let folder = tempfile::tempdir().expect("a folder");
-    fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
-    let mut fake = FakePlotter::new(Fault::None);
-    fake.strokes = 1_000_000;
-    let plotter = Plugged::new(fake);
+/// A `penup plot` of `cube.obj` in this folder, once the plotter draws.
+fn drawing(folder: &Path, plotter: &Plugged, stderr: Stdio) -> Child {
     let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
         .args(["plot", "cube.obj", "--port", &plotter.device])
-        .current_dir(folder.path())
+        .current_dir(folder)
+        .stderr(stderr)
         .spawn()
         .expect("the program runs");
     while !plotter.drawing.load(Ordering::Relaxed) {
@@ -107,9 +104,25 @@ fn an_interrupt_stops_the_plotter() {
         assert_eq!(ended, None, "it ended before the drawing began");
         std::thread::sleep(Duration::from_millis(5));
     }
-    let sent =
-        Command::new("kill").args(["-INT", &program.id().to_string()]).status().expect("a signal");
+    program
+}
+
+/// Sends what Ctrl-C sends.
+fn interrupt(program: &Child) {
+    let number = program.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &number]).status().expect("a signal");
     assert!(sent.success());
+}
+
+#[test]
+fn an_interrupt_stops_the_plotter() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("cube.obj"), CUBE).expect("written");
+    let mut fake = FakePlotter::new(Fault::None);
+    fake.strokes = 1_000_000;
+    let plotter = Plugged::new(fake);
+    let mut program = drawing(folder.path(), &plotter, Stdio::inherit());
+    interrupt(&program);
     assert_eq!(program.wait().expect("it ends").code(), Some(130));
     assert_eq!(plotter.unplug().aborts, 2);
 }
@@ -123,20 +136,9 @@ fn a_second_interrupt_says_that_the_plotter_may_be_moving() {
     let mut fake = FakePlotter::new(Fault::IgnoresAbort);
     fake.strokes = 1_000_000;
     let plotter = Plugged::new(fake);
-    let mut program = Command::new(env!("CARGO_BIN_EXE_penup"))
-        .args(["plot", "cube.obj", "--port", &plotter.device])
-        .current_dir(folder.path())
-        .stderr(std::process::Stdio::piped())
-        .spawn()
-        .expect("the program runs");
-    while !plotter.drawing.load(Ordering::Relaxed) {
-        let ended = program.try_wait().expect("a state");
-        assert_eq!(ended, None, "it ended before the drawing began");
-        std::thread::sleep(Duration::from_millis(5));
-    }
+    let program = drawing(folder.path(), &plotter, Stdio::piped());
     for _ in 0..2 {
-        let sent = Command::new("kill").args(["-INT", &program.id().to_string()]).status();
-        assert!(sent.expect("a signal").success());
+        interrupt(&program);
         std::thread::sleep(Duration::from_millis(500));
     }
     let output = program.wait_with_output().expect("it ends");
