@@ -254,9 +254,8 @@ impl Plot<'_> {
             self.note(&[KNOWS_PLACE.to_owned()]);
         }
         let left_out = begin + stopped.drawn;
-        let mut rest = host.streamed(Form::Strokes, left_out)?.0;
-        rest.set_id(stopped.id);
-        let Stopped { drawn, all, .. } = stopped;
+        let Stopped { drawn, all, points, .. } = stopped;
+        let rest = host.rest(begin, drawn, points)?;
         self.note(&[format!("{drawn} of {all} strokes are drawn: the rest is sent")]);
         let sending = Sending { form: Form::Strokes, left_out, begin, passes: Some(1) };
         self.send(sender, &rest, sending, progress)?;
@@ -307,11 +306,9 @@ impl Plot<'_> {
             let (mut streamed, report) = host.streamed(Form::Strokes, begin)?;
             let size = streamed.size().strokes;
             let drawn = taken.strokes.and_then(|all| size.checked_sub(all)).unwrap_or(0);
-            if (1..size).contains(&drawn) {
-                // The rest of a drawing that had stopped has the number of the whole.
-                let id = streamed.id();
-                streamed = host.streamed(Form::Strokes, begin + drawn)?.0;
-                streamed.set_id(id);
+            if drawn < size && (drawn > 0 || taken.points > 0) {
+                // It draws the rest of a drawing that had stopped.
+                streamed = host.rest(begin, drawn, taken.points)?;
             }
             // The number of strokes is that of a report without a checksum: the targets prove it.
             let is_same = streamed.id() == taken.id && streamed.targets() == taken.all;

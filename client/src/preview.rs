@@ -219,6 +219,40 @@ impl<I: Index> InMemory<I> {
         form: Form,
         from: u32,
     ) -> Result<(StreamedJob, Option<JobReport>), Error> {
+        let (job, report, _) = self.streamed_from(form, from, 0)?;
+        Ok((job, report))
+    }
+
+    /// Computes the rest of the drawing of the model that was sent, as the lines that a plotter
+    /// draws which has drawn so many strokes behind the first `from`, and has passed so many points
+    /// within strokes. It begins at the last of these points if that lies in the next stroke, and
+    /// otherwise with that stroke.
+    ///
+    /// # Errors
+    /// As [`InMemory::streamed`].
+    pub fn rest(&mut self, from: u32, drawn: u32, points: u32) -> Result<StreamedJob, Error> {
+        let (whole, _, before) = self.streamed_from(Form::Strokes, from, 0)?;
+        // A stroke that begins elsewhere has its points elsewhere.
+        let points = if self.reloops { before } else { before.saturating_add(points) };
+        let begin = from.saturating_add(drawn);
+        let (mut rest, _, mut passed) = self.streamed_from(Form::Strokes, begin, points)?;
+        // The last point lies in a later stroke, where several strokes are noted at once.
+        if rest.size().strokes != whole.size().strokes.saturating_sub(drawn) {
+            (rest, _, passed) = self.streamed_from(Form::Strokes, begin, 0)?;
+        }
+        rest.set_rest_of(&whole, passed.saturating_sub(before));
+        Ok(rest)
+    }
+
+    /// Computes the lines of [`InMemory::streamed`] without the first `from` strokes, beginning at
+    /// the last one of so many points within strokes, if it lies behind these strokes. Returns the
+    /// number of points before that, too.
+    fn streamed_from(
+        &mut self,
+        form: Form,
+        from: u32,
+        points: u32,
+    ) -> Result<(StreamedJob, Option<JobReport>, u32), Error> {
         self.plotter.set_thorough(true);
         self.compute(&mut StopWatch::default(), &mut Unobserved)?;
         let settings = *self.plotter.machine().settings();
@@ -227,11 +261,12 @@ impl<I: Index> InMemory<I> {
             let strokes = self.with_strokes(|strokes| strokes_of(strokes, steps));
             Lengths::of(&strokes.into_iter().map(|stroke| stroke.points).collect::<Vec<_>>())
         });
-        let mut strokes = self.plotter.strokes();
-        if from > 0 && !strokes.begin_at(from) {
-            let reason = format!("it has no more than {from} strokes: nothing is left to draw");
-            return Err(Error::NotStreamed { reason });
-        }
+        let (strokes, before) = match from {
+            0 if points == 0 => (self.plotter.strokes(), 0),
+            _ => self.plotter.strokes_left(from, points).ok_or_else(|| Error::NotStreamed {
+                reason: format!("it has no more than {from} strokes: nothing is left to draw"),
+            })?,
+        };
         let job = with_begins(strokes, reloops, |path| StreamedJob::new(&settings, path, form));
         let job = job.map_err(|error| match error {
             StreamError::Machine(error) => {
@@ -256,7 +291,7 @@ impl<I: Index> InMemory<I> {
             Some(lengths) => report.map(|report| report.with_moves_of(lengths)),
             None => report,
         };
-        Ok((job, report))
+        Ok((job, report, before))
     }
 
     /// The speed with the pen down, in mm/min.

@@ -48,4 +48,19 @@ impl StreamedDrawing {
         assert!(strokes == 0 || path.begin_at(strokes), "so many strokes");
         StreamedJob::new(&settings, &mut path, Form::Strokes).expect("lines of strokes")
     }
+
+    /// The lines with which it goes on where so many strokes are drawn, and so many points within
+    /// strokes are passed.
+    ///
+    /// # Panics
+    /// Panics if nothing is left.
+    pub fn rest(&mut self, drawn: u32, points: u32) -> StreamedJob {
+        let whole = self.from(0);
+        let settings = *self.bench.plotter.machine().settings();
+        let (mut path, passed) = self.bench.plotter.strokes_left(drawn, points).expect("a rest");
+        let rest = StreamedJob::new(&settings, &mut path, Form::Strokes);
+        let mut rest = rest.expect("lines of strokes");
+        rest.set_rest_of(&whole, passed);
+        rest
+    }
 }

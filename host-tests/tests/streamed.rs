@@ -319,13 +319,13 @@ fn what_cannot_be_drawn_is_refused_before_anything_moves() {
     let mut bench = Bench::new();
     bench.heard();
     assert_eq!(bench.say(&format!("{}\n", header(100))), "ok\n");
-    assert!(bench.say("$stream\n").starts_with("[STREAM:1,0,2]\nok"));
+    assert!(bench.say("$stream\n").starts_with("[STREAM:1,0,2,0]\nok"));
     // Beyond the bounds that were said, no strokes, and too many.
     for (line, number) in [("$s=,0000mC0", "182"), ("$s=0", "180"), ("$s=,0000000000", "181")] {
         let answer = bench.say(&format!("{line}\n"));
         assert!(answer.ends_with(&format!("error:{number}\n")), "{line}: {answer}");
     }
-    assert!(bench.say("$stream\n").starts_with("[STREAM:1,0,2]\nok"), "nothing was taken");
+    assert!(bench.say("$stream\n").starts_with("[STREAM:1,0,2,0]\nok"), "nothing was taken");
     assert!(bench.say("$plot\n").ends_with("error:8\n"));
     assert_eq!(bench.say("$s=,0022\n"), "ok\n");
     // What was given up takes no more strokes, nor does a job of another kind.

@@ -20,8 +20,8 @@ const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];
 /// The working memory of the plotter in words: a target that has come takes one.
 const WORDS: usize = 1000;
 
-/// The numbers of a `[STOPPED:id,drawn,all,lost]`, if that is answered to `$stream`.
-fn stopped(plotter: &mut Powered<'_, '_>) -> Option<[u32; 4]> {
+/// The numbers of a `[STOPPED:id,drawn,all,lost,points]`, if that is answered to `$stream`.
+fn stopped(plotter: &mut Powered<'_, '_>) -> Option<[u32; 5]> {
     plotter.heard();
     let answer = plotter.say("$stream");
     if answer.ends_with("error:181\n") {
@@ -30,7 +30,7 @@ fn stopped(plotter: &mut Powered<'_, '_>) -> Option<[u32; 4]> {
     let numbers = answer.trim_start_matches("[STOPPED:").trim_end_matches("]\nok\n");
     let numbers: Vec<u32> =
         numbers.split(',').map(|it| it.parse().unwrap_or_else(|_| panic!("{answer}"))).collect();
-    Some(numbers.try_into().expect("four numbers"))
+    Some(numbers.try_into().expect("five numbers"))
 }
 
 /// Sends lines while they are drawn, with a line late now and then, for this many milliseconds at
@@ -90,15 +90,15 @@ fn draw_with_cuts(
                 is_over = true;
                 return;
             }
-            let from = found.map_or(0, |[id, drawn, found_all, lost]| {
+            let (from, points) = found.map_or((0, 0), |[id, drawn, found_all, lost, points]| {
                 assert_eq!((whole.id(), all), (id, found_all), "it is known again");
                 assert_eq!(lost, 1, "nobody has said where the pen is");
-                drawn
+                (drawn, points)
             });
             if found.is_some() {
                 assert!(plotter.say("$resume").contains("error:163\n"), "it has no strokes");
                 assert!(plotter.say("$resume=origin").ends_with("ok\n"));
-                let [.., lost] = stopped(plotter).expect("still stopped");
+                let [.., lost, _] = stopped(plotter).expect("still stopped");
                 assert_eq!(lost, 0);
             } else {
                 plotter.order(&drawing.settings);
@@ -106,8 +106,7 @@ fn draw_with_cuts(
             if plotter.is_cut() {
                 return;
             }
-            let mut job = drawing.from(from);
-            job.set_id(whole.id());
+            let job = drawing.rest(from, points);
             if in_flash {
                 let budget = random.below(256 * u64::from(all - from + 2)) as usize;
                 plotter.board.flash().expect("flash").budget = budget;
@@ -236,7 +235,7 @@ fn a_drawing_that_begins_anew_goes_on_at_the_origin_where_it_began() {
     let (flash, _) = switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
         plotter.heard();
         assert!(plotter.say("$X").ends_with("ok\n"));
-        let [_, drawn, _, lost] = stopped(plotter).expect("it has stopped");
+        let [_, drawn, _, lost, _] = stopped(plotter).expect("it has stopped");
         assert_eq!([drawn, lost], [0, 1]);
         assert!(!send(plotter, &job, 0, 1800, &mut random));
     });
@@ -248,7 +247,7 @@ fn a_drawing_that_begins_anew_goes_on_at_the_origin_where_it_began() {
         plotter.send("\x18");
         plotter.run(100);
         assert!(plotter.say("$X").ends_with("ok\n"));
-        let [_, drawn, _, lost] = stopped(plotter).expect("it goes on there");
+        let [_, drawn, _, lost, _] = stopped(plotter).expect("it goes on there");
         assert!(drawn > 0 && lost == 1, "{drawn} {lost}");
     });
 }
@@ -317,7 +316,7 @@ fn the_rest_of_a_drawing_whose_strokes_are_noted_by_twos_asks_for_its_pen() {
         plotter.run(20);
     });
     let (_, changes) = switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
-        let [id, drawn, all, _] = stopped(plotter).expect("it has stopped");
+        let [id, drawn, all, ..] = stopped(plotter).expect("it has stopped");
         assert_eq!((id, drawn, all), (7, 2, strokes));
         assert!(plotter.say("$resume=origin").ends_with("ok\n"));
         plotter.order(&apart(strokes - drawn, &[0, 1, 1]));
@@ -328,6 +327,83 @@ fn the_rest_of_a_drawing_whose_strokes_are_noted_by_twos_asks_for_its_pen() {
         assert!(plotter.status().contains("|Pen:2|"), "{}", plotter.status());
     });
     assert_eq!(strokes_of(changes.iter().map(PinChange::from)).len(), 1);
+}
+
+/// Has the user put in pen 2.
+fn put_in_pen_2(plotter: &mut Powered<'_, '_>) {
+    plotter.send("T2M6\n");
+    plotter.run(100);
+    assert!(plotter.heard().contains("put in the next pen"));
+    plotter.send("~");
+    plotter.run(100);
+}
+
+/// The power goes while the plotter asks for pen 1, because pen 2 was in. A plotter that starts
+/// knows nothing of that, and asks again, if the drawing has several pens.
+#[test]
+fn the_rest_of_a_drawing_asks_for_its_first_pen_after_a_start() {
+    let settings = QUICK_PEN.map(str::to_owned);
+    for (numbers, asks) in [("", true), (",1", false), (",1,0", false), (",2,0", true)] {
+        let job = |strokes: u32| {
+            let mut lines = apart(strokes, &[0, 0, 0, 0]);
+            lines[0] += numbers;
+            lines
+        };
+        let (flash, _) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+            plotter.order(&settings);
+            put_in_pen_2(plotter);
+            plotter.order(&job(4));
+            plotter.run(1000);
+            assert!(plotter.status().contains("|Pen:1|"), "{}", plotter.status());
+        });
+        switch_on_early::<WORDS>(flash.powered(), None, |plotter| {
+            assert_eq!(stopped(plotter).map(|[_, drawn, ..]| drawn), Some(0));
+            assert!(plotter.say("$resume=origin").ends_with("ok\n"));
+            plotter.order(&job(4));
+            plotter.run(1000);
+            assert_eq!(plotter.status().contains("|Pen:1|"), asks, "{numbers}");
+        });
+    }
+}
+
+/// With points within strokes a stroke goes on at the last one, also behind a second cut, and also
+/// where its lines come late.
+#[test]
+fn a_stroke_that_is_sent_goes_on_within() {
+    let mut lines: Vec<String> = Vec::new();
+    let points = 600;
+    for index in 0..points {
+        let (angle, radius) = (f64::from(index) * 0.2, 1.0 + f64::from(index) * 0.04);
+        let (x, y) = (30.0 + radius * angle.cos(), 30.0 + radius * angle.sin());
+        lines.push(format!("v {x:.3} {y:.3} 0"));
+    }
+    for first in (1..points).step_by(20) {
+        let last = points.min(first + 20);
+        let numbers: Vec<String> = (first..=last).map(|number| number.to_string()).collect();
+        lines.push(format!("l {}", numbers.join(" ")));
+    }
+    lines.extend(["v 0 0 0", "v 4 0 0"].map(str::to_owned));
+    lines.push(format!("l {} {}", points + 1, points + 2));
+    let options = ["$219=0.04", "$view=auto", "$page=70x70", "$margin=5", "$plot"];
+    lines.extend(QUICK_PEN.iter().chain(&options).map(|line| (*line).to_owned()));
+    let mut drawing = Drawing::of(&lines);
+    let (whole, milliseconds) = undisturbed(&mut drawing);
+    let length = |strokes: &[Vec<Point>]| -> f64 {
+        let legs = strokes.iter().flat_map(|stroke| stroke.windows(2));
+        legs.map(|leg| f64::from(leg[1].0 - leg[0].0).hypot(f64::from(leg[1].1 - leg[0].1))).sum()
+    };
+    let mut cuts = 0;
+    for (seed, late_once_in) in [(0, 0), (1, 0), (2, 0), (3, 6), (4, 6)] {
+        let random = &mut Random::new(1980 + seed);
+        let runs = draw_with_cuts(&mut drawing, 6, late_once_in, milliseconds / 3, random);
+        assert!(ink(runs.iter().flatten()) == ink(&whole), "seed {seed}: the ink differs");
+        // At most what lies between two points is drawn twice for each cut, and a chord.
+        let twice = runs.iter().map(|run| length(run)).sum::<f64>() - length(&whole);
+        let most = (runs.len() - 1) as f64 * (40.0 + 5.0) * 80.0;
+        assert!(twice <= most, "seed {seed}: {twice} steps are drawn twice, {most} at most");
+        cuts += runs.len() - 1;
+    }
+    assert!(cuts > 10, "{cuts}");
 }
 
 /// Whoever asks the plotter for the rest of a drawing that it does not have is told who has it.

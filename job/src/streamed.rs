@@ -107,14 +107,19 @@ impl StreamedJob {
         let size = measure(settings, path).map_err(StreamError::Machine)?;
         let (least, greatest) = (PagePoint { x: i32::MAX, y: i32::MAX }, PagePoint { x: 0, y: 0 });
         let steps = settings.page_steps().map(|steps| steps.to_bits());
-        let mut header = StreamHeader { steps, id: 0, targets: 0, least, greatest, size };
-        for_each(path, &mut |StreamedTarget { target, .. }| {
+        let (id, targets, points) = (0, 0, 0);
+        let mut header =
+            StreamHeader { steps, id, targets, least, greatest, size, pens: 0, points };
+        let mut pens = 0u32;
+        for_each(path, &mut |StreamedTarget { target, pen }| {
+            pens |= 1u32.checked_shl(pen.into()).unwrap_or(0);
             let PagePoint { x, y } = target.point;
             let StreamHeader { least, greatest, targets, .. } = &mut header;
             (least.x, least.y) = (least.x.min(x), least.y.min(y));
             (greatest.x, greatest.y) = (greatest.x.max(x), greatest.y.max(y));
             *targets = targets.saturating_add(1);
         });
+        header.pens = pens.count_ones();
         if header.targets == 0 {
             header.least = header.greatest;
         }
@@ -228,14 +233,15 @@ impl StreamedJob {
         self.header.id
     }
 
-    /// Gives the drawing another number, by which a plotter knows the whole of which it is the
-    /// rest. As G-code it has none.
-    pub fn set_id(&mut self, id: u32) {
+    /// Tells the plotter that these are the rest of the drawing `whole`, and that it begins behind
+    /// so many points within strokes at which the machine has rested. G-code does not say that.
+    pub fn set_rest_of(&mut self, whole: &Self, points: u32) {
         let (Form::Strokes, Some(&LineBegin { at: end, .. })) = (self.form, self.begins.get(1))
         else {
             return;
         };
-        self.header.id = id;
+        let StreamHeader { id, pens, .. } = whole.header;
+        self.header = StreamHeader { id, pens, points, ..self.header };
         let header = self.header.line();
         self.text.replace_range(..end, &header);
         for begin in self.begins.iter_mut().skip(1) {

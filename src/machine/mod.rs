@@ -102,6 +102,8 @@ pub struct Machine<'m> {
     rapid_percent: u8,
     /// The number of the pen in the holder, counted from 0.
     pen: u8,
+    /// Whether nobody has said since the start which pen is in the holder.
+    is_pen_assumed: bool,
     /// The progress of noting strokes of the job in flash.
     log: StrokeLog,
     /// The points within strokes at which the machine rests.
@@ -160,6 +162,7 @@ impl<'m> Machine<'m> {
             percent: 100,
             rapid_percent: 100,
             pen: 0,
+            is_pen_assumed: true,
             #[cfg(feature = "driver-pins")]
             released_at: 0,
         };
@@ -259,7 +262,7 @@ impl<'m> Machine<'m> {
             && self.pen_wanted().is_some()
         {
             self.steady = Steady::default();
-            self.pen = pen;
+            self.set_pen(pen);
             source = Source::Path;
             match self.push(first, SpeedLimit::NONE) {
                 Ok(length) => self.pass_point(first, length),

@@ -131,6 +131,17 @@ impl Machine<'_> {
     /// Declares that the pen with this number, counted from 0, is in the holder.
     pub fn set_pen(&mut self, pen: u8) {
         self.pen = pen;
+        self.is_pen_assumed = false;
+    }
+
+    /// Lets the next stroke ask for its pen if nobody has said since the start which one is in the
+    /// holder: the first one is assumed to be then, but a job that has stopped may have left
+    /// another one. With `always` it asks even if somebody has.
+    #[cfg(feature = "resume")]
+    pub fn forget_pen(&mut self, always: bool) {
+        if always || self.is_pen_assumed {
+            self.pen = u8::MAX;
+        }
     }
 
     /// The position where the pen is parked, in steps of the page.

@@ -302,7 +302,7 @@ impl<I: Index> Inner<'_, I> {
         {
             let strokes = self.job.strokes(self.words, &mut self.cursor, None);
             let cancel: &mut dyn Cancel = listener;
-            let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+            let mut strokes = MeasuredStrokes::new(strokes, cancel);
             self.machine.start(&mut strokes)?;
             if strokes.aborted {
                 self.machine.abort();
@@ -440,7 +440,7 @@ impl<I: Index> Inner<'_, I> {
         let strokes = {
             let strokes = self.job.strokes(self.words, &mut self.cursor, None);
             let cancel: &mut dyn Cancel = listener;
-            let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+            let mut strokes = MeasuredStrokes::new(strokes, cancel);
             let mut measured = self.machine.begin_measuring();
             while self.machine.measure_next(&mut strokes, &mut measured)? {}
             if strokes.aborted {

@@ -20,6 +20,28 @@ pub(super) struct MeasuredStrokes<'s, 'a, I> {
     pub(super) targets: usize,
     /// Whether the user has aborted the job. The strokes then end.
     pub(super) aborted: bool,
+    /// The pen of the last target that the machine has read.
+    #[cfg(feature = "resume")]
+    pub(super) last_pen: Option<u8>,
+    /// Whether the targets that the machine has read have several pens.
+    #[cfg(feature = "resume")]
+    pub(super) has_pens: bool,
+}
+
+impl<'s, 'a, I> MeasuredStrokes<'s, 'a, I> {
+    /// None of these strokes is read yet.
+    pub(super) fn new(strokes: Strokes<'s, I>, cancel: &'a mut dyn Cancel) -> Self {
+        Self {
+            strokes,
+            cancel,
+            targets: 0,
+            aborted: false,
+            #[cfg(feature = "resume")]
+            last_pen: None,
+            #[cfg(feature = "resume")]
+            has_pens: false,
+        }
+    }
 }
 
 impl<I: Index> Path for MeasuredStrokes<'_, '_, I> {
@@ -29,7 +51,13 @@ impl<I: Index> Path for MeasuredStrokes<'_, '_, I> {
         if self.targets.is_multiple_of(64) && self.cancel.check().is_err() {
             self.aborted = true;
         }
-        self.strokes.next_target().filter(|_| !self.aborted)
+        let target = self.strokes.next_target().filter(|_| !self.aborted)?;
+        #[cfg(feature = "resume")]
+        {
+            let pen = self.strokes.pen();
+            self.has_pens |= self.last_pen.replace(pen).is_some_and(|last| last != pen);
+        }
+        Some(target)
     }
 
     fn rewind(&mut self) {

@@ -368,6 +368,17 @@ impl<'m, I: Index> Plotter<'m, I> {
         let ends = self.inner.machine.stroke_ends();
         self.inner.job.strokes(self.inner.words, &mut self.inner.cursor, ends)
     }
+
+    /// The strokes of the job computed last, from where it goes on if so many of them are `drawn`
+    /// and so many points within strokes are passed, and the number of points before that. `None`
+    /// if nothing is left to draw. See [`Strokes::begin_rest`].
+    #[cfg(feature = "host")]
+    pub fn strokes_left(&mut self, drawn: u32, points: u32) -> Option<(Strokes<'_, I>, u32)> {
+        let Inner { machine, job, words, cursor, .. } = &mut self.inner;
+        let mut strokes = job.strokes(words, cursor, machine.stroke_ends());
+        let before = strokes.begin_rest(drawn, points, machine)?;
+        Some((strokes, before))
+    }
 }
 
 impl<I: Index> Inner<'_, I> {

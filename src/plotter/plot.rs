@@ -242,7 +242,7 @@ impl<I: Index> Inner<'_, I> {
     pub(super) fn begin(&mut self, cancel: &mut dyn Cancel) -> Result<(), CommandError> {
         let ends = self.machine.stroke_ends();
         let strokes = self.job.strokes(self.words, &mut self.cursor, ends);
-        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+        let mut strokes = MeasuredStrokes::new(strokes, cancel);
         self.machine.start(&mut strokes)?;
         if strokes.aborted {
             self.machine.abort();

@@ -177,7 +177,7 @@ impl<I: Index> Inner<'_, I> {
         self.job = Job::default();
         self.cursor = Cursor::default();
         self.streamed = Streamed { header, taken: 0, released: 0 };
-        self.keep_streamed(header.id, board);
+        self.keep_streamed(header, board);
         #[cfg(feature = "resume")]
         self.act(requests);
         Ok(())
@@ -244,7 +244,8 @@ impl<I: Index> Inner<'_, I> {
             return if is_stopped { Ok(()) } else { Err(CommandError::NoStream) };
         }
         let Streamed { header, taken, .. } = self.streamed;
-        Reply(board).line(format_args!("[STREAM:{},{taken},{}]", header.id, header.targets));
+        let StreamHeader { id, targets, points, .. } = header;
+        Reply(board).line(format_args!("[STREAM:{id},{taken},{targets},{points}]"));
         Ok(())
     }
 }

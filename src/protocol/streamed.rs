@@ -44,13 +44,19 @@ pub struct StreamHeader {
     pub greatest: PagePoint,
     /// The strokes, lengths and time of the whole job.
     pub size: JobSize,
+    /// The number of pens of the whole job, of which this may be the rest. 0 if that is not said.
+    pub pens: u32,
+    /// The number of points within strokes at which the machine has rested before this rest of a
+    /// job begins ([`Setting::PointDistance`](crate::machine::Setting::PointDistance)).
+    pub points: u32,
 }
 
 impl StreamHeader {
     /// The number of values.
-    const COUNT: usize = 12;
+    const COUNT: usize = 14;
 
-    /// Parses the text after `$stream=`: whole numbers with commas between them.
+    /// Parses the text after `$stream=`: whole numbers with commas between them. The last two may
+    /// be left out, and are 0 then.
     ///
     /// # Errors
     /// There are too few or too many numbers, or one of them is not a number or is too
@@ -58,8 +64,13 @@ impl StreamHeader {
     pub fn parse(text: &str) -> Result<Self, CommandError> {
         let wrong_count = CommandError::WrongNumberCount { needed: Self::COUNT };
         let mut parts = text.split(',');
+        let mut read = 0;
         let mut next = |limit: u64| {
-            let part = parts.next().ok_or(wrong_count)?.trim_ascii();
+            read += 1;
+            let part = match parts.next() {
+                None if read > Self::COUNT - 2 => return Ok(0),
+                part => part.ok_or(wrong_count)?.trim_ascii(),
+            };
             if part.is_empty() || !part.bytes().all(|byte| byte.is_ascii_digit()) {
                 return Err(CommandError::NotANumber);
             }
@@ -81,6 +92,8 @@ impl StreamHeader {
                 travelled: next(length)?,
                 milliseconds: next(length)?,
             },
+            pens: next(most)? as u32,
+            points: next(most)? as u32,
         };
         if parts.next().is_some() {
             return Err(wrong_count);
@@ -94,14 +107,14 @@ impl StreamHeader {
     /// use penup::protocol::StreamHeader;
     /// let header = StreamHeader { id: 7, targets: 2, ..StreamHeader::default() };
     /// let line = header.line();
-    /// assert_eq!(line, "$stream=0,0,7,2,0,0,0,0,0,0,0,0");
+    /// assert_eq!(line, "$stream=0,0,7,2,0,0,0,0,0,0,0,0,0,0");
     /// assert_eq!(StreamHeader::parse(line.trim_start_matches("$stream=")), Ok(header));
     /// ```
     #[cfg(any(test, feature = "host"))]
     pub fn line(&self) -> std::string::String {
-        let Self { steps: [x, y], id, targets, least, greatest, size } = self;
+        let Self { steps: [x, y], id, targets, least, greatest, size, pens, points } = self;
         std::format!(
-            "$stream={x},{y},{id},{targets},{},{},{},{},{},{},{},{}",
+            "$stream={x},{y},{id},{targets},{},{},{},{},{},{},{},{},{pens},{points}",
             least.x,
             least.y,
             greatest.x,
@@ -358,14 +371,21 @@ mod tests {
             least: PagePoint { x: 1, y: 2 },
             greatest: PagePoint { x: PAGE_LIMIT, y: 4 },
             size: JobSize { strokes: 6, drawn: 7 << 40, travelled: 8, milliseconds: 9 },
+            pens: 10,
+            points: 11,
         };
         let line = header.line();
         let text = line.trim_start_matches("$stream=");
         assert_eq!(StreamHeader::parse(text), Ok(header));
         assert!(matches!(
             StreamHeader::parse(&std::format!("{text},1")),
-            Err(CommandError::WrongNumberCount { needed: 12 })
+            Err(CommandError::WrongNumberCount { needed: 14 })
         ));
+        let short = text.strip_suffix(",10,11").unwrap();
+        let without = StreamHeader { pens: 0, points: 0, ..header };
+        assert_eq!(StreamHeader::parse(short), Ok(without));
+        assert_eq!(StreamHeader::parse(&std::format!("{short},10")).map(|it| it.pens), Ok(10));
+        assert!(StreamHeader::parse(&std::format!("{short},10,")).is_err());
         assert!(StreamHeader::parse("1,2,3").is_err());
         assert_eq!(StreamHeader::parse("-1"), Err(CommandError::NotANumber));
         let long = text.replace(",2,", ",1048577,");

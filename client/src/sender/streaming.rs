@@ -21,6 +21,8 @@ pub struct Taken {
     pub targets: u32,
     /// The number of all targets of the drawing.
     pub all: u32,
+    /// The number of points within strokes that were passed before the drawing went on.
+    pub points: u32,
     /// The number of strokes that are drawn in all, if the plotter has said so.
     pub strokes: Option<u32>,
 }
@@ -36,6 +38,8 @@ pub struct Stopped {
     pub all: u32,
     /// Whether nobody has said where the pen is since then.
     pub is_lost: bool,
+    /// The number of points within strokes that are passed, at which the machine has rested.
+    pub points: u32,
 }
 
 /// How much of a drawing has arrived that is sent while it is drawn.
@@ -248,22 +252,26 @@ impl<'a> Sender<'a> {
     }
 }
 
-/// The answer to `$stream` after a stop: `[STOPPED:id,drawn,all,lost]`.
+/// The answer to `$stream` after a stop: `[STOPPED:id,drawn,all,lost,points]`. Older firmware does
+/// not say the last number.
 fn stopped_in(reply: &Reply) -> Option<Stopped> {
     let Reply::Other(line) = reply else { return None };
     let mut numbers = line.strip_prefix("[STOPPED:")?.strip_suffix(']')?.split(',');
     let mut next = || numbers.next()?.parse::<u32>().ok();
     let (id, drawn, all, lost) = (next()?, next()?, next()?, next()?);
-    Some(Stopped { id, drawn, all, is_lost: lost != 0 }).filter(|_| drawn < all)
+    let points = next().unwrap_or(0);
+    Some(Stopped { id, drawn, all, is_lost: lost != 0, points }).filter(|_| drawn < all)
 }
 
-/// The answer to `$stream`: `[STREAM:id,taken,all]`.
+/// The answer to `$stream`: `[STREAM:id,taken,all,points]`. Older firmware does not say the last
+/// number.
 fn taken_in(reply: &Reply) -> Option<Taken> {
     let Reply::Other(line) = reply else { return None };
     let mut numbers = line.strip_prefix("[STREAM:")?.strip_suffix(']')?.split(',');
     let mut next = || numbers.next()?.parse::<u32>().ok();
     let (id, targets, all) = (next()?, next()?, next()?);
-    Some(Taken { id, targets, all, strokes: None })
+    let points = next().unwrap_or(0);
+    Some(Taken { id, targets, all, points, strokes: None })
 }
 
 #[cfg(test)]

@@ -118,14 +118,11 @@ pub struct SentDrawing {
 impl SentDrawing {
     /// The lines from stroke number `from` on.
     pub fn lines(&mut self, from: u32) -> Vec<String> {
-        let id = self.drawing.from(0).id();
-        let mut job = self.drawing.from(from);
-        job.set_id(id);
-        job.in_order().map(|line| line.sent).collect()
+        self.drawing.rest(from, 0).in_order().map(|line| line.sent).collect()
     }
 }
 
-/// The second and third number of `[STOPPED:id,drawn,all,lost]`, if that was answered.
+/// The second and third number of `[STOPPED:id,drawn,all,lost,points]`, if that was answered.
 fn sent(shown: &Shown) -> Option<(usize, usize)> {
     let numbers = shown.iter().find_map(|line| line.strip_prefix("[STOPPED:"))?;
     let mut numbers = numbers.trim_end_matches(']').split(',').skip(1);

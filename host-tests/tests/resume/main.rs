@@ -469,6 +469,39 @@ fn pens_are_asked_for_after_a_cut() {
     assert!(strokes[1][0].starts_with(&strokes[0][2]));
 }
 
+/// The power goes while the plotter asks for pen 1 for another copy, because pen 2 is in. After a
+/// start the first pen is assumed to be in, but not for the rest of a job with several pens.
+#[test]
+fn the_first_pen_is_asked_for_after_a_cut() {
+    let vertices = ["v 0 0 0", "v 9 0 0", "v 0 3 0", "v 9 3 0"];
+    let pens = ["usemtl pen1", "l 1 2", "usemtl pen2", "l 3 4"];
+    let options = ["$212=20", "$213=20", "$page=20x20", "$margin=2", "$plot"];
+    let lines: Vec<String> =
+        vertices.iter().chain(&pens).chain(&options).map(|line| (*line).to_owned()).collect();
+    let (flash, _) = switch_on(empty_flash(), |plotter| {
+        plotter.order(&lines);
+        plotter.finish();
+        plotter.send("~");
+        plotter.finish();
+        plotter.heard();
+        assert_eq!(plotter.say("$again"), "ok\n");
+        plotter.finish();
+        assert!(plotter.status().contains("|Pen:1|"), "{}", plotter.status());
+    });
+    let (_, changes) = switch_on(flash.powered(), |plotter| {
+        plotter.heard();
+        assert!(plotter.say("$resume=origin").ends_with("ok\n"));
+        plotter.finish();
+        for pen in [1, 2] {
+            let status = plotter.status();
+            assert!(status.contains(&format!("|Pen:{pen}|")), "{status}");
+            plotter.send("~");
+            plotter.finish();
+        }
+    });
+    assert_eq!(strokes_of(changes.iter().map(PinChange::from)).len(), 2);
+}
+
 #[test]
 fn boards_without_flash_refuse_it() {
     let mut bench = Bench::new();

@@ -5,7 +5,7 @@ use crate::index::Index;
 #[cfg(any(feature = "stream", feature = "early-ink"))]
 use crate::machine::PendingTarget;
 #[cfg(feature = "resume")]
-use crate::machine::StrokePoints;
+use crate::machine::{Machine, StrokePoints};
 use crate::machine::{Path, StrokeEnds, Target};
 use crate::motion::PathLength;
 use crate::order::Leg;
@@ -279,6 +279,20 @@ impl<I: Index> Strokes<'_, I> {
             }
             (inked, pen) = (ink.is_some(), self.pen());
         }
+    }
+
+    /// Lets the path begin where a job goes on of which so many strokes are `drawn` and so many
+    /// `points` are passed ([`Setting::PointDistance`](crate::machine::Setting::PointDistance)).
+    /// Returns the number of points before the path, or `None` if nothing is left to draw.
+    pub fn begin_rest(&mut self, drawn: u32, points: u32, machine: &Machine<'_>) -> Option<u32> {
+        if !self.begin_at(drawn) {
+            return None;
+        }
+        let distance = machine.point_distance();
+        if distance == 0 {
+            return Some(0);
+        }
+        Some(self.begin_at_point(drawn, points, distance, &|ends| machine.length(ends)))
     }
 
     /// Lets the path begin within this stroke, at the last one of the `points` that are passed

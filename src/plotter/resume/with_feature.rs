@@ -326,20 +326,14 @@ impl<I: Index> Inner<'_, I> {
     ) -> Result<(), CommandError> {
         let ends = self.machine.stroke_ends();
         let strokes = self.job.strokes(self.words, &mut self.cursor, ends);
-        let mut strokes = MeasuredStrokes { strokes, cancel, targets: 0, aborted: false };
+        let mut strokes = MeasuredStrokes::new(strokes, cancel);
         let whole = self.machine.measure_whole(&mut strokes)?;
         if strokes.aborted {
             return Err(CommandError::Aborted);
         }
-        if !strokes.strokes.begin_at(drawn.parts) {
-            return Err(CommandError::NoJobKept);
-        }
-        let (mut points, distance) = (0, self.machine.point_distance());
-        if drawn.points > 0 && distance > 0 {
-            let length = |ends| self.machine.length(ends);
-            let LogProgress { parts, points: passed, .. } = drawn;
-            points = strokes.strokes.begin_at_point(parts, passed, distance, &length);
-        }
+        let has_pens = strokes.has_pens;
+        let begun = strokes.strokes.begin_rest(drawn.parts, drawn.points, &self.machine);
+        let points = begun.ok_or(CommandError::NoJobKept)?;
         self.machine.start_rest(&mut strokes, whole)?;
         if strokes.aborted {
             self.machine.abort();
@@ -347,6 +341,9 @@ impl<I: Index> Inner<'_, I> {
         }
         strokes.strokes.rewind();
         if self.machine.state() == State::Run {
+            if has_pens {
+                self.machine.forget_pen(false);
+            }
             self.machine.log_strokes(points);
         }
         Ok(())

@@ -5,7 +5,7 @@ use crate::index::Index;
 use crate::machine::{Settings, State};
 use crate::plotter::{Board, Inner};
 #[cfg(feature = "stream")]
-use crate::protocol::CommandError;
+use crate::protocol::{CommandError, StreamHeader};
 
 impl Resumption {
     /// How many strokes of a job that has stopped are drawn, and how many there are: none.
@@ -26,7 +26,8 @@ impl Resumption {
 impl<I: Index> Inner<'_, I> {
     /// Keeps nothing of a job that is sent while it is drawn.
     #[cfg(feature = "stream")]
-    pub(in crate::plotter) const fn keep_streamed<B: Board>(&mut self, _: u32, _: &mut B) {}
+    pub(in crate::plotter) const fn keep_streamed<B: Board>(&mut self, _: StreamHeader, _: &mut B) {
+    }
 
     /// Whether a job has stopped that was sent while it was drawn: none.
     ///

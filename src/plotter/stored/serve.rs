@@ -78,7 +78,8 @@ impl<I: Index> Inner<'_, I> {
         }
         let at = self.machine.end();
         let mut drawn = kept.and_then(|kept| kept.drawn).unwrap_or(0);
-        let may_begin_before_pen = search.pens != 0 && are_noted_at_once(drawn);
+        let has_pens = search.pens != 0;
+        let begins_before_pen = are_noted_at_once(drawn);
         if drawn > 0 {
             Reply(listener.board).line(format_args!(
                 "[MSG:what is drawn is computed again, which may take minutes]"
@@ -105,9 +106,10 @@ impl<I: Index> Inner<'_, I> {
             Self::make_room(listener, 2 * PAGE_BYTES as u32)?;
         }
         self.machine.start_streamed(JobSize::default(), bounds)?;
-        if may_begin_before_pen {
-            // The rest may begin with strokes before the last change of the pen.
-            self.machine.set_pen(u8::MAX);
+        if has_pens && kept.is_some_and(|kept| kept.drawn.is_some()) {
+            // If several strokes are noted at once, the rest may begin with strokes before the last
+            // change of the pen.
+            self.machine.forget_pen(begins_before_pen);
         }
         self.keep_parts(model.checksum(), time_model, kept, listener.board);
         self.parts.is_active = true;

@@ -6,17 +6,22 @@ use super::refuse;
 use crate::index::Index;
 use crate::machine::State;
 use crate::plotter::{Board, Inner, Reply, records};
-use crate::protocol::CommandError;
+use crate::protocol::{CommandError, StreamHeader};
 
 /// The most strokes that are noted at once.
 const MOST_AT_ONCE: u32 = 1 << 12;
 
 impl<I: Index> Inner<'_, I> {
-    /// Begins to keep how far a job comes that is sent while it is drawn, and that its sender
-    /// knows by the number `id`. If it is the rest of the job that has stopped, goes on with
-    /// what is kept of that. Nothing may move yet.
+    /// Begins to keep how far a job comes that is sent while it is drawn, behind this `header`. If
+    /// it is the rest of the job that has stopped, goes on with what is kept of that. Nothing may
+    /// move yet.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    pub(in crate::plotter) fn keep_streamed<B: Board>(&mut self, id: u32, board: &mut B) {
+    pub(in crate::plotter) fn keep_streamed<B: Board>(
+        &mut self,
+        header: StreamHeader,
+        board: &mut B,
+    ) {
+        let StreamHeader { id, pens, points, .. } = header;
         let stopped = self.resumption.progress;
         self.resumption = self.resumption.anew(self.machine.settings());
         if self.machine.state() != State::Run || !board.keeps_progress() {
@@ -33,11 +38,12 @@ impl<I: Index> Inner<'_, I> {
             // All of it may be drawn anew, from another origin.
             && (drawn > 0 || self.resumption.origin.is_homed() == began_homed(&notes))
         {
-            self.machine.log_strokes(0);
+            self.machine.log_strokes(points);
             let more_at_once = word(&notes, 3).saturating_sub(1);
-            if more_at_once > 0 {
-                // The rest may begin with strokes before the last change of the pen.
-                self.machine.set_pen(u8::MAX);
+            if pens != 1 {
+                // If several strokes are noted at once, the rest may begin with strokes before the
+                // last change of the pen.
+                self.machine.forget_pen(more_at_once > 0);
             }
             self.resumption = Resumption {
                 progress: Some([drawn, all]),
@@ -71,8 +77,8 @@ impl<I: Index> Inner<'_, I> {
 
     /// Says how far a job has come that was sent while it was drawn and has stopped, so that
     /// its sender can go on: the number by which it knows the job, how many strokes are drawn
-    /// and how many there are, and whether the position of the pen is unknown since then.
-    /// Returns whether there is such a job.
+    /// and how many there are, whether the position of the pen is unknown since then, and how many
+    /// points within strokes are passed. Returns whether there is such a job.
     ///
     /// # Errors
     /// What the job depends on has changed.
@@ -84,14 +90,15 @@ impl<I: Index> Inner<'_, I> {
         let Some([drawn, all]) = self.resumption.stopped(self.machine.state()) else {
             return Ok(false);
         };
-        let Some((notes, _)) = read(board).filter(|(notes, _)| is_streamed(notes)) else {
+        let Some((notes, noted)) = read(board).filter(|(notes, _)| is_streamed(notes)) else {
             return Ok(false);
         };
         self.check_notes(&notes)?;
         let id = word(&notes, 4);
         let origin = self.resumption.origin(self.machine.settings());
         let is_lost = u8::from(origin == Origin::Lost);
-        Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost}]"));
+        let points = noted.points;
+        Reply(board).line(format_args!("[STOPPED:{id},{drawn},{all},{is_lost},{points}]"));
         Ok(true)
     }
 }
