@@ -331,7 +331,8 @@ impl<'a, I: Index> PointFinder<'a, I> {
         let longest = 1 << (usize::BITS - 1 - longest.leading_zeros());
         let most_slots = I::NONE.get().saturating_add(1).saturating_mul(2);
         let length = (2 * most).next_power_of_two().clamp(8, most_slots).min(longest);
-        let (mut points, mut table) = scratch.split(available - Scratch::bytes_for::<I>(length));
+        let (mut points, mut table) =
+            scratch.split(available.saturating_sub(Scratch::bytes_for::<I>(length)));
         let point_limit = (points.available_bytes() / size_of::<PagePoint>()).min(most);
         Ok(Self { points: points.take(point_limit)?, count: 0, table: table.take(length)? })
     }
@@ -378,7 +379,8 @@ impl<'a, I: Index> PointFinder<'a, I> {
             needed: (self.count + 1) * size_of::<PagePoint>(),
             available: size_of_val(self.points),
         };
-        let fullest = self.table.len() - self.table.len() / 8;
+        // One slot at least stays free.
+        let fullest = self.table.len() - self.table.len().div_ceil(8);
         if self.count >= fullest.min(I::NONE.get()) {
             return Err(full);
         }
@@ -462,7 +464,10 @@ mod tests {
     #[test]
     fn too_little_memory_is_an_error_and_never_a_panic() {
         let lines: Vec<PackedLine> = (0..40).map(|i| line((i * 10, 0), (i * 10, 5))).collect();
-        assert!(drawn(&lines, 120).is_err());
+        // The lines alone take 60 words. A few more leave a table of 1 to 8 slots.
+        for words in 60..=120 {
+            assert!(drawn(&lines, words).is_err(), "{words} words");
+        }
         let enough = (121..400).find(|words| drawn(&lines, *words).is_ok());
         assert!(enough.is_some());
         for words in enough.unwrap()..400 {

@@ -84,8 +84,9 @@ fn even_part<I: Index>() -> I {
 pub struct Leg<I = u16>(I);
 
 impl<I: Index> Leg<I> {
-    /// The greatest number of segments that can be numbered.
-    pub const LIMIT: usize = (1 << (I::BITS - 1)) - 1;
+    /// The greatest number of segments that can be numbered: each may have two ends of its own, and
+    /// the order adds the two ends of the tour to these points.
+    pub const LIMIT: usize = (1 << (I::BITS - 1)) - 2;
 
     /// Makes the leg of segment `segment`, which is drawn from its `to` end if `reversed`.
     pub fn new(segment: I, reversed: bool) -> Self {
