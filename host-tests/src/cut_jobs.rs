@@ -10,6 +10,16 @@ use std::collections::BTreeSet;
 /// A point of the page in steps.
 pub type Point = (i32, i32);
 
+/// The length of strokes, in steps.
+pub fn drawn_length(strokes: &[Vec<Point>]) -> f64 {
+    let legs = strokes.iter().flat_map(|stroke| stroke.windows(2));
+    let length = |leg: &[Point]| match leg {
+        [from, to] => f64::from(to.0 - from.0).hypot(f64::from(to.1 - from.1)),
+        _ => 0.0,
+    };
+    legs.map(length).sum()
+}
+
 /// Creates the erased flash of a board in memory.
 pub fn empty_flash() -> CutFlash {
     CutFlash::new(LAYOUT.end() as usize)

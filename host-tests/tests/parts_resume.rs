@@ -8,7 +8,7 @@ use penup::machine::State;
 use penup::plotter::Board as _;
 use penup::storage::NOTE_BYTES;
 use penup_host_tests::cut_jobs::{
-    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_small,
+    Point, Powered, assert_one_drawing, drawn_length, empty_flash, ink, strokes_of, switch_on_small,
 };
 use penup_host_tests::random::Random;
 use penup_host_tests::streamed_drawing::StreamedDrawing;
@@ -137,6 +137,7 @@ fn draw_with_cuts(lines: &[String], milliseconds: u64, cuts: u64, random: &mut R
                 if runs.iter().any(|run| !run.is_empty()) {
                     return;
                 }
+                plotter.say("$clear");
                 plotter.order(lines);
             }
             if is_last || in_flash {
@@ -165,6 +166,26 @@ fn a_drawing_that_is_cut_ten_times_arrives_as_one() {
         }
         assert!(twice > 5, "{options:?}: {twice}");
     }
+}
+
+/// With points within strokes a stroke goes on at the last one, in whatever part it lies.
+#[test]
+fn a_stroke_of_a_part_goes_on_within() {
+    let lines = lattice(&["$hidden=erased", "$219=0.005"]);
+    let (whole, milliseconds) = undisturbed(&lines);
+    let without = undisturbed(&lattice(&["$hidden=erased"])).0;
+    assert_eq!(ink(&whole), ink(&without));
+    let all = drawn_length(&whole);
+    let (mut twice, mut cuts) = (0.0, 0.0);
+    for seed in 0..4 {
+        let mut random = Random::new(1990 + seed);
+        let runs = draw_with_cuts(&lines, milliseconds, 10, &mut random);
+        assert_eq!(ink(runs.iter().flatten()), ink(&whole), "seed {seed}");
+        twice += runs.iter().map(|run| drawn_length(run)).sum::<f64>() - all;
+        cuts += runs.len() as f64 - 1.0;
+    }
+    // Between two points lie 400 steps and a chord. On average half of it is drawn twice.
+    assert!(twice > 0.0 && twice < 400.0 * cuts, "{twice} {cuts}");
 }
 
 #[test]

@@ -5,7 +5,7 @@
 
 use penup::plotter::Board as _;
 use penup_host_tests::cut_jobs::{
-    Point, Powered, assert_one_drawing, empty_flash, ink, strokes_of, switch_on_early,
+    Point, Powered, assert_one_drawing, drawn_length, empty_flash, ink, strokes_of, switch_on_early,
 };
 use penup_host_tests::random::Random;
 use penup_host_tests::streamed_drawing::StreamedDrawing as Drawing;
@@ -388,17 +388,13 @@ fn a_stroke_that_is_sent_goes_on_within() {
     lines.extend(QUICK_PEN.iter().chain(&options).map(|line| (*line).to_owned()));
     let mut drawing = Drawing::of(&lines);
     let (whole, milliseconds) = undisturbed(&mut drawing);
-    let length = |strokes: &[Vec<Point>]| -> f64 {
-        let legs = strokes.iter().flat_map(|stroke| stroke.windows(2));
-        legs.map(|leg| f64::from(leg[1].0 - leg[0].0).hypot(f64::from(leg[1].1 - leg[0].1))).sum()
-    };
     let mut cuts = 0;
     for (seed, late_once_in) in [(0, 0), (1, 0), (2, 0), (3, 6), (4, 6)] {
         let random = &mut Random::new(1980 + seed);
         let runs = draw_with_cuts(&mut drawing, 6, late_once_in, milliseconds / 3, random);
         assert!(ink(runs.iter().flatten()) == ink(&whole), "seed {seed}: the ink differs");
         // At most what lies between two points is drawn twice for each cut, and a chord.
-        let twice = runs.iter().map(|run| length(run)).sum::<f64>() - length(&whole);
+        let twice = runs.iter().map(|run| drawn_length(run)).sum::<f64>() - drawn_length(&whole);
         let most = (runs.len() - 1) as f64 * (40.0 + 5.0) * 80.0;
         assert!(twice <= most, "seed {seed}: {twice} steps are drawn twice, {most} at most");
         cuts += runs.len() - 1;

@@ -376,7 +376,7 @@ impl<'m, I: Index> Plotter<'m, I> {
     pub fn strokes_left(&mut self, drawn: u32, points: u32) -> Option<(Strokes<'_, I>, u32)> {
         let Inner { machine, job, words, cursor, .. } = &mut self.inner;
         let mut strokes = job.strokes(words, cursor, machine.stroke_ends());
-        let before = strokes.begin_rest(drawn, points, machine)?;
+        let before = strokes.begin_rest(drawn, [0, points], machine)?;
         Some((strokes, before))
     }
 }

@@ -316,7 +316,7 @@ pub(super) fn load_parts<B: Board>(
                 *options = kept;
             }
             let time_model = TimeModel { speed, acceleration, units_per_second };
-            found = Some(KeptParts { time_model, model, sources, drawn: None });
+            found = Some(KeptParts { time_model, model, sources, drawn: None, points: 0 });
         }
     });
     found

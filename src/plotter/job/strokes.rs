@@ -250,15 +250,18 @@ impl<I: Index> Path for Strokes<'_, I> {
 #[cfg(feature = "resume")]
 impl<I: Index> Strokes<'_, I> {
     /// Reads the path to its end. Returns the number of its strokes, as the machine counts them,
-    /// and where it ends.
+    /// the number of its points within strokes, and where it ends.
     #[cfg(feature = "tiles")]
-    pub fn count_strokes(&mut self) -> (u32, Option<PagePoint>) {
+    pub fn count_strokes(&mut self, machine: &Machine<'_>) -> (u32, u32, Option<PagePoint>) {
+        let mut points = StrokePoints::new(0, machine.point_distance());
         let (mut inked, mut pen, mut strokes, mut end) = (false, 0, 0u32, None);
-        while let Some(Target { point, ink }) = self.next_target() {
+        while let Some(target) = self.next_target() {
+            let Target { point, ink } = target;
             strokes += u32::from(ink.is_some() && (!inked || self.pen() != pen));
+            points.pass(target, end.map_or(0, |end| machine.length([end, point])));
             (inked, pen, end) = (ink.is_some(), self.pen(), Some(point));
         }
-        (strokes, end)
+        (strokes, points.passed, end)
     }
 
     /// Lets the path begin with this stroke, counted from 0 as the machine counts them. Returns
@@ -282,9 +285,15 @@ impl<I: Index> Strokes<'_, I> {
     }
 
     /// Lets the path begin where a job goes on of which so many strokes are `drawn` and so many
-    /// `points` are passed ([`Setting::PointDistance`](crate::machine::Setting::PointDistance)).
-    /// Returns the number of points before the path, or `None` if nothing is left to draw.
-    pub fn begin_rest(&mut self, drawn: u32, points: u32, machine: &Machine<'_>) -> Option<u32> {
+    /// points are passed ([`Setting::PointDistance`](crate::machine::Setting::PointDistance)).
+    /// `points` has the number of those before the strokes, and of all. Returns the number of
+    /// points before the path, or `None` if nothing is left to draw.
+    pub fn begin_rest(
+        &mut self,
+        drawn: u32,
+        points: [u32; 2],
+        machine: &Machine<'_>,
+    ) -> Option<u32> {
         if !self.begin_at(drawn) {
             return None;
         }
@@ -295,21 +304,22 @@ impl<I: Index> Strokes<'_, I> {
         Some(self.begin_at_point(drawn, points, distance, &|ends| machine.length(ends)))
     }
 
-    /// Lets the path begin within this stroke, at the last one of the `points` that are passed
-    /// along the whole path, if it lies in this stroke. Otherwise the path begins with the stroke,
-    /// as with [`Strokes::begin_at`]. `distance` and `length` are the machine's
+    /// Lets the path begin within this stroke, at the last one of the points that are passed, if it
+    /// lies in this stroke. Otherwise the path begins with the stroke, as with
+    /// [`Strokes::begin_at`]. `points` has the number of points before the whole path, and of those
+    /// that are passed. `distance` and `length` are the machine's
     /// [`point_distance`](crate::machine::Machine::point_distance) and
     /// [`length`](crate::machine::Machine::length). Returns the number of points before the path.
     pub fn begin_at_point(
         &mut self,
         stroke: u32,
-        points: u32,
+        [before, points]: [u32; 2],
         distance: u64,
         length: &dyn Fn([PagePoint; 2]) -> u64,
     ) -> u32 {
         *self.cursor = Cursor::default();
-        let mut walk = StrokePoints::new(0, distance);
-        let (mut inked, mut pen, mut begun, mut before) = (false, 0, 0u32, 0);
+        let mut walk = StrokePoints::new(before, distance);
+        let (mut inked, mut pen, mut begun, mut before) = (false, 0, 0u32, before);
         let mut at = None;
         while let Some(target) = self.next_target() {
             if target.ink.is_some() && (!inked || self.pen() != pen) {

@@ -294,7 +294,8 @@ impl<I: Index> Inner<'_, I> {
                 self.resumption.origin = Origin::ByHand;
             }
             let drawn = Some(done(&notes, noted));
-            return Ok(StoppedJob::InParts(KeptParts { drawn, ..kept }));
+            let points = noted.points;
+            return Ok(StoppedJob::InParts(KeptParts { drawn, points, ..kept }));
         }
         // Other sources may compute another order, in which others of the strokes come first.
         #[cfg(feature = "early-ink")]
@@ -332,7 +333,7 @@ impl<I: Index> Inner<'_, I> {
             return Err(CommandError::Aborted);
         }
         let has_pens = strokes.has_pens;
-        let begun = strokes.strokes.begin_rest(drawn.parts, drawn.points, &self.machine);
+        let begun = strokes.strokes.begin_rest(drawn.parts, [0, drawn.points], &self.machine);
         let points = begun.ok_or(CommandError::NoJobKept)?;
         self.machine.start_rest(&mut strokes, whole)?;
         if strokes.aborted {

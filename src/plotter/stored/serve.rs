@@ -29,6 +29,15 @@ pub(in crate::plotter) enum PartsProgress {
     Aborted,
 }
 
+/// What is left to draw of a computed part of a drawing that goes on.
+#[derive(Debug, Clone, Copy)]
+struct RestOfPart {
+    /// The number of its strokes that are drawn.
+    drawn: u32,
+    /// The number of points within strokes before the part, and of those that are passed in all.
+    points: [u32; 2],
+}
+
 impl<I: Index> Inner<'_, I> {
     /// Begins to draw the model in flash, or the drawing of it that was `kept`, whose options are
     /// in force: all of it, or what is not drawn of it.
@@ -77,7 +86,9 @@ impl<I: Index> Inner<'_, I> {
             return Ok(());
         }
         let at = self.machine.end();
-        let mut drawn = kept.and_then(|kept| kept.drawn).unwrap_or(0);
+        let mut rest =
+            kept.and_then(|kept| Some(RestOfPart { drawn: kept.drawn?, points: [0, kept.points] }));
+        let drawn = rest.map_or(0, |rest| rest.drawn);
         let has_pens = search.pens != 0;
         let begins_before_pen = are_noted_at_once(drawn);
         if drawn > 0 {
@@ -88,13 +99,18 @@ impl<I: Index> Inner<'_, I> {
         let ends = self.machine.stroke_ends();
         let mut part = next_part(model, search, steps, self.words, None, listener)?;
         // The parts that are drawn are left out.
-        while let Some((job, begin)) = &part {
+        while let (Some((job, begin)), Some(RestOfPart { drawn, points: [passed, _] })) =
+            (&part, &mut rest)
+        {
             let words = self.words.get_mut(*begin..).unwrap_or(&mut []);
-            let (strokes, at) = job.strokes(words, &mut Cursor::default(), ends).count_strokes();
-            if drawn < strokes {
+            let mut cursor = Cursor::default();
+            let mut counted = job.strokes(words, &mut cursor, ends);
+            let (strokes, points, at) = counted.count_strokes(&self.machine);
+            if *drawn < strokes {
                 break;
             }
-            drawn -= strokes;
+            *drawn -= strokes;
+            *passed += points;
             part = next_part(model, search, steps, self.words, at, listener)?;
         }
         let Some(part) = part else {
@@ -111,19 +127,20 @@ impl<I: Index> Inner<'_, I> {
             // change of the pen.
             self.machine.forget_pen(begins_before_pen);
         }
-        self.keep_parts(model.checksum(), time_model, kept, listener.board);
+        let points = self.take_part(Some(part), rest);
+        self.keep_parts(model.checksum(), time_model, kept, points, listener.board);
         self.parts.is_active = true;
         self.parts.last.target.point = at;
         self.streamed = Streamed::open_ended();
-        self.take_part(Some(part), drawn);
         self.feed_part();
         Reply(listener.board).line(format_args!("[MSG:computed and drawn part by part]"));
         Ok(())
     }
 
-    /// Notes what has been computed. So many strokes of it are `drawn` already.
+    /// Notes what has been computed, of which only the `rest` is drawn, if there is one. Returns
+    /// the number of points within strokes before that.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
-    fn take_part(&mut self, part: Option<Computed<I>>, drawn: u32) {
+    fn take_part(&mut self, part: Option<Computed<I>>, rest: Option<RestOfPart>) -> u32 {
         if part.is_none() {
             self.parts.search = None;
             self.streamed.end_here();
@@ -132,18 +149,20 @@ impl<I: Index> Inner<'_, I> {
         if let Some((job, _)) = &part {
             self.job.add_report(job.report());
         }
+        let mut before = 0;
         self.parts.part = part.map(|(job, begin)| {
             let ends = self.machine.stroke_ends();
             let words = self.words.get_mut(begin..).unwrap_or(&mut []);
             let mut cursor = Cursor::default();
             let mut strokes = job.strokes(words, &mut cursor, ends);
-            if drawn > 0 {
-                strokes.begin_at(drawn);
+            if let Some(RestOfPart { drawn, points }) = rest {
+                before = strokes.begin_rest(drawn, points, &self.machine).unwrap_or(0);
             }
             let from = *strokes.cursor;
             let left = core::iter::from_fn(|| strokes.next_target()).count();
             ComputedPart { job, cursor: from, left, begin }
         });
+        before
     }
 
     /// Hands the strokes of the computed part to the machine, as far as there is room.
@@ -197,7 +216,7 @@ impl<I: Index> Inner<'_, I> {
             (Some(EarlyEnd::ByMachine), _) => self.end_parts(),
             (None, Ok(part)) => {
                 self.parts.search = Some(*search);
-                self.take_part(part, 0);
+                self.take_part(part, None);
                 self.feed_part();
             }
             (None, Err(error)) => self.give_up(error, board),

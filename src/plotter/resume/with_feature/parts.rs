@@ -32,6 +32,8 @@ pub(in crate::plotter) struct KeptParts {
     pub sources: u32,
     /// The number of strokes that are drawn; `None` to begin anew.
     pub drawn: Option<u32>,
+    /// The number of points within strokes that are passed.
+    pub points: u32,
 }
 
 impl Resumption {
@@ -104,13 +106,15 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Begins to keep how far a drawing in parts comes that has just begun, of the model with this
-    /// checksum, or goes on with what is kept of it. Nothing may move yet.
+    /// checksum, or goes on with what is kept of it, behind so many points within strokes. Nothing
+    /// may move yet.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(in crate::plotter) fn keep_parts<B: Board>(
         &mut self,
         model: u32,
         time_model: TimeModel,
         kept: Option<KeptParts>,
+        points: u32,
         board: &mut B,
     ) {
         self.resumption = self.resumption.anew(self.machine.settings());
@@ -130,7 +134,7 @@ impl<I: Index> Inner<'_, I> {
                 return refuse(board);
             }
         }
-        self.machine.log_strokes(0);
+        self.machine.log_strokes(points);
         let drawn = drawn.unwrap_or(0);
         self.resumption.progress = Some([drawn, u32::MAX]);
         (self.resumption.drawn_before, self.resumption.in_parts) = (drawn, true);
