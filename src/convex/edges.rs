@@ -154,6 +154,13 @@ impl<I: Index> Membership<I> {
     }
 }
 
+// Why no index in this file can fail:
+// * A vertex is below `points.len()`: `from_edges` has checked the ends of all edges, `numbers`
+//   begins with the numbers of all points, and `first_at_place` returns one of these. `membership`
+//   and `visible` are as long as `points`.
+// * The name of a component is a vertex: only ends of edges and other names become names.
+// * `outline` holds vertices, and the place of a vertex in it is below its length.
+
 /// The vertices that have edges, each position once, and the edges between them.
 struct Graph<'s, I> {
     /// The positions of all vertices, those without edges included.
@@ -185,7 +192,7 @@ impl<'s, I: Index> Graph<'s, I> {
         let membership = scratch.take::<Membership<I>>(points.len())?;
         membership.fill(Membership::NO_EDGE);
         let own_edges = scratch.take::<[I; 2]>(edges.len())?;
-        let mut count = 0;
+        let mut count = 0; // at most the number of edges that were looked at
         for ends in edges {
             let [a, b] =
                 ends.map_each(|end| points::first_at_place(points, &numbers[..distinct], end));
@@ -199,7 +206,7 @@ impl<'s, I: Index> Graph<'s, I> {
         let own_edges = &mut own_edges[..count];
         heap_sort_by_key(own_edges, |edge| *edge);
         let edge_count = remove_repeated(own_edges);
-        let mut used = 0;
+        let mut used = 0; // at most `at`
         for at in 0..distinct {
             if membership[numbers[at].get()] != Membership::NO_EDGE {
                 numbers[used] = numbers[at];
@@ -402,6 +409,8 @@ impl<'s, I: Index> Graph<'s, I> {
 
     /// Whether an edge between two corners of the outline that are not neighbours is visible. The
     /// corners are given by their indices.
+    // `right` is not empty: `first` is less than `last`, because the outline has no vertex twice,
+    // and `visibility` has excluded neighbours.
     fn is_isolated_edge_visible(&self, first: usize, last: usize, outline: &[I]) -> bool {
         let [start, end] = [first, last].map(|slot| self.point(outline[slot]));
         let right = &outline[first + 1..last];
@@ -468,7 +477,7 @@ impl<'s, I: Index> Graph<'s, I> {
 
 /// Keeps the first of each run of equal edges and returns how many are left.
 fn remove_repeated<I: Index>(edges: &mut [[I; 2]]) -> usize {
-    let mut kept = 0;
+    let mut kept = 0; // at most `at`
     for at in 0..edges.len() {
         if kept == 0 || edges[kept - 1] != edges[at] {
             edges[kept] = edges[at];

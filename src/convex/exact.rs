@@ -47,6 +47,7 @@ impl Plane {
         match eye {
             Eye::At(position) => dot(
                 self.normal,
+                // An axis is 0, 1 or 2, so the indexing cannot fail.
                 [0, 1, 2].map_each(|axis| position[axis] - i64::from(self.origin[axis])),
             ),
             Eye::Towards(direction) => dot(self.normal, direction),

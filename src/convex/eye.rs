@@ -38,6 +38,7 @@ impl Eye {
         }
         let square = i64::from(extent) * i64::from(extent); // at most 2^62
         let centre = centre.map_each(i64::from);
+        // An axis is 0, 1 or 2, so no indexing below can fail.
         let (ray, nearest) = match self {
             Self::At(position) => {
                 ([0, 1, 2].map_each(|axis| position[axis] - centre[axis]), square)

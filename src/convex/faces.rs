@@ -194,7 +194,7 @@ fn flat_solid<I: Index>(
         polygon.enclose(points, &viewpoint, *number).map_err(|_| SolidError::EyeInside)?;
     }
     let corners = polygon.corners();
-    let marked = scratch.take::<Corner<I>>(corners.len())?;
+    let marked = scratch.take::<Corner<I>>(corners.len())?; // one for each `at`
     for (at, corner) in corners.iter().enumerate() {
         marked[at] = Corner::new(*corner, false, at + 1 == corners.len());
     }
@@ -231,6 +231,13 @@ pub(super) struct Solid<'s, I> {
     /// The number of vertices in the middle of a face or an edge.
     pub(super) flat: usize,
 }
+
+// No index can fail. Vertices are numbers of `points`; edges and faces are numbered as they are
+// found. All tests are exact, so each face and each edge of the solid is found once. By Euler they
+// are at most as many as `faces` and `edges` hold, and the perimeter holds different edges. The
+// candidates are different vertices, because a corner of the outline has left them with its last
+// segment before it is added again; so they fit, as do those `on_plane`. A segment of the perimeter
+// lacks a face, whose corners are candidates still: at least three vertices are `on_plane`.
 
 /// Finds the faces of a solid, one after the other, as Harrison does. It holds what is found so
 /// far.
@@ -285,6 +292,7 @@ impl<'s, I: Index> FaceFinder<'s, I> {
         let perimeter = scratch.take::<I>(most_edges(count))?;
         let segments_from = scratch.take::<I>(points.len())?;
         let edges = scratch.take::<HullEdge<I>>(most_edges(count))?;
+        // Three numbers for each face, so the cast cannot fail.
         let faces = bytemuck::cast_slice_mut(scratch.take::<I>(3 * most_faces(count))?);
         let on_plane = scratch.take::<I>(count)?;
         let [a, b, c, _] = inside;
@@ -390,7 +398,7 @@ impl<'s, I: Index> FaceFinder<'s, I> {
         polygon.begin_with(from);
         let corners = polygon.corners();
         let face = I::new(self.face_count); // below 2^15
-        let spread = corners.len() / 3;
+        let spread = corners.len() / 3; // a polygon has 3 corners at least
         self.faces[self.face_count] = [corners[0], corners[spread], corners[2 * spread]];
         self.face_count += 1;
         self.flat += on_plane_count - corners.len();

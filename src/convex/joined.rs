@@ -15,6 +15,16 @@ use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::{Cancel, OutOfScratch, Scratch};
 
+// Why no index in this file can fail:
+// * `from`, `to`, the corners of faces and the vertices `inside` are numbers of `solid.points`,
+//   because `FaceFinder` takes them all from the list of vertices. `next` and `corners` are as long
+//   as `solid.points`.
+// * Both faces of each edge are numbers of `solid.faces`: an edge leaves the perimeter only when it
+//   gets a face that it lacks, and the outline does so twice; each search ends only when the
+//   perimeter is empty. `joined` is as long as `solid.faces`.
+// * `joined` holds numbers of faces, or `NONE`, which is only compared: `join_faces` goes on until
+//   no face is undecided, so `hand_over` meets no `NONE`.
+
 /// Joins faces of one solid that are meant to be one face and differ only by rounding.
 #[derive(Debug)]
 pub(super) struct Joining<'s, I> {
@@ -217,6 +227,8 @@ impl<'s, I: Index> Joining<'s, I> {
             count += 1;
         }
         let start = start?;
+        // `count` is the number of different vertices from which a side leads on, so `corners` has
+        // as many, and it is at least 1 here.
         let mut at = start;
         for corner in &mut self.corners[..count] {
             if at == I::NONE {

@@ -8,6 +8,11 @@ use crate::index::Index;
 use crate::model::Corner;
 use crate::stage::heap_sort_by_key;
 
+// No indexing of points by the number of a vertex can fail, because each number is below
+// `points.len()`: the lists of numbers are made by counting the points and then only become
+// shorter, and `from_edges` refuses ends of edges that are no vertices before it calls anything
+// here. An axis is 0, 1 or 2.
+
 /// Returns the longest side of the bounding box of the points.
 pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32 {
     let extent = |axis: usize| {
@@ -30,7 +35,8 @@ pub(super) fn drawn_in_eye<I: Index>(
 ) -> Eye {
     let tolerance = precision.written.saturating_mul(16);
     let corners = numbers.iter().map(|number| points[number.get()]);
-    let count = numbers.len().max(1) as i64; // at most 2^14
+    // At most 2^14, and at least 1, so the division below cannot fail.
+    let count = numbers.len().max(1) as i64;
     let mean = |axis: usize| {
         let sum: i64 = corners.clone().map(|point| i64::from(point[axis])).sum();
         (sum / count) as i32
@@ -69,6 +75,7 @@ pub(super) fn weld<I: Index>(points: &[Point], numbers: &mut [I]) -> usize {
     heap_sort_by_key(numbers, |number| (points.get(number.get()), *number));
     let mut kept = 0;
     for at in 0..numbers.len() {
+        // `kept` grows by 1 at most in each round, so it is at most `at`.
         let number = numbers[at];
         let same_place = kept > 0 && points[numbers[kept - 1].get()] == points[number.get()];
         if !same_place {
@@ -103,6 +110,7 @@ pub(super) fn span<I: Index>(points: &[Point], numbers: &[I]) -> Span<I> {
 /// each position.
 pub(super) fn first_at_place<I: Index>(points: &[Point], welded: &[I], number: I) -> I {
     let position = points[number.get()];
+    // The search finds an index of `welded`.
     welded
         .binary_search_by_key(&position, |other| points[other.get()])
         .map_or(number, |at| welded[at])

@@ -10,6 +10,16 @@ use super::exact::{Point, Viewpoint};
 use crate::array::{MapEach, rotate_left};
 use crate::index::Index;
 
+// Why no index in this file can fail:
+// * A corner is a number of `points`, because the callers make a polygon from such numbers only,
+//   and enclose such numbers only.
+// * `count` is at least 3: it begins with 3, and `enclose` makes it `count - replaced + 2` with
+//   `replaced` below `count`. So there is no division by zero either.
+// * `count` is at most the length of `corners`. The callers give room for each different number
+//   that they enclose, those of the triangle included, and these are 3 at least. No number is among
+//   the corners twice: a turn is the exact sign of a determinant, so the polygon is convex, and a
+//   point that is a corner already is beyond none of its sides, and is not added.
+
 /// The corners of the polygon in counter-clockwise order, no three of them in line on the page.
 #[derive(Debug)]
 pub(super) struct Polygon<'s, I> {
@@ -91,6 +101,7 @@ impl<'s, I: Index> Polygon<'s, I> {
         if (start, end) == (None, None) {
             return if first_is_beyond { Err(Surrounded) } else { Ok(()) };
         }
+        // `start` is below `count`, and `end` is at most `count`.
         let (mut start, mut end) = (start.unwrap_or(0), end.unwrap_or(count));
         // A neighbouring side in line with the point is replaced too, as otherwise a corner would
         // remain in the middle of a side.
@@ -109,7 +120,8 @@ impl<'s, I: Index> Polygon<'s, I> {
             return Err(Surrounded);
         }
         rotate_left(&mut corners[..count], start);
-        // Sides 0 to `replaced` - 1 are replaced by two sides that meet in the new point.
+        // Sides 0 to `replaced` - 1 are replaced by two sides that meet in the new point. As many
+        // corners as before are left, one more, or fewer; there is room for them (see above).
         corners.copy_within(replaced..count, 2);
         corners[1] = number;
         self.count = count - replaced + 2;
