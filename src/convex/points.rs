@@ -10,8 +10,8 @@ use crate::stage::heap_sort_by_key;
 
 // No indexing of points by the number of a vertex can fail, because each number is below
 // `points.len()`: the lists of numbers are made by counting the points and then only become
-// shorter, and `from_edges` refuses ends of edges that are no vertices before it calls anything
-// here. An axis is 0, 1 or 2.
+// shorter, and `from_edges` refuses ends of edges that are no vertices before it hands any to a
+// function here. An axis is 0, 1 or 2.
 
 /// Returns the longest side of the bounding box of the points.
 pub(super) fn largest_extent(points: impl Iterator<Item = Point> + Clone) -> u32 {
