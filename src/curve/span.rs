@@ -5,6 +5,14 @@ use super::{FRACTION_BITS, GREATEST_ORDER, Parameter};
 /// The greatest number of Bézier points of a polynomial, one more than the highest degree.
 const POINTS: usize = GREATEST_ORDER as usize;
 
+// Why no index in this file can fail, and no division: `degree` is at most 5, because `Spline::new`
+// refuses other orders than 2 to 6 and `Spline::load` holds as many control points as the order. It
+// is 0 before a span is loaded, and at least 1 in the two conversions. `points` and `powers` have
+// entries 0 to 5, and `BINOMIAL` has rows and columns 0 to 6. All indices of points and powers are
+// from 0 to `degree`: where one lower is read, the loop begins at 1, and where one higher is read,
+// it ends before `degree`. `around` has 10 knots, and the greatest index of a knot is
+// 2 `degree` - 1. An axis is 0, 1 or 2.
+
 /// A polynomial of degree 1 to 5, given by its Bézier points in units of 2^-[`FRACTION_BITS`].
 ///
 /// Coordinates are within ±2^38, so a difference times a number of 23 bits fits in 62 bits.
@@ -67,6 +75,7 @@ impl Span {
             // a multiple of every C(degree, i). The coefficients are now below 2^5 5! C(degree, i)
             // 2^30, so no sum exceeds 2^54.
             for (j, point) in self.points.iter_mut().enumerate().take(order) {
+                // Since i <= j <= degree, C(degree, i) is not 0.
                 let sum: i64 =
                     (0..=j).map(|i| BINOMIAL[j][i] * (60 / BINOMIAL[degree][i]) * powers[i]).sum();
                 point[axis] = divide_rounding(sum << FRACTION_BITS, 60 * factorial);
