@@ -251,6 +251,8 @@ pub fn build_graph<I: Index>(
     let available = size_of_val(words);
     let point_bytes = 2 * count * (size_of::<PagePoint>() + 2 * size_of::<I>());
     let spare = available.saturating_sub(point_bytes) / size_of::<LineOf<I>>();
+    // In both cases it is at least `count`. So no index of a line below can fail: `kept` is at most
+    // `at`, which is below `count`, and `spread` packed lines take as much room as a numbered one.
     let room = if differ { (2 * count).min(spare).max(count + count / 4 + 8) } else { count };
     let line_words = Scratch::bytes_for::<LineOf<I>>(room) / 8;
     let missing = OutOfScratch { needed: line_words * 8, available };
@@ -294,6 +296,7 @@ pub fn build_graph<I: Index>(
     };
 
     // Shrink each line, of six numbers, to its segment, of three, in place, from front to back.
+    // `ink_once` returns no more segments than `lines` has room for, so all of these numbers exist.
     let numbers: &mut [I] = bytemuck::cast_slice_mut(&mut *line_memory);
     for at in 0..segments {
         let line: [I; 6] = core::array::from_fn(|number| numbers[6 * at + number]);
@@ -305,6 +308,7 @@ pub fn build_graph<I: Index>(
 
     let stored = Stored::of_counts([segments, points]);
     let point_words = Scratch::bytes_for::<PagePoint>(points) / 8;
+    // The points lie at the front of what is behind the lines, and segments are shorter than these.
     words.copy_within(line_words..line_words + point_words, stored.segment_bytes() / 8);
     Ok(stored)
 }

@@ -244,6 +244,8 @@ pub(super) fn ink_once<I: Index>(
         }
         last = Some(key);
     }
+    // `ends[0]` is at most `count`: a piece was stored there only while it was at most `read`. And
+    // `ends[1]` is at most the length, where `get_mut` has refused to store. So both ranges exist.
     segments.copy_within(count..ends[1], ends[0]);
     Ok(ends[0] + ends[1] - count)
 }

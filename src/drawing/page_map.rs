@@ -106,6 +106,8 @@ impl PageMap {
         page: &Page,
         steps: StepsPerMillimetre,
     ) -> Result<Self, PageError> {
+        // The limits of `clamp` are in order, because `field` is not negative: `View::field`, from
+        // which it comes, returns the quotient of positive numbers.
         let limited = Bounds {
             low: bounds.low.map(|low| low.clamp(-field, field)),
             high: bounds.high.map(|high| high.clamp(-field, field)),
@@ -231,6 +233,7 @@ impl PageMap {
     /// |c| and w must be below 2^52, so that it is below 2^42 2^52 + 2^(44 + 21) 2^52 < 2^118.
     #[inline(never)] // Its 128-bit arithmetic is long.
     fn times_w(&self, axis: usize, c: i64, w: i64) -> i128 {
+        // The callers have an axis for x and one for y, 0 and 1, so the indexing cannot fail.
         product(self.a[axis], c) + self.b[axis] * i128::from(w)
     }
 

@@ -40,6 +40,7 @@ impl Window {
         let (mut enter, mut leave) = ((0, 1), (1, 1));
         let later = |a: (i64, i64), b: (i64, i64)| product(a.0, b.1) > product(b.0, a.1);
         for axis in [0, 1] {
+            // A point has two coordinates, so no indexing by `axis` can fail.
             // How far the line runs outwards across a border, and how far inside its start lies.
             for (outward, inside) in [
                 (-along[axis], from[axis] - self.low[axis]),
