@@ -100,6 +100,7 @@ impl<'a, I: Index> Elements<'a, I> {
     /// are ignored.
     pub fn with_pens(corners: &'a [Corner<I>], pens: Pens<'a, I>) -> Self {
         let whole = corners.iter().rposition(|corner| corner.is_last()).map_or(0, |last| last + 1);
+        // `whole` is 0, or one more than an index of `corners`, so there are as many.
         Self { corners: &corners[..whole], pens }
     }
 

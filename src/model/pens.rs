@@ -129,6 +129,7 @@ pub(super) fn close_gap<I: Index>(
 ) -> usize {
     let (mut kept, mut last) = (0usize, 0);
     for at in 0..count.min(runs.len()) {
+        // `kept` grows by 1 at most in each round, so it is at most `at`. No index here can fail.
         let (before, pen) = (runs[at].first(), runs[at].pen());
         // It only becomes less, so it fits.
         let first = if before >= gone.end { before - gone.len() } else { before.min(gone.start) };
@@ -155,6 +156,8 @@ pub(super) fn open_gap<I: Index>(
     pen: u8,
 ) -> usize {
     let end = at + length;
+    // No index below can fail: `next` is at most `count`, and so is `index`; and `count`, which
+    // grows by 2 at most, stays within `runs`, which have room for two more.
     let next = runs.iter().take(count).take_while(|run| run.first() < at).count();
     let before = next.checked_sub(1).map_or(0, |last| runs[last].pen());
     let mut after = before;
@@ -221,7 +224,7 @@ impl PenBook {
                 let pen = self.names.iter().position(|name| *name == hash);
                 let pen = pen.or_else(|| self.names.iter().position(|name| *name == FREE));
                 let pen = pen.ok_or(ModelError::TooManyPens)?;
-                self.names[pen] = hash;
+                self.names[pen] = hash; // `position` found it there
                 pen as u8
             }
         };

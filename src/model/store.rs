@@ -94,6 +94,8 @@ impl<'m, I: Index> Store<'m, I> {
     }
 
     /// Returns the changes of the pen, in the order of the elements.
+    // The casts here and below cannot fail: the region grows and shrinks by whole changes of the
+    // pen, and `replace` gets the ends that the regions once had.
     pub(super) fn pen_runs(&self) -> &[PenRun<I>] {
         bytemuck::cast_slice(self.region(Region::PenRuns))
     }

@@ -54,6 +54,7 @@ impl<I: Index> Model<'_, I> {
         ]
         .map(|number| number as u32);
         *rest.first_chunk_mut()? = names;
+        // What is taken is as long as what is copied to it.
         scratch.take::<Position>(self.vertices.len()).ok()?.copy_from_slice(&self.vertices);
         scratch.take::<I>(halves.len()).ok()?.copy_from_slice(halves);
         Some(())

@@ -10,12 +10,14 @@ use core::ops::Range;
 impl<I: Index> Model<'_, I> {
     /// Deletes the elements of a kind in `range`. If `plug`, the last element replaces the deleted
     /// one.
+    // `Model::range` has made the range: it is not empty, and all elements in it exist. So the
+    // vertices that are swapped or moved here exist, and there is a last one.
     pub(super) fn delete(&mut self, part: ElementKind, range: Range<usize>, plug: bool) {
         match part {
             ElementKind::Vertices => {
                 let gone = range.len();
                 if plug {
-                    let last = self.vertices.len() - 1; // the range is not empty
+                    let last = self.vertices.len() - 1;
                     self.vertices.swap(range.start, last);
                     self.vertices.truncate(last);
                 } else {

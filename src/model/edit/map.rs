@@ -16,6 +16,9 @@ pub(super) const SCALE_LIMIT: i64 = 1 << (20 + UNIT_BITS);
 /// fits 64 bits.
 const NORMAL_BITS: u32 = 28;
 
+// No index in this file can fail: a row, a column and an axis have a number from 0 to 2, and are
+// indices of arrays of three.
+
 /// How an edit moves vertices: a matrix and a shift, or a reflection.
 pub(super) enum Map {
     /// The rows of a matrix in units of 2^-[`UNIT_BITS`], and the vector that is added.
