@@ -10,6 +10,14 @@ use crate::array::MapEach;
 use crate::index::Index;
 use core::ops::Range;
 
+// Why no index in this file can fail:
+// * A leg has a number below `legs.len()`, because it is a chain of the network, or the gap, which
+//   has the number after those. `places` is as long as `legs`.
+// * `places` holds indices of `legs`: it begins with zeros, and nothing else is written to it.
+// * The difference of two indices, in either direction, is below `legs.len()`. So a stretch that is
+//   turned begins at an index, and is at most as long as the cycle. Where it passes the end of
+//   `legs` it goes on at 0.
+
 /// The cycle, and how it changed since it was last [settled](Cycle::settle).
 pub(super) struct Cycle<'s, I> {
     /// The legs of the tour, in the order in which they are drawn.

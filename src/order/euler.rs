@@ -16,6 +16,14 @@ use crate::drawing::PagePoint;
 use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
+// Why no index in this file can fail:
+// * A station is below the length of `mate`, which has an entry for each: it is an end of a chain,
+//   or comes from a list of stations, or is a partner in `mate`. `lift` tests for the other marks.
+// * `used` has an entry for each chain, and each leg is that of a chain.
+// * `trace` gets room for each chain that is not used yet. Each leg before `traced` and from
+//   `finished` on is another of these. So `traced` is below `finished` when a leg is added, and
+//   `finished` is not 0 when one is moved there. `done` counts chains, so it is within the route.
+
 /// What remains to be traced: the chains (runs of segments) and the pen-up moves that no trail has
 /// used yet.
 pub(super) struct Unused<'s, 'a, I> {

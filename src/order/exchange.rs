@@ -44,6 +44,10 @@ pub(super) struct Step<I> {
     pub third: Option<(Leg<I>, bool)>,
 }
 
+// No index can fail: `is_waiting` lets a number in only if it is that of a station which is not in
+// the queue. So `count` is below the length of `queue` before one is added; and `first` is below it
+// too while `count` is not 0.
+
 /// A queue of the stations around which an exchange may help, because a move near them has changed.
 /// Each station is in it at most once.
 struct Waiting<'s, I> {

@@ -252,11 +252,13 @@ fn choose<I: Index>(
             let is_chosen =
                 |segment: &&Segment<I>| segment.pen() == pen && parts.has_chosen(segment);
             if segments.get(index).filter(is_chosen).is_some() {
+                // It counts some of the segments before `index`.
                 segments.swap(first.segments, index);
                 first.segments += 1;
             }
         }
     }
+    // At most all of them were counted.
     let (chosen, _) = segments.split_at_mut(first.segments);
     arrange(points, chosen, corner, options, scratch, cancel)?;
     first.odd_points = odd;
@@ -289,7 +291,7 @@ fn arrange<I: Index>(
             *slot = Segment::new(from, to).inked(segment.line_type(), segment.pen());
         }
     }
-    segments.copy_from_slice(arranged);
+    segments.copy_from_slice(arranged); // as long as what was taken
     Ok(())
 }
 

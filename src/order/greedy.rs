@@ -168,6 +168,8 @@ impl<'s, I: Index> Shortcuts<'s, I> {
 }
 
 /// Finds the two nearest unpaired points of `chooser`.
+// No index from here on can fail: loops and `around` count points to `real_count`; `choices` has as
+// many entries, and `mate` two more if there are free ends.
 fn choose<I: Index>(
     odd: &OddPoints<'_, I>,
     mate: &[I],

@@ -140,6 +140,7 @@ pub(super) fn improve<'t, I: Index>(
         let starts = if network.anchor().is_some() { 1 } else { CORNERS.len() };
         for corner in CORNERS.into_iter().take(starts) {
             best.follow(mate, None, Some(corner), cycle, scratch.reborrow(), work_budget)?;
+            // A cycle is as long as the route, or longer by the gap. So no split of it can fail.
             let (route, _) = cycle.split_at(best.route.len());
             let length = route_moves(network, route, open).sum();
             if length < shortest.0 {
@@ -313,7 +314,7 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
         work_budget: &mut WorkBudget<'_>,
     ) -> Result<(), OrderError> {
         let moves: &mut [I] = scratch.take(mate.len())?;
-        moves.copy_from_slice(mate);
+        moves.copy_from_slice(mate); // as long as what was taken
         let mut unused = Unused::new(self.network, moves, &mut scratch)?;
         let start = match corner {
             Some(corner) => {
@@ -325,6 +326,7 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
             }
             None => start,
         };
+        // Every caller gives a cycle that is as long as the route, or longer by the gap.
         let (route, _) = cycle.split_at_mut(self.route.len());
         unused.nearest_first(start, Some(self.neighbours), route, work_budget)
     }
@@ -344,6 +346,7 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
 
     /// Copies the shortest tour found so far into `cycle`, to be changed there.
     fn restore(&self, cycle: &mut [Leg<I>]) {
+        // As in `follow`.
         let (route, _) = cycle.split_at_mut(self.route.len());
         route.copy_from_slice(self.route);
     }
@@ -360,6 +363,7 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
     ) -> Result<bool, OrderError> {
         let mut scratch = scratch.reborrow();
         let chains = self.network.chains();
+        // As in `follow`.
         let (_, gap) = cycle.split_at_mut(self.route.len());
         gap.fill(Leg::new(chains, false));
         let gap = self.open.then_some(chains);
@@ -460,7 +464,7 @@ impl<'b, 'a, I: Index> Best<'b, 'a, I> {
             return;
         }
         self.cost = cost;
-        let legs = tour.cycle.len();
+        let legs = tour.cycle.len(); // at least 1, because a pen without segments has no tour
         let leg = |index: usize| tour.cycle.leg(index % legs);
         let gap = (0..legs).find(|&index| tour.is_gap(leg(index)));
         let start = gap.map_or(0, |gap| gap + 1);

@@ -6,6 +6,10 @@ use super::network::Network;
 use crate::index::Index;
 use crate::stage::{OutOfScratch, Scratch};
 
+// No index can fail: `first` has an entry for each station and `next` one for each leg. Both hold
+// codes of legs, or `NONE`, for which `leg` and `drop_first` test. Who asks has a station of the
+// network, or a leg that came from here.
+
 /// For each station (each point where the pen may stop), the list of the legs that begin there, in
 /// ascending order of their codes.
 pub(super) struct Incidence<'s, I> {

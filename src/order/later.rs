@@ -143,7 +143,7 @@ fn improve_legs<I: Index>(
     // The rest becomes a drawing of its own, whose segments lie in the order that is improved.
     let segments: &mut [Segment<I>] = scratch.take(rest.len())?;
     let before: &mut [Leg<I>] = scratch.take(rest.len())?;
-    before.copy_from_slice(rest);
+    before.copy_from_slice(rest); // as long as what was taken
     for (slot, leg) in segments.iter_mut().zip(rest.iter()) {
         let Some(segment) = drawing.segments.get(leg.segment()) else { return Ok(()) };
         let [from, to] = ends(segment, *leg);

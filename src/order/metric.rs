@@ -60,6 +60,7 @@ pub(super) fn measure<I: Index>(
 ) {
     let y_in_x = y_in_x(options.steps);
     let length = |a, b| true_length(a, b, y_in_x);
+    // The legs of a tour are segments of its drawing, and `check` has seen that their points exist.
     let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
     let closing = match options.shape {
         Shape::OpenPath => None,

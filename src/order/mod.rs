@@ -302,11 +302,14 @@ fn order_pens<I: Index>(
     let mut anchor = anchor;
     while let Some(pen) = next_pen {
         let count = pens().filter(|&other| other == pen).count();
+        // Each segment has one pen, so all counts together are the length of `tour`.
         let (legs, others) = rest.split_at_mut(count);
         rest = others;
         let scratch = scratch.reborrow();
         let from = core::mem::take(&mut anchor);
         order_pen(drawing, pen, options, from, scratch, &mut work_budget, legs, report)?;
+        // `expand` has written all of these legs: the route has each chain, and each segment of the
+        // pen lies in a chain. They name segments of `drawing`, and `check` has seen their points.
         let position = |leg: Leg<I>| drawing.points[start_point(drawing.segments, leg).get()];
         if let (Some(at), Some(&first), Some(&last)) = (pen_at, legs.first(), legs.last())
             && length(at, position(last.flipped())) < length(at, position(first))
@@ -371,7 +374,7 @@ fn order_pen<'a, I: Index>(
         {
             let mut scratch = scratch.reborrow();
             let unused: &mut [I] = scratch.take(mate.len())?;
-            unused.copy_from_slice(mate);
+            unused.copy_from_slice(mate); // as long as what was taken
             Unused::new(network, unused, &mut scratch)?.nearest_first(
                 start,
                 None,
@@ -419,6 +422,8 @@ fn mark_parts<I: Index>(
     mut scratch: Scratch<'_>,
     marks: &mut [I],
 ) -> Result<Parts, OutOfScratch> {
+    // No index below can fail: `marks`, `odd` and `lowest` have an entry for each station, chains
+    // begin at stations, and `lowest` holds stations.
     let odd: &mut [u8] = scratch.take(marks.len())?;
     for code in I::below(network.chains() << 1) {
         odd[network.start(Leg::from_code(code)).get()] ^= 1;
@@ -457,6 +462,7 @@ fn turn<I: Index>(network: Network<'_, I>, shape: Shape, route: &mut [Leg<I>]) {
     let x_of = |leg: &Leg<I>| network.position(network.start(*leg)).x;
     match shape {
         Shape::ClosedCycle => {
+            // `index` counts to the length of the route.
             let first = (0..route.len()).min_by_key(|&index| x_of(&route[index]));
             rotate_left(route, first.unwrap_or(0));
         }

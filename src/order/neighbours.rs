@@ -78,6 +78,7 @@ impl<'a, I: Index> Neighbours<'a, I> {
         let count = network.stations();
         let cells = Cells::new(network, count, &|station| station, &mut lent)?;
         let grid = Grid { network, cells };
+        // `per_station` is 8 or 4, and `entries` is as much or twice as much.
         for (station, list) in I::all().zip(lists.chunks_exact_mut(entries)) {
             grid.search(station, &mut list[..per_station], work_budget)?;
             if I::HAS_ROOM {
@@ -157,6 +158,8 @@ impl<I: Index> Grid<'_, '_, I> {
         if row < 0 || row >= rows || from > to {
             return &[];
         }
+        // The cell is in the grid, so it has an entry in `begin`, and so has the end of the last
+        // cell. The entries ascend, and the last is the number of points.
         let begin = |column| begin[(row * columns + column) as usize].get();
         &self.cells.points[begin(from)..begin(to + 1)]
     }
@@ -175,6 +178,7 @@ impl<I: Index> Grid<'_, '_, I> {
             true => u64::MAX,
             false => self.network.square(station, other),
         };
+        // At least 1. Below, `quadrant` is at most 3, so four quadrants have their place in `near`.
         let per_quadrant = near.len() / 4;
         let mut enough = None;
         for ring in 0..self.cells.columns.max(self.cells.rows) {
@@ -228,6 +232,7 @@ fn insert<I: Index>(list: &mut [I], station: I, distance: impl Fn(I) -> u64) {
     }
     *last = station;
     for index in (1..list.len()).rev() {
+        // Both `index` and the one before it are indices of the list.
         if (distance(list[index - 1]), list[index - 1]) <= own {
             break;
         }

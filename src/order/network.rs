@@ -43,6 +43,17 @@ enum Stops {
     All,
 }
 
+// Why no index in this file can fail:
+// * The ends of a segment are below `points.len()`: `check` refuses other segments before they are
+//   ordered, and those that are chosen as the first come from `build_graph`, which numbers the
+//   points. `degree`, `across`, `part`, `station_of` and the points themselves are equally many.
+// * `lay_chains` writes numbers of points to `at`, and indices of `at` to `ends`.
+// * A leg of the network has a number below `chains`, the length of `ends` and of `outer`: those
+//   who have legs made them by counting to `chains`. The gap of an open path has the next number,
+//   but `Exchanges::end` keeps it from the network.
+// * `next_leg` is called only where exactly two segments of the pen meet, because a chain ends at
+//   any other point. There the exclusive or of both numbers and one of them is the other.
+
 /// The stations and chains of one pen. A chain is numbered like a segment: a [`Leg`] of a chain
 /// holds the number of the chain and the direction in which it is drawn.
 #[derive(Debug, Clone, Copy)]

@@ -69,11 +69,13 @@ impl<'a, I: Index> OddPoints<'a, I> {
         &self,
         scratch: &mut Scratch<'s>,
     ) -> Result<Remaining<'s, I>, OutOfScratch> {
+        // `Remaining` asks for the numbers below `real_count` only, of which each has a station.
         let station = |odd: I| self.stations[odd.get()];
         Remaining::new(self.network, self.real_count(), &station, scratch)
     }
 
     /// Returns the position of an odd point that is no free end.
+    // Each caller has a number below `real_count`, so the station exists.
     pub fn position(&self, odd: I) -> PagePoint {
         self.network.position(self.stations[odd.get()])
     }

@@ -26,6 +26,9 @@ pub(super) fn orient<I: Index>(
     // which then ends where it began. The first stroke is not reversed.
     let mut least = [0, i64::MAX / 2];
     let (mut ends, mut first_start, mut old) = ([I::NONE; 2], I::NONE, 0);
+    // No index below can fail: each stroke has at least one leg, and the walk ends at the leg where
+    // it began. So there are no more strokes than legs, and `choices` has an entry for each of
+    // these. A direction is 0 or 1.
     let mut strokes = 0;
     let mut leg = begin;
     loop {

@@ -29,6 +29,7 @@ pub(super) fn pair_odd<I: Index>(
     let partners: &mut [I] = scratch.take(odd.count().get())?;
     report.bound += pair_points(&odd, options.method, scratch, work_budget, partners)?;
     for (&station, &partner) in stations.iter().zip(partners.iter()) {
+        // The station is an index of `mate`, where its mark was found.
         mate[station.get()] = odd.station(partner).unwrap_or(I::NONE);
     }
     if !odd.has_free_ends() {
@@ -37,6 +38,8 @@ pub(super) fn pair_odd<I: Index>(
     if let Some(anchor) = network.anchor() {
         return Ok(free_for_anchor(network, anchor, stations, mate));
     }
+    // There are free ends, and they are the last two of `odd.count()`, the length of `partners`.
+    // That count fits in 16 bits: 2^16 - 2 odd points would take more memory than a board has.
     let ends = odd.free_ends().map_each(|end| partners[end.get()]);
     let ends = ends.into_iter().filter_map(|end| odd.station(end));
     Ok(ends.min_by_key(|&station| (network.position(station).x, station)))

@@ -6,6 +6,9 @@ use crate::index::Index;
 ///
 /// A parent never has a higher number than its child, so the representative does not depend on the
 /// order of the unions.
+// No index can fail: each entry of `parent` is a member, because `singletons` makes it the member
+// itself and the others make it another parent; and the callers name members only, which are points
+// at the ends of segments, stations at the ends of chains, or the partners of stations.
 #[derive(Debug)]
 pub(super) struct Partition<'a, I> {
     /// The parent of each member; a representative is its own parent.

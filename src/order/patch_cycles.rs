@@ -37,6 +37,8 @@ pub(super) fn patch_cycles<I: Index>(
             parts.unite(station, mate);
         }
     }
+    // No index below can fail: `mate` has an entry for each station, a neighbour is a station, and
+    // what `is_move` lets through is the partner of one.
     let mut allowance = FIRST_ALLOWANCE;
     let mut apart = true;
     while core::mem::take(&mut apart) {

@@ -32,7 +32,7 @@ impl<'s, I: Index> Remaining<'s, I> {
         let cells = Cells::new(network, count, station, scratch)?;
         let ends = cells.begin.get(1..).unwrap_or(&[]);
         let end: &mut [I] = scratch.take(ends.len())?;
-        end.copy_from_slice(ends);
+        end.copy_from_slice(ends); // as long as what was taken
         Ok(Self { cells, end })
     }
 

@@ -73,6 +73,9 @@ impl<I: Index> Node<I> {
     }
 }
 
+// Why no index in this file can fail is said beside the struct `Matching`. Besides, `within` climbs
+// from a vertex of `blossom` through the nodes that contain it, of which one lies in the ring of
+// `blossom`; so it ends before a parent is `NONE`. `position` goes around a ring that has the node.
 impl<I: Index> Matching<'_, '_, I> {
     /// Puts all blossoms, none of which is in use yet, in a list from which new ones are taken.
     pub(super) fn lay_out_spares(&mut self) {

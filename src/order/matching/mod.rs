@@ -83,6 +83,25 @@ pub(super) fn pair<'s, I: Index>(
     Ok(matching.length())
 }
 
+// Why no index in this module can fail:
+// * A vertex is below `odd.count()`, the length of `top`, `mate`, `label`, `radius`, `when` and
+//   `best`. Loops count to it, and ranges of odd points and of free ends are within it. `top` has a
+//   node for each vertex, and `best` a vertex: it begins with zeros, and only `note` changes it.
+// * A node is below the length of `nodes`: a vertex, or a blossom in use or in the list of spare
+//   ones. A blossom in use makes the outermost nodes fewer by two at least, because its ring has
+//   three nodes or more. So fewer than half as many blossoms as vertices are in use, one of the
+//   spare ones is always left, and `slack_inside` has an entry for each. 16 bits are enough for
+//   their numbers, because 2^16 nodes would take more memory than a board has.
+// * The base of a node in use is a vertex in it. It is `NONE` only in blossoms not in use, which
+//   `is_outermost` keeps out. The links of a ring are pairs of vertices, and so is the link of an
+//   inner outermost node: `grow_tree` and `open_inner` set it when the node becomes inner.
+// * `mate` of the base of an outermost node is `NONE` or a vertex, and `NONE` is tested for. The
+//   partner of the base of an outer node lies in an inner one, because each outer node but the root
+//   has entered the tree as the partner of an inner one.
+// * `next_touch` always finds a vertex: the number of vertices is even, so one that is unmatched is
+//   left besides the root. The root is examined first, no radius of an unmatched vertex is
+//   negative, and pairs are lighter than `NEVER`.
+
 /// The matching while it is being found: the pairs so far, their duals (see the module
 /// documentation), and the present tree.
 struct Matching<'s, 'a, I> {

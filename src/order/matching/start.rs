@@ -6,6 +6,8 @@ use crate::index::Index;
 use crate::order::OrderError;
 use crate::order::work_budget::WorkBudget;
 
+// No index can fail: all vertices here are counted to `odd.count()`, the length of `radius` and of
+// `mate`, and `touched` is one of them when `mate.get` finds it.
 impl<I: Index> Matching<'_, '_, I> {
     /// Makes a starting solution: large duals without overlap, and a match of each pair that then
     /// touches.
