@@ -69,6 +69,7 @@ impl<I: Index> Touching<I> {
     fn corner(&self, edge_side: EdgeSide) -> Option<I> {
         let wanted = if edge_side.is_left { 1 } else { -1 };
         let found = self.sides.iter().position(|&side| side == wanted)?;
+        // There are as many corners as sides.
         Some(self.corners[found])
     }
 

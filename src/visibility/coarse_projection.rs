@@ -258,6 +258,9 @@ fn fine(projection: Projection, vertex: Vertex) -> (i64, i64) {
     let fine = |coordinate: i32| i64::from(coordinate) << 20;
     match projection {
         Projection::Perspective => {
+            // The depth is not zero. `check` refuses a vertex level with the eye, the end of a seam
+            // is rounded from between two vertices, and the tiles ask only for what is not nearer
+            // than the near plane, whose depth is at least 1 (`View::near`).
             let depth = i64::from(vertex.z);
             (fine(vertex.x).div_euclid(depth), fine(vertex.y).div_euclid(depth))
         }
@@ -296,6 +299,10 @@ pub struct CoarseProjection<'a> {
     /// Whether the view is perspective or parallel.
     pub projection: Projection,
     /// The view coordinates of each vertex.
+    // Indexing this and `positions` by the number of a vertex cannot fail: each number comes from a
+    // corner of the scene, whose vertex exists (see `check`), and there is a position for each
+    // vertex. An end with the number `End::FREE` is not looked up; it has its vertex and its
+    // position in itself.
     pub vertices: &'a [Vertex],
     /// The position of each vertex on the coarse grid.
     pub positions: &'a [CoarsePoint],

@@ -76,6 +76,7 @@ impl Crease {
 
     /// Whether the angle between two normals with components below 2^20 exceeds the limit.
     fn is_sharp(&self, one: [i64; 3], other: [i64; 3]) -> bool {
+        // A normal has the components 0, 1 and 2.
         let dot = |a: [i64; 3], b: [i64; 3]| (0..3).map(|n| a[n] * b[n]).sum::<i64>(); // below 2^42
         // Compares the cosine of the angle between the normals with the limit. Both are squared and
         // keep their signs; they stay below 2^124.

@@ -49,6 +49,7 @@ type Side<I> = (I, I);
 #[derive(Clone, Copy)]
 pub struct CrossedPolygon<'c, I> {
     /// The numbers of the vertices of the polygon.
+    // There is at least one corner: a polygon is a triangle or has all corners of an element.
     corners: &'c [I],
     /// One bit for each corner: whether it lies to the left of the line.
     pub left: u32,
@@ -89,6 +90,7 @@ impl<'c, I: Index> CrossedPolygon<'c, I> {
 
     /// Returns the side that ends at a corner.
     fn side(&self, end: usize) -> Side<I> {
+        // `passage` counts `end` up to the number of corners, so there is one.
         let begin = end.checked_sub(1).unwrap_or(self.corners.len() - 1);
         (self.corners[begin], self.corners[end])
     }

@@ -26,6 +26,9 @@ impl<'a, I: Index> Outlines<'a, I> {
     }
 
     /// Returns the corners of the element that begins at corner `first`.
+    // Elements are found only by the numbers that `elements_in` and `start_of` give, so `first` is
+    // the number of a corner. The last corner of a scene is marked (see `check`), so the end is
+    // found in `rest`.
     #[inline]
     pub fn element(&self, first: usize) -> &'a [Corner<I>] {
         let rest = &self.corners[first..];
@@ -76,6 +79,9 @@ pub fn sides<I: Index>(corners: &[Corner<I>]) -> impl Iterator<Item = (usize, I,
 #[derive(Debug)]
 pub struct ChosenSides<'a> {
     /// The bits, 32 to a word, the lowest bit first.
+    // There is a bit for each corner of the scene. A side has the number of the corner at which it
+    // begins: that of the first corner of its element plus the number that `sides` gives it. So
+    // indexing by a side cannot fail.
     bits: &'a mut [u32],
 }
 
@@ -119,6 +125,10 @@ impl<'a> ChosenSides<'a> {
         let next: &mut [I] = meantime.take(corners.len())?;
         // This marks the sides whose edges have been found to have a second side.
         let mut shared = ChosenSides { bits: meantime.take(word_count)? };
+        // None of the indexes below can fail. `heads` has an item for each vertex, and `from` and
+        // `to` are vertices (see `check`). `next` has an item for each corner; `side` is the number
+        // of a corner, and so is `known` wherever it is not `NONE`, because nothing but such sides,
+        // `NONE` and the zeros of new memory is ever put into `heads` and `next`.
         heads.fill(I::NONE);
         for (first, element) in outlines.elements() {
             for (number, from, to) in sides(element) {
@@ -206,6 +216,9 @@ impl<'a> ChosenSides<'a> {
 }
 
 /// Returns the number of the first corner of the element to which a corner belongs.
+// In these two functions, `corner` and `side` are numbers of corners, because `choose` passes only
+// what it has found in `heads` and `next`. If the corner at `side` is not the last of its element,
+// there is another one behind it: the last corner of a scene is marked (see `check`).
 fn start_of<I: Index>(corners: &[Corner<I>], corner: usize) -> usize {
     let before = corners[..corner].iter().rposition(|corner| corner.is_last());
     before.map_or(0, |last| last + 1)

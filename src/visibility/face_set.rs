@@ -13,6 +13,9 @@ use core::marker::PhantomData;
 /// A set of ranks of faces, which are numbered by `I`.
 pub struct FaceSet<'a, I> {
     /// One bit for each rank.
+    // Only the ranks of faces are added, and there is a bit for each face of the scene. While the
+    // faces in `Marks::met` are looked through, an empty set stands in its place; nothing is added
+    // to that. `used` holds indices of words to which a rank was added.
     words: &'a mut [u32],
     /// The indices of the words that are not zero, as far as they are recorded.
     used: &'a mut [u32],

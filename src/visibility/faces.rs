@@ -19,6 +19,8 @@ use rayon::slice::ParallelSliceMut;
 #[derive(Debug)]
 pub struct Faces<'a, I: Index> {
     /// The elements, each packed into 32 bits and sorted, so that an index here is a rank.
+    // Indexing by a rank cannot fail. A rank is counted up to `len`, or it is read from where such
+    // a rank was put: a list or a cover of the grid, a set of faces, or the marks of a profile.
     order: &'a mut [I::Pair],
     /// The number of faces that have no area.
     degenerate: u32,
@@ -55,6 +57,7 @@ impl<'a, I: Index> Faces<'a, I> {
         let order: &mut [I::Pair] = scratch.take(outlines.elements().count())?;
         for (key, (first, corners)) in order.iter_mut().zip(outlines.elements()) {
             yield_counter.spend(200 * corners.len())?;
+            // Every corner is the number of a vertex (see `check`).
             let near =
                 corners.iter().map(|corner| vertices[corner.vertex().get()].z).min().unwrap_or(0);
             let depth = ((near + COORDINATE_LIMIT) >> 7) as usize;

@@ -89,8 +89,16 @@ pub struct Grid<'a, I> {
     columns: usize,
     /// For each cell, where its list ends in `entries`, and the face that covers all of it. The
     /// cells are stored row by row, from the lower left of the page.
+    // The number of a cell is its row times `columns` plus its column. It is always an index of
+    // `cells`, because no cell beyond that of `shape.far` is looked up: `far` has the greatest
+    // coordinates of all vertices, so the bounds of a face do not exceed it, and `are_all`,
+    // `cells_along` and `EdgeCells::visit` move what may lie outside the grid back to its border.
     cells: &'a mut [Cell<I>],
     /// The lists of all cells one after the other. An entry is the rank of a face.
+    // The ends of the lists ascend, and the last is the number of entries: `Raster::count` puts at
+    // each cell the sum of the lengths of the lists before, and `Raster::fill` adds the length of
+    // its own. The sums fit `I`, since `new` divides the page only where `most_entries` is at most
+    // `NONE`, and a single cell lists each face once.
     entries: &'a mut [I],
 }
 
@@ -226,6 +234,7 @@ impl<'a, I: Index> Grid<'a, I> {
         if self.cells[cell].cover_depth() != NO_COVER {
             return None;
         }
+        // There is at least one column.
         let area = self.shape.area(cell % self.columns, cell / self.columns);
         let far = around.sheet(&area, self.view(cell, 0).faces)?;
         Some(coarse_depth(far + 1))
@@ -328,7 +337,8 @@ impl<'g, I: Index> EdgeCells<'g, I> {
             let (mut from, mut to) = (left, right);
             if dy > 0 {
                 // The product is rounded down, towards the lower end. It is below 2^30, as the
-                // slope is at most 2^30 / dy.
+                // slope is at most 2^30 / dy. As `dy` is above zero, the limits of `clamp` are in
+                // order.
                 let x_at = |y: i32| low_x + ((self.slope * (y - low_y).clamp(0, dy)) >> 16);
                 let x_below = x_at((row << shift_y) - 1 - margin);
                 let x_above = x_at(((row + 1) << shift_y) + margin);

@@ -355,6 +355,13 @@ fn index<'a, I: Index>(
 }
 
 /// Refuses a scene whose numbers would overflow the arithmetic or that refers to unknown vertices.
+// This module indexes by the numbers of a scene without further checks. What is established here
+// proves that they exist: `scratch_bytes`, `index` and `follow_wire` begin with it, and a scene
+// does not change while it is borrowed. Every corner is the number of a vertex. The number of each
+// corner is below `most_corners`, so it fits `I` and is not `NONE`. In perspective every depth is
+// above zero. Besides, the last corner of a scene is marked as the last of its element: a model
+// marks the last corner of each element, and `Elements::with_pens` cuts off what follows the last
+// mark.
 fn check<I: Index>(scene: &Scene<'_, I>) -> Result<(), VisibilityError> {
     let corners = scene.elements.corners();
     if corners.len() > most_corners::<I>() {

@@ -69,6 +69,9 @@ pub struct ProfilePiece {
 #[derive(Debug)]
 pub struct Profile<'a> {
     /// The memory for the pieces, the first `count` of which are in use.
+    // There are at least `FEWEST_PIECES` (see `Marks::new`), and `count` is from 1 to as many as
+    // there are: `split` makes room before it adds a piece to a full memory, and `join` keeps one.
+    // The pieces begin at ascending places.
     memory: &'a mut [ProfilePiece],
     /// The number of pieces in use.
     count: usize,
@@ -127,6 +130,9 @@ impl<'a> Profile<'a> {
         }
         let first = part.from.map_or(0, |from| self.split(from));
         let last = part.to.map_or(self.count, |to| self.split(to));
+        // `first` pieces begin before the part does, and so before its end. The second `split`
+        // returns how many begin before the end, of those that it has left. So the limits are in
+        // order.
         for piece in &mut self.memory[first.min(self.count)..last.min(self.count)] {
             piece.marks = change(piece.marks);
             if piece.marks & mark::HIDDEN == mark::HIDDEN {
@@ -143,6 +149,8 @@ impl<'a> Profile<'a> {
         if position >= self.end {
             return self.count;
         }
+        // `after` is at most `count`. Behind the returns below it is not zero and still at most
+        // `count`, and a full memory has lost a piece, so there is room for one at `after`.
         let after = self.memory[..self.count].partition_point(|piece| piece.from < position);
         if after == 0 || after < self.count && self.memory[after].from == position {
             return after;

@@ -284,6 +284,8 @@ impl<'c, I: Index> Raster<'c, I> {
             }
             return Ok(());
         }
+        // The visits are those of `count`, because both begin with cells without a cover. So no
+        // list grows beyond where the next one begins, nor the last one beyond `entries`.
         self.visit(coarse_projection, outlines, faces, yield_counter, &mut |cell, rank| {
             entries[cell.end().get()] = rank;
             cell.lengthen();
@@ -315,11 +317,14 @@ impl<'c, I: Index> Raster<'c, I> {
             let bounds = Bounds::of(coarse_projection, corners);
             let mut sides = [HalfPlane::default(); MOST_SIDES];
             let side_count = self.half_planes(coarse_projection, corners, &bounds, &mut sides);
+            // `half_planes` fills at most as many as there are.
             let sides = &sides[..side_count];
             let may_cover = face.is_fan && side_count > 0;
             let [column0, column1, row0, row1] = self.shape.span(&bounds);
             for row in row0..=row1 {
                 yield_counter.spend(200 + 50 * usize::from(column1 - column0))?;
+                // An element has a corner, so its first row and column are not beyond its last, and
+                // these lie in the grid: see `Grid::cells`.
                 let first = usize::from(row) * self.columns;
                 let cells = first + usize::from(column0)..=first + usize::from(column1);
                 let mut values = [0; MOST_SIDES];
@@ -370,6 +375,7 @@ impl<'c, I: Index> Raster<'c, I> {
         if !(3..=MOST_SIDES).contains(&count) {
             return 0;
         }
+        // It is asked for n up to `count - 1 + others`, which is below twice `count`.
         let position = |n: usize| {
             let n = if n < count { n } else { n - count };
             coarse_projection.position(corners[n].vertex())

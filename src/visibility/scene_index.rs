@@ -169,6 +169,7 @@ impl<I: Index> SceneIndex<'_, I> {
             return self.ears.of(face.first).get(number).copied();
         }
         let corners = self.outlines.element(face.first);
+        // If these two corners exist, so does the first one.
         match corners.get(number + 1..number + 3) {
             Some([b, c]) if face.is_fan => Some([corners[0].vertex(), b.vertex(), c.vertex()]),
             _ => None,

@@ -78,6 +78,7 @@ pub fn seam(
     for (triangle, through, heights) in [(other, one, of_other), (one, other, of_one)] {
         for n in 0..3 {
             let next = (n + 1) % 3;
+            // Both are below 3, the number of corners and of heights.
             let (a, b) = (triangle[n], triangle[next]);
             if (heights[n] >= 0) != (heights[next] >= 0) && pierces(a, b, through) {
                 let point = between(a, b, heights[n], heights[next]);

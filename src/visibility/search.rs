@@ -311,6 +311,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
             return Ok(());
         }
         let pen_at = |corner: usize| self.around.outlines.pens.at(corner);
+        // The ranks of a seam are those of two faces of the scene: see `Faces`.
         let pen_of = |rank: &usize| pen_at(self.around.faces.get(*rank).first);
         let pen =
             seam_of.iter().flatten().map(pen_of).min().unwrap_or_else(|| pen_at(edge_query.side));

@@ -37,6 +37,9 @@ struct Entry<I>([I; 2]);
 #[derive(Debug, Default)]
 pub struct Ears<'a, I> {
     /// Where the triangles of each face begin, in the order of the model.
+    // A face begins at the number of triangles of those before it, so these indexes ascend, and
+    // none is beyond `ears`. A face of n corners has n - 2 triangles at most, so each index is
+    // below the number of corners and fits `I`.
     entries: &'a mut [Entry<I>],
     /// The triangles, face after face. Each is three vertex numbers.
     ears: &'a mut [[I; 3]],
@@ -92,6 +95,9 @@ impl<'a, I: Index> Ears<'a, I> {
         let ears: &mut [[I; 3]] = scratch.take(needs.ears)?;
         let mut meantime = scratch.reborrow();
         let remaining: &mut [I] = meantime.take(needs.most_corners)?;
+        // `EarNeeds::of` has gone through the same faces, so none has more corners than `remaining`
+        // has room for, and each has an entry. `cut_ears` says how many of the ears that are left
+        // it has used, which are no more than there are.
         let mut used = 0;
         for (entry, (first, corners)) in entries.iter_mut().zip(concave(outlines, vertices)) {
             *entry = Entry([first, used].map_each(I::new));
@@ -164,6 +170,7 @@ impl Plane {
     /// the polygon has no area.
     fn of(mut polygon: impl Iterator<Item = Vertex>) -> Option<Self> {
         let areas = areas(&mut polygon);
+        // An axis is 0, 1 or 2, which is an index of `areas`.
         let leans_to = (0..3).rev().max_by_key(|&axis| areas[axis].abs())?;
         (areas[leans_to] != 0).then_some(Self { leans_to, flipped: areas[leans_to] < 0 })
     }
@@ -190,6 +197,7 @@ pub fn cut_of<I: Index>(corners: &[Corner<I>], vertices: &[Vertex]) -> Cut {
     if is_bar(corners) {
         return Cut::None;
     }
+    // Every corner is the number of a vertex (see `check`), and an element has at least one corner.
     let at = |corner: &Corner<I>| vertices[corner.vertex().get()];
     let Some(plane) = Plane::of(corners.iter().map(at)) else {
         return Cut::None;
@@ -224,6 +232,7 @@ fn cut_ears<I: Index>(
     ears: &mut [[I; 3]],
     yield_counter: &mut YieldCounter<'_>,
 ) -> Result<usize, VisibilityError> {
+    // `polygon` holds vertices of corners, which exist (see `check`).
     let at = |number: I| vertices[number.get()];
     let Some(plane) = Plane::of(polygon.iter().map(|&number| at(number))) else {
         return Ok(0);
@@ -232,6 +241,8 @@ fn cut_ears<I: Index>(
     let mut left = polygon.len();
     while left >= 3 {
         yield_counter.spend(100 * left * left)?;
+        // `left` begins as the length of `polygon` and only becomes less, and it is at least 3
+        // here. All numbers that `around` is asked for are below `left`, and `cut` is one of them.
         let rest = &polygon[..left];
         let around = |middle: usize| {
             [rest[(middle + left - 1) % left], rest[middle], rest[(middle + 1) % left]]

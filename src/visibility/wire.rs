@@ -31,6 +31,7 @@ pub fn follow_wire<I: Index>(
         yield_counter.spend(500 * element.len())?;
         for (number, p, q) in sides(element) {
             if chosen.contains(first + number) {
+                // Every corner is the number of a vertex (see `check`).
                 let ends = (vertices[p.get()], vertices[q.get()]);
                 let (from, to) = (EdgeParameter::START, EdgeParameter::END);
                 let pen = outlines.pens.at(first);
