@@ -350,6 +350,7 @@ pub fn are_in_line(points: [[i32; 3]; 3], precision: Precision) -> bool {
 
 /// Returns the vector from a to `to`, for coordinates within ±2^30. Each component is within ±2^31.
 pub(crate) fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
+    // Both points have the components 0, 1 and 2.
     [0, 1, 2].map_each(|n| i64::from(to[n]) - i64::from(a[n]))
 }
 
@@ -357,12 +358,14 @@ pub(crate) fn difference(to: [i32; 3], a: [i32; 3]) -> [i64; 3] {
 /// of a triangle in a square of side 2^31, so it is within ±2^62.
 #[inline(never)] // Its 64-bit arithmetic is long.
 pub(crate) fn cross(u: [i64; 3], v: [i64; 3]) -> [i64; 3] {
+    // It is asked only for the components 0, 1 and 2, which both vectors have.
     let minor = |m: usize, n: usize| u[m] * v[n] - u[n] * v[m];
     [minor(1, 2), minor(2, 0), minor(0, 1)]
 }
 
 /// Returns the scalar product of two vectors, whose components must be within ±2^62.
 pub(crate) fn dot(a: [i64; 3], b: [i64; 3]) -> i128 {
+    // Both vectors have the components 0, 1 and 2.
     (0..3).map(|n| product(a[n], b[n])).sum()
 }
 

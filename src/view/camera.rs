@@ -9,6 +9,8 @@ use crate::geometry::Projection;
 use crate::model::{Position, Positions};
 
 /// A point or direction in model space. It is used only to set up the camera.
+// It has three components, as a position has, and both are indexed only by the axes 0, 1 and 2,
+// which stand beside the index.
 pub type Direction = [f64; 3];
 
 /// The view that the user chose: from where the model is seen, and by which projection.

@@ -132,6 +132,7 @@ pub(crate) fn cut<'a, I: Index>(
         return Err(too_many);
     }
     let all = scratch.take::<Vertex>(vertices.len() + keys.len())?;
+    // `all` has as many items as `vertices` and `keys` together.
     let (same, new) = all.split_at_mut(vertices.len());
     for (vertex, original) in same.iter_mut().zip(vertices) {
         // Vertices behind the near plane no longer belong to any edge, but visibility requires
@@ -215,6 +216,8 @@ fn edges<I: Index>(element: Element<'_, I>) -> impl Iterator<Item = Edge<I>> + C
 
 /// Moves each different number of a sorted list to the front, and returns these.
 fn without_repeats<T: Copy + PartialEq>(sorted: &mut [T]) -> &[T] {
+    // At most one item is kept for each that has been looked at, so `kept` does not exceed `at`
+    // within the loop, nor the length of the list behind it.
     let mut kept = 0;
     for at in 0..sorted.len() {
         if kept == 0 || sorted[kept - 1] != sorted[at] {

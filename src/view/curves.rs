@@ -106,6 +106,7 @@ impl Flattening<'_> {
         let old = elements.corners();
         let chords = vertices.len() - first - curve_ends.len().min(vertices.len() - first);
         let corners = scratch.take::<Corner<I>>(old.len() + 2 * chords)?;
+        // `corners` has as many items as `old` and two for each chord.
         let (same, new) = corners.split_at_mut(old.len());
         same.copy_from_slice(old);
         let mut pens = PenWriter::new(scratch, elements.pens().changes() + curve_ends.len())?;
@@ -119,6 +120,7 @@ impl Flattening<'_> {
         for (curve, &end) in model.curves().iter().zip(&*curve_ends) {
             for (to, pair) in (begin + I::ONE).to(end).zip(&mut pairs) {
                 pens.element(at, curve.pen);
+                // Each of `pairs` has two items.
                 pair.copy_from_slice(&[
                     Corner::new(to - I::ONE, true, false),
                     Corner::new(to, true, true),

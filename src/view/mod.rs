@@ -171,6 +171,7 @@ impl View {
     ) -> Result<Self, ViewError> {
         let limit = f64::from(COORDINATE_LIMIT - 1);
         let shift = directions.map_each(|axis| -dot(axis, origin));
+        // Here and below, the rows are 0, 1 and 2, and each array has an item for each row.
         let width = [0, 1]
             .iter()
             .flat_map(|&row: &usize| [extents[row].0 + shift[row], extents[row].1 + shift[row]])

@@ -65,6 +65,7 @@ pub(crate) fn spans_area(start: Position, others: impl Iterator<Item = Position>
     let from = start.coordinates();
     let mut sides = others.filter_map(|position| {
         let to = position.coordinates();
+        // A position has three coordinates.
         let side = [0, 1, 2].map_each(|axis: usize| i64::from(to[axis]) - i64::from(from[axis]));
         (side != [0; 3]).then_some(side)
     });
