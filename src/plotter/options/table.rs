@@ -391,6 +391,7 @@ const fn client(flag: Flag) -> HostOnly<Option<Flag>> {
 
 /// The value with index `at`, where the row has as many words as there are `values`.
 fn pick<T: Copy, const N: usize>(at: usize, values: [T; N]) -> T {
+    // No row has an empty list, so `N` is at least 1.
     values[at.min(N - 1)]
 }
 

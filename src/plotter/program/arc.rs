@@ -60,6 +60,7 @@ impl Program {
         let is_short = from != to && is_short(center, ends, turn);
         let [from, to] = ends.map_each(|point| steps_at(point, steps));
         // A centre may lie far beyond every page.
+        // The centre and the steps are those of the axes 0 and 1.
         let [x, y] = [0, 1].map_each(|axis| to_steps_within(FAR, center[axis], steps[axis]));
         let center = PagePoint { x, y };
         // Ends that only the steps make the same are not those of a whole circle.
@@ -87,6 +88,7 @@ fn is_near(from: PagePoint, to: PagePoint) -> bool {
 /// Whether an arc whose ends lie close together is the short one of the two between them, and not
 /// the one nearly all around `center`.
 fn is_short(center: [Millimetres; 2], [from, to]: [[Millimetres; 2]; 2], turn: Turn) -> bool {
+    // The axes are 0 and 1, which both points have.
     let between = |from: [Millimetres; 2], to: [Millimetres; 2]| {
         [0, 1].map_each(|axis| i64::from(to[axis].to_bits()) - i64::from(from[axis].to_bits()))
     };
@@ -106,6 +108,7 @@ fn center_of_radius(
     // Lengths are in units of 2^-15 mm, below 2^30; so differences are below 2^31 and squares below
     // 2^62.
     let halved = |length: Millimetres| i64::from(length.to_bits()) / 2;
+    // Here and in `middle`, the axes are 0 and 1, which both points have.
     let [dx, dy] = [0, 1].map_each(|axis| halved(to[axis]) - halved(from[axis]));
     let distance = (dx * dx + dy * dy).unsigned_abs();
     let wide = 2 * halved(radius).unsigned_abs();

@@ -9,6 +9,7 @@ use crate::fixed::{Decimal, Millimetres};
 use crate::protocol::{BlockError, CommandError};
 
 /// The letters of the axes.
+// A position has as many coordinates as there are axes, so the number of an axis is an index of it.
 const AXES: [u8; 3] = [b'X', b'Y', b'Z'];
 
 impl Program {

@@ -48,6 +48,7 @@ pub(super) fn inverse_feed(
     to: [Millimetres; 2],
     feed: Millimetres,
 ) -> Millimetres {
+    // The axes are 0 and 1, which both points have.
     // Differences are below 2^32 units of 2^-16 mm; halved, their squares are below 2^62.
     let half = |axis: usize| {
         (i64::from(to[axis].to_bits()) - i64::from(from[axis].to_bits())).unsigned_abs() / 2
