@@ -288,6 +288,7 @@ impl<'s, I: Index> StretchFinder<'s, I> {
         let far = extent.far();
         grid.within(&around.bounds_of(one), &mut |ranks| {
             // The ranks in a cell ascend.
+            // A partition point is at most the length of the slice, so it can be split there.
             let (_, higher) = ranks.split_at(ranks.partition_point(|rank| rank.get() <= one));
             let higher = higher.iter().map(|rank| rank.get());
             for other in higher.take_while(|&other| !around.faces.begins_behind(other, far)) {

@@ -79,6 +79,7 @@ impl<I: Index> OpenSides<I> {
     pub fn meet(&mut self, [from, to]: Directed<I>) -> Option<()> {
         let open = self.sides.get_mut(..self.count)?;
         if let Some(found) = open.iter().position(|side| *side == [to, from]) {
+            // One side is open at least, and `count` then becomes the index of the last.
             self.count -= 1;
             open.swap(found, self.count);
         } else {
