@@ -99,6 +99,7 @@ pub fn distinct_edges<'a, I: Index>(
         *key = edge.key();
     }
     heap_sort_by_key(keys, |key| *key);
+    // A pair has the size of its two numbers, and is aligned no less.
     Ok(bytemuck::cast_slice(without_repeats(keys)))
 }
 
@@ -189,6 +190,7 @@ pub(crate) fn cut<'a, I: Index>(
         }
     }
     let corners: &'a [I] = corners;
+    // A corner has the form of a number.
     let corners = bytemuck::cast_slice(corners.get(..length).unwrap_or(&[]));
     Ok((all, Elements::with_pens(corners, pens.finish()), keys))
 }

@@ -41,6 +41,7 @@ impl Flattening<'_> {
             Projection::Perspective => (z >= near).then(|| (self.on_page)(x, y, z)),
             Projection::Parallel => Some((self.on_page)(x, y, 1 << FRACTION_BITS)),
         };
+        // A vertex and a point have the same form: three numbers of 32 bits.
         let points: &[Point] = bytemuck::cast_slice(points);
         model.curves().flatten(points, &project, self.tolerance, cancel, each)
     }
