@@ -2,7 +2,9 @@
 //!
 //! Each call is counted to the innermost function of the project in the chain of functions that the
 //! compiler inlined there, which the DWARF sections tell. So a bounds check inside a function of
-//! the core library counts to the module that called it.
+//! the core library counts to the module that called it. A function of a library that was not
+//! inlined, and that calls a panic function, counts as one itself: each call of it by the project
+//! is a call that may panic.
 
 use addr2line::gimli::{Dwarf, EndianSlice, LittleEndian};
 use object::{Object, ObjectSection, ObjectSymbol, SymbolKind};
@@ -52,19 +54,30 @@ pub fn panic_calls(elf: &[u8]) -> Result<Vec<PanicCall>, Box<dyn Error>> {
         let (name, _) = functions.get(&target)?;
         if panics(name) { Some(name) } else { tails.get(&target) }
     };
-    let mut calls = Vec::new();
-    for (start, (name, end)) in &functions {
-        if panics(name) || tails.contains_key(start) {
-            continue;
+    // Functions of libraries that call a panic function, or another such function.
+    let mut libraries: BTreeMap<u64, String> = BTreeMap::new();
+    loop {
+        let known = libraries.len();
+        let mut calls = Vec::new();
+        for (start, (name, end)) in &functions {
+            if panics(name) || tails.contains_key(start) {
+                continue;
+            }
+            for (at, target) in code.branches(*start, *end) {
+                let found = callee(target).or_else(|| libraries.get(&target));
+                let Some(function) = found.cloned() else { continue };
+                let (file, line) = cause(&lines, at, name)?;
+                if !file.starts_with("src/") {
+                    libraries.entry(*start).or_insert_with(|| name.clone());
+                }
+                calls.push(PanicCall { file, line, function });
+            }
         }
-        for (at, target) in code.branches(*start, *end) {
-            let Some(callee) = callee(target) else { continue };
-            let (file, line) = cause(&lines, at, name)?;
-            calls.push(PanicCall { file, line, function: callee.clone() });
+        if libraries.len() == known {
+            calls.sort();
+            return Ok(calls);
         }
     }
-    calls.sort();
-    Ok(calls)
 }
 
 /// The end of a check of bounds that has failed: instructions of the image from which on it panics,
