@@ -49,6 +49,7 @@ pub mod fixed;
 pub mod host_only;
 pub mod index;
 pub mod stage;
+mod text;
 
 pub mod storage;
 pub mod geometry;

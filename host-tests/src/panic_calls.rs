@@ -67,7 +67,7 @@ pub fn panic_calls(elf: &[u8]) -> Result<Vec<PanicCall>, Box<dyn Error>> {
                 let found = callee(target).or_else(|| libraries.get(&target));
                 let Some(function) = found.cloned() else { continue };
                 let (file, line) = cause(&lines, at, name)?;
-                if !file.starts_with("src/") {
+                if !file.starts_with("src/") && !name.starts_with("firmware::") {
                     libraries.entry(*start).or_insert_with(|| name.clone());
                 }
                 calls.push(PanicCall { file, line, function });
@@ -211,6 +211,10 @@ fn cause(lines: &Lines<'_>, address: u64, name: &str) -> Result<(String, u32), B
             (None, _) => {}
         }
         outermost = (own.unwrap_or(Path::new(file)).to_string_lossy().into_owned(), line);
+    }
+    // A function of a library that was made for the project's types or closures.
+    if let Some(module) = module(name) {
+        return Ok((format!("src/{module}"), 0));
     }
     Ok(outermost)
 }

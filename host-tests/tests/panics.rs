@@ -6,21 +6,25 @@ use penup_client::emulator::image_path;
 use penup_host_tests::panic_calls::{PanicCall, panic_calls};
 use std::collections::BTreeMap;
 
-/// The greatest numbers of calls of panic functions, for each room of `src/` on the LM3S6965 and on
-/// the Pico. A room that is missing has none: the interrupt handlers and what they call, protocol,
-/// machine, motion, step, storage and boards must have none. A number that has fallen is lowered
-/// here.
-const MOST: [(&str, [usize; 2]); 9] = [
-    ("convex", [69, 146]),
+/// The greatest numbers of calls of panic functions, and of functions of libraries that call some,
+/// for each room of `src/` on the LM3S6965 and on the Pico. A room that is missing has none: the
+/// interrupt handlers and what they call, protocol, machine, motion, step, storage and boards must
+/// have none. A number that has fallen is lowered here.
+const MOST: [(&str, [usize; 2]); 11] = [
+    // Those of `defmt`, which panics where a log begins within another one. None does.
+    ("boards", [19, 9]),
+    ("convex", [80, 147]),
     ("curve", [11, 19]),
-    ("drawing", [5, 6]),
+    ("drawing", [13, 9]),
     ("geometry.rs", [1, 0]),
-    ("model", [10, 37]),
-    ("order", [87, 283]),
-    // A check of bounds without a line of its own.
-    ("plotter", [1, 1]),
-    ("view", [6, 9]),
-    ("visibility", [42, 163]),
+    ("model", [33, 45]),
+    ("order", [98, 257]),
+    // The corners of faces that are moved and listed, and of what is beside a place in a list.
+    ("plotter", [6, 2]),
+    // The exchange of two numbers while a list is sorted.
+    ("stage.rs", [2, 0]),
+    ("view", [15, 9]),
+    ("visibility", [62, 159]),
 ];
 
 /// Crates that the Pico's interrupt handler of USB called before it had a device of its own.

@@ -72,6 +72,7 @@ pub fn stop(cause: &str) -> ! {
     })
 }
 
+// SAFETY: `memory.x` and `cortex-m-rt` define these symbols. Only their addresses are used.
 unsafe extern "C" {
     /// Where the stack begins. It grows down from there.
     static _stack_start: u32;

@@ -2,6 +2,7 @@
 
 use super::{Millimetres, divide, shift_left};
 use crate::array::MapEach;
+use crate::text::strip_first;
 use core::fmt;
 
 /// A number exactly as the user wrote it: `mantissa` × 10^`exponent`.
@@ -55,9 +56,9 @@ impl Decimal {
     /// # Ok::<(), penup::fixed::NotANumber>(())
     /// ```
     pub fn parse(text: &str) -> Result<Self, NotANumber> {
-        let (negative, unsigned) = match text.strip_prefix('-') {
+        let (negative, unsigned) = match strip_first(text, b'-') {
             Some(unsigned) => (true, unsigned),
-            None => (false, text.strip_prefix('+').unwrap_or(text)),
+            None => (false, strip_first(text, b'+').unwrap_or(text)),
         };
         let (digits, power) = match unsigned.split_once(['e', 'E']) {
             Some((digits, power)) => (digits, parse_power(power)?),

@@ -7,6 +7,7 @@ use super::{CommandError, GCode, Numbers, Significant, next_number};
 use crate::curve::CurveError;
 use crate::fixed::Decimal;
 use crate::model::{self, Edit, ElementKind, ModelError, PenName};
+use crate::text::{split_once, strip_first};
 
 /// What a line asks the plotter to do, with its values already parsed.
 #[derive(Debug, Clone, PartialEq)]
@@ -240,12 +241,12 @@ impl<'a> Command<'a> {
             return Ok(Self::Assign { name: "title", value });
         }
         let line = trim(line);
-        if let Some(dollar) = line.strip_prefix('$') {
+        if let Some(dollar) = strip_first(line, b'$') {
             return Self::parse_dollar(trim(dollar));
         }
         let line = trim(match GCode::begins(line) {
             true => before_hash(line),
-            false => line.split('#').next().unwrap_or(""),
+            false => split_once(line, b'#').map_or(line, |(before, _)| before),
         });
         #[cfg(not(feature = "hpgl"))]
         if line.starts_with("IN;") {
@@ -288,7 +289,7 @@ impl<'a> Command<'a> {
         // A `#` begins a comment where a space stands before it.
         let comment = text.as_bytes().windows(2).position(|pair| pair == b" #");
         let text = trim(comment.and_then(|at| text.get(..at)).unwrap_or(text));
-        if let Some((name, value)) = text.split_once('=') {
+        if let Some((name, value)) = split_once(text, b'=') {
             let (name, value) = (trim(name), trim(value));
             if name == "resume" {
                 return match value {
@@ -333,7 +334,7 @@ impl<'a> Command<'a> {
     /// for other commands.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn parse_grbl(text: &'a str) -> Option<Result<Self, CommandError>> {
-        let (name, value) = text.split_once('=').map_or((text, None), |(n, v)| (n, Some(v)));
+        let (name, value) = split_once(text, b'=').map_or((text, None), |(n, v)| (n, Some(v)));
         let is = |text: &'a str, expected: &str| Significant(text.bytes()).eq(expected.bytes());
         let Some(value) = value else {
             let commands = [
@@ -385,7 +386,7 @@ impl<'a> Command<'a> {
 /// other lines.
 #[inline(never)] // Inlined, its frame would take stack while a job is computed.
 fn title(line: &str) -> Option<&str> {
-    let (name, text) = trim_start(line).strip_prefix('$')?.split_once('=')?;
+    let (name, text) = split_once(strip_first(trim_start(line), b'$')?, b'=')?;
     (trim(name) == "title").then_some(text)
 }
 

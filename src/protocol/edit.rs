@@ -3,6 +3,7 @@
 use super::values::{choice, number, trim, whole};
 use super::{Command, CommandError};
 use crate::model::{self, Edit, ElementKind};
+use crate::text::split_once;
 
 /// Reads the values of an edit one after the other. They are separated by commas.
 struct Values<'a> {
@@ -16,7 +17,7 @@ impl<'a> Values<'a> {
     /// Returns the text of the next value.
     fn text(&mut self) -> Result<&'a str, CommandError> {
         let rest = self.rest.ok_or(CommandError::WrongNumberCount { needed: self.needed })?;
-        let (value, rest) = match rest.split_once(',') {
+        let (value, rest) = match split_once(rest, b',') {
             Some((value, rest)) => (value, Some(rest)),
             None => (rest, None),
         };

@@ -6,6 +6,7 @@
 
 use super::CommandError;
 use crate::drawing::is_in_font;
+use crate::text::{split_once, strip_first};
 use core::fmt::{self, Write};
 use core::str::Chars;
 
@@ -55,11 +56,11 @@ fn escaped(rest: &mut Chars<'_>) -> Option<u32> {
     let (digits, after) = match rest.next()? {
         '\\' => return Some('\\'.into()),
         'x' => rest.as_str().split_at_checked(2)?,
-        'u' => rest.as_str().strip_prefix('{')?.split_once('}')?,
+        'u' => split_once(strip_first(rest.as_str(), b'{')?, b'}')?,
         _ => return None,
     };
     *rest = after.chars();
-    let is_number = (1..=6).contains(&digits.len()) && !digits.starts_with('+');
+    let is_number = (1..=6).contains(&digits.len()) && strip_first(digits, b'+').is_none();
     u32::from_str_radix(digits, 16).ok().filter(|_| is_number)
 }
 

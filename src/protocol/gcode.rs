@@ -5,6 +5,7 @@
 
 use super::CommandError;
 use crate::fixed::Decimal;
+use crate::text::strip_first;
 
 /// One letter and its number: `G1`, `X-2.5`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -77,7 +78,7 @@ impl<'a> GCode<'a> {
 
     /// Whether the line is `%`, which stands before and after a program.
     pub fn is_mark(self) -> bool {
-        self.text.trim_ascii().starts_with('%')
+        strip_first(self.text.trim_ascii(), b'%').is_some()
     }
 
     /// The text of the line, as it came.

@@ -7,6 +7,7 @@ use super::gcode::LinePart;
 use super::numbering::NUMBER_LIMIT;
 use super::values::trim;
 use super::{CommandError, DAMAGED, GCode};
+use crate::text::strip_first;
 
 /// The length of the longest line in bytes, without its end, its number and its checksum.
 pub const LINE_LIMIT: usize = 256;
@@ -127,7 +128,7 @@ impl LineReader {
 /// Whether the bytes are those of a line of G-code, or of a `$` command without a text.
 fn is_code(bytes: &[u8]) -> bool {
     let bytes = bytes.utf8_chunks().next().map_or("", |chunk| chunk.valid());
-    match trim(bytes).strip_prefix('$') {
+    match strip_first(trim(bytes), b'$') {
         Some(command) => !["title", "I", "i"].iter().any(|name| trim(command).starts_with(name)),
         None => GCode::begins(bytes),
     }

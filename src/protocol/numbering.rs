@@ -16,6 +16,7 @@
 use super::gcode::ends_in_comment;
 use super::{CommandError, GCode, LINE_LIMIT};
 use crate::checksum::CRC_16;
+use crate::text::strip_first;
 
 /// The largest number of bytes that number and checksum add to a line: `N-999999999 ` and `*FFFF`.
 pub const NUMBER_LIMIT: usize = 12 + 5;
@@ -271,8 +272,8 @@ fn split_checksum(line: &str) -> Option<(&str, Checksum, u16)> {
 
 /// The number after `N`, of at most nine digits, and the text after it.
 fn split_number(line: &str) -> Option<(i32, &str)> {
-    let rest = line.trim_ascii_start().strip_prefix('N')?;
-    let digits = rest.strip_prefix('-').unwrap_or(rest);
+    let rest = strip_first(line.trim_ascii_start(), b'N')?;
+    let digits = strip_first(rest, b'-').unwrap_or(rest);
     let sign = rest.len() - digits.len();
     let count = digits.bytes().take_while(u8::is_ascii_digit).count();
     let (number, text) = rest.split_at_checked(sign + count)?;

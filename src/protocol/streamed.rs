@@ -15,6 +15,7 @@ use super::CommandError;
 use crate::drawing::{LineType, PAGE_LIMIT, PagePoint};
 use crate::machine::{JobSize, Target};
 use crate::model::PEN_LIMIT;
+use crate::text::parts;
 
 /// The keyword of a line of strokes.
 pub const STROKES_KEYWORD: &str = "$s=";
@@ -63,7 +64,7 @@ impl StreamHeader {
     /// large.
     pub fn parse(text: &str) -> Result<Self, CommandError> {
         let wrong_count = CommandError::WrongNumberCount { needed: Self::COUNT };
-        let mut parts = text.split(',');
+        let mut parts = parts(text, b',');
         let mut read = 0;
         let mut next = |limit: u64| {
             read += 1;

@@ -3,6 +3,7 @@
 use super::CommandError;
 use crate::fixed::{Decimal, Millimetres};
 use crate::model::PEN_LIMIT;
+use crate::text::parts;
 
 /// The number of pens, as a number of the kind that is parsed.
 pub(crate) const PENS: i32 = PEN_LIMIT as i32;
@@ -64,7 +65,7 @@ pub(crate) fn numbers<const N: usize>(text: &str) -> Result<[f64; N], CommandErr
 #[inline(never)] // All counts share one copy of the code.
 fn read_values(text: &str, values: &mut [f64]) -> Result<(), CommandError> {
     let wrong_count = CommandError::WrongNumberCount { needed: values.len() };
-    let mut parts = text.split(',').map(number);
+    let mut parts = parts(text, b',').map(number);
     for value in &mut *values {
         *value = parts.next().unwrap_or(Err(wrong_count))?.to_f64();
     }
@@ -147,7 +148,7 @@ impl<'a> Numbers<'a> {
 
 /// The first part of `v`, `v/vt`, `v//vn`, `v/vt/vn`, if every part is a whole number.
 fn vertex_number(word: &str) -> Option<i32> {
-    let mut parts = word.split('/');
+    let mut parts = parts(word, b'/');
     let vertex = parts.next()?.parse().ok()?;
     let texture = parts.next();
     let normal = parts.next();

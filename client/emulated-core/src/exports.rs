@@ -8,6 +8,7 @@ use core::ptr::null_mut;
 
 use crate::chip::{Chip, Divider};
 
+// SAFETY: `quick_core.mjs` imports functions with these arguments and results.
 #[link(wasm_import_module = "divider")]
 unsafe extern "C" {
     /// Reads the register of the divider at an offset within SIO.

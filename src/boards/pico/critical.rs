@@ -78,6 +78,7 @@ static IN_RAM: Vectors = Vectors([const { AtomicU32::new(0) }; VECTORS]);
 /// Makes the core read the vectors from RAM. It is called during set-up, before any interrupt is
 /// unmasked.
 pub fn move_vectors_to_ram() {
+    // SAFETY: `cortex-m-rt` defines this symbol, as an array of at least so many words.
     unsafe extern "C" {
         static __vector_table: [u32; VECTORS];
     }
@@ -122,6 +123,7 @@ unsafe impl critical_section::Impl for MaskAllButSteps {
         u8::from(set != 0)
     }
 
+    // SAFETY: called in pairs with `acquire`, as the trait demands, it unmasks what that masked.
     unsafe fn release(outermost: critical_section::RawRestoreState) {
         if outermost != 0 {
             // The work of the section must be finished before a handler runs.

@@ -62,6 +62,7 @@ use self::ports::Ports;
 use super::fault::{self, once};
 
 /// The second-stage boot loader, which the boot ROM runs to set up the flash.
+// SAFETY: the section is where the boot ROM looks for just these 256 bytes (`boards/pico.x`).
 #[unsafe(link_section = ".boot2")]
 #[used]
 static BOOT_2: [u8; 256] = rp2040_boot2::BOOT_LOADER_W25Q080;

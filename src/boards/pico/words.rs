@@ -98,6 +98,7 @@ core::arch::global_asm!(
     pulse = const super::steps::PULSE,
 );
 
+// SAFETY: the instructions above define these functions, with these arguments and results.
 unsafe extern "C" {
     /// Writes the next steps of a train to the words from `words` up to, but not including, `end`.
     /// See [`write_train`].

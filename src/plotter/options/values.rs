@@ -4,6 +4,7 @@
 use crate::drawing::LineType;
 use crate::fixed::SixDecimals;
 use crate::protocol::{CommandError, PENS, choice, numbers, trim, whole};
+use crate::text::split_once;
 use crate::view::Lens;
 use core::fmt;
 
@@ -44,7 +45,7 @@ impl ProjectionChoice {
 
     /// Parses one of these forms.
     pub(super) fn parse(value: &str) -> Result<Self, CommandError> {
-        let (name, rest) = match value.split_once(',') {
+        let (name, rest) = match split_once(value, b',') {
             Some((name, rest)) => (trim(name), Some(rest)),
             None => (value, None),
         };

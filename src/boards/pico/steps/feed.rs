@@ -51,6 +51,9 @@ pub static ABANDONED: AtomicU32 = AtomicU32::new(0);
 /// Whether a block is being transferred. It is written where the channel's interrupt is masked.
 pub static FEEDING: AtomicBool = AtomicBool::new(false);
 
+// SAFETY of all sections `.data.in_ram` of this board: `boards/pico.x` places them in RAM, and
+// `cortex-m-rt` copies them there with the data before `main`. Only functions lie there.
+
 /// The number of words that have left the channel and the queue of the state machine.
 #[inline(never)]
 #[unsafe(link_section = ".data.in_ram")]

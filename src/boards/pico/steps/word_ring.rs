@@ -16,6 +16,8 @@ const _: () = assert!(align_of::<Ring>() == size_of::<Ring>());
 
 /// The ring of the words that wait. It lies where its alignment leaves no gap (`boards/pico.x`),
 /// and nothing gives it a value before [`clear`].
+// SAFETY: nothing else lies in this section, which is in RAM and may hold anything at the start.
+// Atomic words may hold any value.
 #[unsafe(link_section = ".ring")]
 static RING: Ring = Ring([const { AtomicU32::new(0) }; WORDS as usize]);
 /// For each word of the ring that is a step: `around` of [`StepDistances`] in the lower half and

@@ -95,7 +95,10 @@ impl Anchors {
         let [a, b, w] = [belts.x, belts.y, width].map_each(square);
         // Belts have up to 2^23 steps, so the squares are at most 2^46.
         let twice = 2 * i64::from(width).max(1);
-        let x = (a - b + w + twice / 2).div_euclid(twice);
+        let doubled = a - b + w + twice / 2;
+        // `twice` is not 0. Division rounds towards 0, and this is to round down.
+        let toward_zero = doubled.checked_div(twice).unwrap_or(0);
+        let x = toward_zero - i64::from(toward_zero * twice > doubled);
         let down = (a - x * x).max(0).unsigned_abs();
         PagePoint { x: left.x + x as i32, y: left.y - rounded_root(down) }
     }
