@@ -10,9 +10,11 @@
 //!
 //! The file is longer than 500 lines, because recording, cutting and judging work on one record.
 
+mod computed_again;
 mod power_cut;
 mod scenarios;
 
+pub use computed_again::{ComputedAgain, Missing};
 pub use power_cut::PowerCut;
 pub use scenarios::{KeptJob, OldOrNew, SentDrawing, UploadedModel};
 
@@ -104,9 +106,10 @@ pub trait Scenario {
     /// Panics if it is not as it must be.
     fn judge(&self, operations: &[FlashOperation], states: &[Shown]);
 
-    /// What distinguishes cuts with the same outcome, by the number of operations that are done.
-    fn class(&self, done: u32) -> u32 {
-        done
+    /// What a cut has brought about, by the number of operations that are done and by what is
+    /// shown. Of each outcome, the first cut is completed.
+    fn outcome(&self, done: u32, shown: &Shown) -> (u32, Shown) {
+        (done, shown.clone())
     }
 
     /// Completes on a board that has started what has been begun, and judges all that has been
@@ -459,7 +462,7 @@ impl RecordedPico {
         let questions: Vec<&str> = questions.iter().map(String::as_str).collect();
         let shown = self.boot(cut, &questions)?;
         assert_shown(cut, &shown, |at| states.get(at as usize));
-        let is_new = seen.insert((scenario.class(cut.done()), shown.clone()));
+        let is_new = seen.insert(scenario.outcome(cut.done(), &shown));
         if (is_new && effort.completes_each) || random.once_in(effort.complete) {
             self.boot(cut, &[])?;
             self.line.emulator.pin_changes()?;
@@ -492,13 +495,15 @@ fn assert_shown<'s>(cut: PowerCut, shown: &Shown, state: impl Fn(u32) -> Option<
     );
 }
 
-/// What a board shows without the number of strokes of a job that has stopped, and that number.
+/// What a board shows without the number of drawn strokes of a job that has stopped, and that
+/// number.
 fn without_strokes(shown: &Shown) -> (Shown, Option<u32>) {
     let field = shown.iter().find_map(|line| line.strip_prefix("Stopped:")?.split_once('/'));
     let is_count = |line: &&String| {
         !line.starts_with("Stopped:") && !line.starts_with("[MSG:a job stopped at stroke ")
     };
-    let others = shown.iter().filter(is_count).cloned().collect();
+    let all = field.map(|(_, all)| format!("Stopped:/{all}"));
+    let others = shown.iter().filter(is_count).cloned().chain(all).collect();
     (others, field.and_then(|(done, _)| done.parse().ok()))
 }
 

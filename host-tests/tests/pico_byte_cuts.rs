@@ -4,7 +4,8 @@
 
 use penup::board_table::PICO;
 use penup_host_tests::pico_byte_cuts::{
-    Effort, KeptJob, OldOrNew, RecordedPico, SentDrawing, Tally, UploadedModel,
+    ComputedAgain, Effort, KeptJob, Missing, OldOrNew, RecordedPico, SentDrawing, Tally,
+    UploadedModel,
 };
 use penup_host_tests::pico_cuts::Job;
 use penup_host_tests::random::Random;
@@ -96,21 +97,28 @@ fn cut_points(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> 
     board.try_instants(&mut job, effort, random)
 }
 
-/// A drawing that is sent while it is drawn, over another one that was.
-fn cut_streamed(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> TestResult {
-    let sent = |ends: &[[i32; 4]]| {
-        let lines = strokes(ends);
-        let drawing = StreamedDrawing::of(&lines);
-        SentDrawing { whole: Job::new(lines).whole, drawing }
-    };
+/// A drawing of these lines, which is sent while it is drawn.
+fn sent(ends: &[[i32; 4]]) -> SentDrawing {
+    let lines = strokes(ends);
+    let drawing = StreamedDrawing::of(&lines);
+    SentDrawing { whole: Job::new(lines).whole, drawing }
+}
+
+/// Draws a drawing that is sent, so often that both slots of jobs and both logs are in use.
+fn draw_sent(board: &mut RecordedPico) -> TestResult {
     let mut old = sent(&[[0, 0, 4, 0], [0, 2, 4, 2]]);
-    let mut new = sent(&[[0, 0, 2, 3], [1, 0, 3, 3], [2, 0, 4, 3], [3, 0, 5, 3]]);
     board.order(old.drawing.settings.iter().map(String::as_str))?;
     for _ in 0..2 {
         board.order(old.lines(0).iter().map(String::as_str))?;
         board.finish()?;
     }
-    board.restart()?;
+    board.restart()
+}
+
+/// A drawing that is sent while it is drawn, over another one that was.
+fn cut_streamed(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> TestResult {
+    draw_sent(board)?;
+    let mut new = sent(&[[0, 0, 2, 3], [1, 0, 3, 3], [2, 0, 4, 3], [3, 0, 5, 3]]);
     let lines = new.lines(0);
     board.record(|board| board.order(lines.iter().map(String::as_str)))?;
     board.try_all(&mut new, effort, random)?;
@@ -146,20 +154,78 @@ fn cut_model(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> T
     board.try_instants_of_writes(&mut scenario, effort, random)
 }
 
+/// A job over a drawing that was sent: strokes that the pen begins to draw while their order is
+/// computed. There are as few as it takes for that, and some closed ones, which an estimate leaves
+/// out.
+fn early_ink() -> Vec<String> {
+    const STROKES: i32 = 140;
+    const CLOSED: i32 = 3;
+    let ends = (0..STROKES).flat_map(|at| {
+        let [x, y] = [at / 12, at % 12].map(|place| f64::from(place) * 0.7);
+        let rise = f64::from(at * 7 % 5) * 0.1;
+        [format!("v {x:.1} {y:.1} 0"), format!("v {:.1} {:.1} 0", x + 0.4, y + rise)]
+    });
+    let corners = (0..CLOSED).flat_map(|at| {
+        let y = f64::from(at) * 0.7;
+        [format!("v 9 {y:.1} 0"), format!("v 9.5 {y:.1} 0"), format!("v 9.5 {:.1} 0", y + 0.5)]
+    });
+    let lines = (0..STROKES).map(|at| format!("l {} {}", 2 * at + 1, 2 * at + 2));
+    let triangles = (0..CLOSED).map(|at| {
+        let first = 2 * STROKES + 3 * at + 1;
+        format!("l {first} {} {} {first}", first + 1, first + 2)
+    });
+    let quick = ["$120=4000", "$121=4000", "$page=14x14", "$plot"];
+    let quick = QUICK.into_iter().chain(quick).map(str::to_owned);
+    ends.chain(corners).chain(lines).chain(triangles).chain(quick).collect()
+}
+
+/// A job that is kept without its order, which is added behind the strokes while the pen draws.
+fn cut_early_ink(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> TestResult {
+    draw_sent(board)?;
+    let mut job = ComputedAgain { job: Job::new(early_ink()), missing: Missing::Order };
+    let (plot, lines) = job.job.lines.split_last().ok_or("a job")?;
+    board.order(lines.iter().map(String::as_str))?;
+    board.record(|board| board.order([plot.as_str()]))?;
+    // To complete it takes longer than the other jobs.
+    let effort = Effort { complete: 4 * effort.complete, ..effort };
+    board.try_all(&mut job, effort, random)?;
+    board.try_instants(&mut job, effort, random)
+}
+
+/// A drawing in two parts, the second of which is its title, of a model in flash.
+fn cut_parts(board: &mut RecordedPico, effort: Effort, random: &mut Random) -> TestResult {
+    const TITLE: [&str; 4] = ["$page=14x20", "$title-size=2", "$title=Il", "$plot"];
+    draw_sent(board)?;
+    let corners = ["v 0 0 0", "v 6 0 0", "v 3 5 0", "v 8 1 0", "v 9 5 0", "v 10 1 0"];
+    let others = (corners.len()..PICO.memory.vertices + 4).map(|at| format!("v {} 0 0", at % 7));
+    let faces = ["f 1 2 3", "f 4 5 6"].into_iter().chain(QUICK).chain(TITLE);
+    let lines = corners.into_iter().map(str::to_owned).chain(others);
+    let lines = lines.chain(faces.map(str::to_owned)).collect();
+    let mut job = ComputedAgain { job: Job::new(lines), missing: Missing::Strokes };
+    let (plot, lines) = job.job.lines.split_last().ok_or("a job")?;
+    board.order_many(lines)?;
+    // The model is complete before the record.
+    board.ask("$model")?;
+    board.record(|board| board.order([plot.as_str()]))?;
+    board.try_all(&mut job, effort, random)?;
+    board.try_instants(&mut job, effort, random)
+}
+
 type Portion = fn(&mut RecordedPico, Effort, &mut Random) -> TestResult;
 
-const PORTIONS: [(&str, Portion); 6] = [
+const PORTIONS: [(&str, Portion); 8] = [
     ("settings", cut_settings),
     ("parameters", cut_parameters),
     ("job", cut_job),
     ("points", cut_points),
     ("streamed", cut_streamed),
     ("model", cut_model),
+    ("early", cut_early_ink),
+    ("parts", cut_parts),
 ];
 
-/// A few cuts of a job, in each of its operations.
-#[test]
-fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
+/// Tries a few cuts of a portion, in each of its operations, and completes some.
+fn try_few(portion: Portion) -> TestResult {
     let few = Effort {
         bytes: 1000,
         instants: 1,
@@ -169,10 +235,20 @@ fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
         share: [0, 1],
     };
     let mut board = RecordedPico::start()?;
-    cut_job(&mut board, few, &mut Random::new(2211))?;
+    portion(&mut board, few, &mut Random::new(2211))?;
     eprintln!("{:?}", board.tally);
     assert!(board.tally.completed > 0, "{:?}", board.tally);
     Ok(())
+}
+
+#[test]
+fn a_few_cuts_of_a_job_leave_the_old_one_or_the_new_one() -> TestResult {
+    try_few(cut_job)
+}
+
+#[test]
+fn a_few_cuts_of_a_drawing_in_parts_leave_the_old_job_or_the_new_one() -> TestResult {
+    try_few(cut_parts)
 }
 
 /// One of several boards, which try the cuts of a portion between them. Returns what it did.
@@ -187,7 +263,7 @@ fn share_of(portion: Portion, seed: u64, board: u32, boards: u32) -> Result<Tall
 
 /// Prints how many cuts there were of each kind. Each core of the computer emulates a board.
 #[test]
-#[ignore = "`cargo xtask power-soak --bytes` runs it for half an hour or more"]
+#[ignore = "`cargo xtask power-soak --bytes` runs it for three quarters of an hour or more"]
 fn before_every_byte() -> TestResult {
     let seed = wish("PENUP_SEED", 1);
     let only = std::env::var("PENUP_PORTION").ok();

@@ -183,10 +183,12 @@ enum Task {
         #[arg(long)]
         streamed: bool,
         /// Cuts the power before every byte of each kind of record that is written instead, and at
-        /// 1,000 random instants of jobs and of a large model (half an hour or more).
+        /// 1,000 random instants of jobs and of a large model (three quarters of an hour or
+        /// more).
         #[arg(long, conflicts_with_all = ["minutes", "streamed", "long"])]
         bytes: bool,
-        /// Does so for one kind only: settings, parameters, job, points, streamed or model.
+        /// Does so for one kind only: settings, parameters, job, points, streamed, model, early or
+        /// parts.
         #[arg(long, requires = "bytes")]
         only: Option<String>,
     },
