@@ -3,6 +3,7 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use penup::boards::host::CutFlash;
 use penup::plotter::Board as _;
 use penup_host_tests::cut_jobs::{
     Point, Powered, assert_one_drawing, drawn_length, empty_flash, ink, strokes_of, switch_on_early,
@@ -220,6 +221,72 @@ fn small(settings: &[&str]) -> (Drawing, StreamedJob) {
     let mut drawing = Drawing::of(&job_lines("cube.obj", &options));
     let job = drawing.from(0);
     (drawing, job)
+}
+
+/// A drawing that is cut: its strokes, the flash, and what was drawn.
+fn cut_in_the_middle() -> (Drawing, Vec<Vec<Point>>, CutFlash, Vec<Vec<Point>>) {
+    let options = ["$page=60x60", "$margin=5", "$hidden=erased"];
+    let lines = job_lines("lattice2.obj", &[&QUICK_PEN[..], &options].concat());
+    let mut drawing = Drawing::of(&lines);
+    let job = drawing.from(0);
+    let (whole, milliseconds) = undisturbed(&mut drawing);
+    let (flash, changes) = switch_on_early::<WORDS>(empty_flash(), None, |plotter| {
+        plotter.order(&drawing.settings);
+        assert!(!send(plotter, &job, 0, milliseconds / 2, &mut Random::new(3)));
+    });
+    (drawing, whole, flash.powered(), strokes_of(changes.iter().map(PinChange::from)))
+}
+
+/// More reads than there ever are.
+const MANY: usize = 1 << 40;
+
+#[test]
+fn garbage_from_the_flash_at_a_start_loses_nothing() {
+    let (_, whole, flash, before) = cut_in_the_middle();
+    let start = |garbage_after: usize| {
+        let mut found = (String::new(), None);
+        let garbled = CutFlash { garbage_after: Some(garbage_after), ..flash.clone() };
+        let (flash, _) = switch_on_early::<WORDS>(garbled, None, |plotter| {
+            found = (plotter.heard(), stopped(plotter));
+        });
+        (found, flash.garbage_after)
+    };
+    let (found, left) = start(MANY);
+    let (greeting, numbers) = &found;
+    assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
+    let [_, drawn, all, _] = numbers.expect("it has stopped");
+    assert!(drawn > 0 && all as usize == whole.len() && before.len() < whole.len(), "{drawn}");
+    let count = MANY - left.expect("there are fewer reads");
+    assert!(count > 100, "{count}");
+    for number in 0..count {
+        assert_eq!(start(number), (found.clone(), None), "garbage at read {number} of {count}");
+    }
+}
+
+#[test]
+fn garbage_from_the_flash_while_the_rest_is_sent_loses_nothing() {
+    let (mut drawing, whole, flash, before) = cut_in_the_middle();
+    let mut go_on = |garbage_after: usize| {
+        let (flash, changes) = switch_on_early::<WORDS>(flash.clone(), None, |plotter| {
+            let [id, drawn, ..] = stopped(plotter).expect("it has stopped");
+            let mut rest = drawing.from(drawn);
+            rest.set_id(id);
+            plotter.board.flash().expect("flash").garbage_after = Some(garbage_after);
+            assert!(plotter.say("$resume=origin").ends_with("ok\n"));
+            assert!(send(plotter, &rest, 0, u64::MAX / 2, &mut Random::new(5)));
+            assert_eq!(stopped(plotter), None);
+        });
+        let after = strokes_of(changes.iter().map(PinChange::from));
+        assert_one_drawing(&whole, &[before.clone(), after]);
+        flash.garbage_after
+    };
+    let count = MANY - go_on(MANY).expect("there are fewer reads");
+    assert!(count > 20, "{count}");
+    let mut random = Random::new(7);
+    for _ in 0..30 {
+        let number = random.below(count as u64) as usize;
+        assert_eq!(go_on(number), None, "garbage at read {number} of {count}");
+    }
 }
 
 /// A drawing of which no stroke is drawn may begin anew at another origin. Then that counts.
