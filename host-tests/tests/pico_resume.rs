@@ -189,6 +189,36 @@ fn a_start_with_garbage_from_the_flash_finds_everything() -> TestResult {
     Ok(())
 }
 
+#[test]
+fn a_start_with_garbage_from_the_flash_finds_a_model_there() -> TestResult {
+    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+    for _ in 0..PICO.memory.vertices / 8 + 1 {
+        line.emulator.send(&b"v 1 1 1\n".repeat(8))?;
+        for _ in 0..8 {
+            let mut answer = line.hear()?;
+            while answer.starts_with('[') {
+                answer = line.hear()?;
+            }
+            assert_eq!(answer, "ok");
+        }
+    }
+    // What is asked for completes the model.
+    assert_eq!(ask(&mut line, "$model")?, "ok");
+    let found = start_again(&mut line)?;
+    assert!(found.0.starts_with("[MSG:the flash keeps a model of "), "{found:?}");
+    let reads = line.emulator.record_reads()?;
+    let mut random = Random::new(2103);
+    let starts = wish("PENUP_GARBLED", 12);
+    for _ in 0..starts {
+        // The record of the model is what is read last: 64 words, twice.
+        let read = reads - 1 - random.below(128);
+        line.emulator.garble_flash(read, true)?;
+        assert_eq!(start_again(&mut line)?, found, "garbage at read {read} of {reads}");
+    }
+    assert_eq!(u64::from(line.emulator.garbled()), starts);
+    Ok(())
+}
+
 /// A spiral of one stroke, with rests after each 40 mm of it.
 #[test]
 fn a_job_goes_on_within_its_only_stroke() -> TestResult {

@@ -439,7 +439,7 @@ impl Board for HostBoard<'_> {
         let state = self.state;
         let flash = self.model_flash.as_mut()?;
         flash.may_erase = state.is_drained();
-        Some((flash.area(), flash))
+        Some((flash.next_use(), flash))
     }
 
     fn invert_driver_pins(&mut self, steps: u8, enable: bool) {

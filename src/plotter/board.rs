@@ -182,6 +182,12 @@ pub trait Board {
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
         None
     }
+    /// The flash for a model, as the flash itself returns it now. From a cache, garbage that it
+    /// returned while the voltage rose would be read again and again.
+    #[cfg(feature = "tiles")]
+    fn uncached_model(&mut self) -> Option<Area<'static>> {
+        self.model_flash().map(|(area, _)| area)
+    }
     /// Inverts the step pins of the motors in the mask, and the enable pin if `enable`, as `$2` and
     /// `$4` ask. Called at the start and when these settings change, while nothing moves.
     #[cfg(feature = "driver-pins")]

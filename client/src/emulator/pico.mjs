@@ -18,9 +18,9 @@
 // bounces; 8 a function (its number, its address in the cycle's place) is timed; 9 how much of the
 // stack is unused is asked; 10 where x has gone to so many steps, the main loop stands still for so
 // many hundredths of a second, 11 and 12 how long a page of flash takes to be written and a sector
-// to be erased, in microseconds (in the cycle's place), 13 a read of the records in flash returns
+// to be erased, in microseconds (in the cycle's place), 13 a read of what is kept in flash returns
 // garbage, after so many (in the cycle's place) from now on (0) or from the next reset on (1), 14
-// how often the records were read since the chip began is asked, 18 from now on the status is asked
+// how often that was read since the chip began is asked, 18 from now on the status is asked
 // for at the serial line whenever a change of flash begins and no answer is awaited (1), or no
 // longer (0). 32 the pin RUN is pulled low for a moment, 33 the image is copied onto the drive that
 // the board shows with BOOTSEL held, 34 and 35 bits (the value) of a byte of flash (the cycle) stay
@@ -35,7 +35,7 @@
 // began (in the cycle's place), 32 the boot ROM shows its drive, 33 a character of the serial
 // number that the USB host reads, after a 0, 34 flash has returned garbage, 35 the status was asked
 // for at the serial line, and so many cycles later (in the cycle's place) the first byte of the
-// answer (0) or all of it (1) had left, 36 so often the records in flash were read, 37 a recorded
+// answer (0) or all of it (1) had left, 36 so often what is kept in flash was read, 37 a recorded
 // operation of the flash, an erasure (1) or a page (0), began at that cycle, 38 from which place it
 // goes on (the upper 32 bits) and how many bytes it changes (the lower 16), 39 so many operations
 // were recorded, 40 the longest cycles of an exception's handler (its number), 41 and for which an
@@ -326,7 +326,7 @@ let garbleNext = Infinity;
 
 /** A chip that begins with this flash, after such a reset. */
 function start(flash, kind) {
-  quick.garble(board.records, garbleNext);
+  quick.garble(board.kept, garbleNext);
   garbleNext = Infinity;
   stamp = -1;
   cyclesBefore = clock ? now() : 0;
@@ -622,7 +622,7 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === ASK_IN_CHANGES) asksInChanges = entry.value !== 0;
     else if (rest[at] === GARBLE) {
       if (entry.value) garbleNext = entry.cycle;
-      else quick.garble(board.records, entry.cycle);
+      else quick.garble(board.kept, entry.cycle);
     } else if (rest[at] === READS) report(WERE_READ, 0, quick.reads);
     else if (rest[at] === TIMED) timeFunction(entry.cycle, entry.value);
     else if (rest[at] === SWITCH) {

@@ -178,8 +178,8 @@ impl Pico {
         self.shared.lock().resets
     }
 
-    /// Lets flash return garbage once, as in a brown-out: when `reads` more have gone to the
-    /// records, counted from now on, or from the next reset on.
+    /// Lets flash return garbage once, as in a brown-out: when `reads` more have gone to what
+    /// it keeps, counted from now on, or from the next reset on.
     ///
     /// # Errors
     /// The emulator has ended.
@@ -194,7 +194,7 @@ impl Pico {
         std::mem::take(&mut self.shared.lock().waits)
     }
 
-    /// How often the records in flash were read since the board last started, each time that the
+    /// How often what flash keeps was read since the board last started, each time that the
     /// flash itself was asked, and not its cache.
     ///
     /// # Errors

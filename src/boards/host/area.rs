@@ -18,6 +18,9 @@ pub struct CutArea {
     pub erasures: Vec<u32>,
     /// The number of pages that were written.
     pub pages: usize,
+    /// A brown-out: after so many uses of the area, one finds garbage in the word with this index,
+    /// however often it reads it, because the cache of the flash keeps it; `None` for never.
+    pub garbage: Option<[usize; 2]>,
     /// Whether sectors may be erased: nothing moves.
     pub(super) may_erase: bool,
 }
@@ -31,6 +34,7 @@ impl CutArea {
             budget: usize::MAX,
             erasures: std::vec![0; bytes / SECTOR_BYTES],
             pages: 0,
+            garbage: None,
             may_erase: true,
         }
     }
@@ -38,6 +42,19 @@ impl CutArea {
     /// The area that lies in this flash.
     pub fn area(&self) -> Area<'static> {
         Area::new(self.words)
+    }
+
+    /// The area for one use.
+    pub(super) fn next_use(&mut self) -> Area<'static> {
+        let Some([left, word]) = self.garbage else { return self.area() };
+        self.garbage = left.checked_sub(1).map(|left| [left, word]);
+        if left > 0 {
+            return self.area();
+        }
+        let copy = self.words.iter().map(|word| AtomicU32::new(word.load(Ordering::Relaxed)));
+        let copy: Vec<_> = copy.collect();
+        copy[word].fetch_xor(0xA5C3_96F0, Ordering::Relaxed);
+        Area::new(copy.leak())
     }
 
     /// The bytes as they are now.

@@ -294,11 +294,12 @@ impl NorFlash for Flash {
 
 impl MultiwriteNorFlash for Flash {}
 
-/// The flash for a model, as it is read.
+/// The flash for a model, as it is read: through the cache, or past it.
 #[cfg(feature = "tiles")]
-pub fn model_area() -> Area<'static> {
+pub fn model_area(past_cache: bool) -> Area<'static> {
     const WORDS: usize = (RECORDS - START) as usize / size_of::<AtomicU32>();
-    let address = (MAPPED_AT + START as usize) as *const AtomicU32;
+    let mapped_at = if past_cache { UNCACHED_AT } else { MAPPED_AT };
+    let address = (mapped_at + START as usize) as *const AtomicU32;
     // SAFETY: this many words are mapped to flash there, for ever. They change while the flash is
     // erased or written, which atomic words may; nothing writes them through this slice.
     Area::new(unsafe { core::slice::from_raw_parts(address, WORDS) })

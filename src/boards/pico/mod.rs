@@ -221,7 +221,12 @@ impl Board for Pico {
 
     #[cfg(feature = "tiles")]
     fn model_flash(&mut self) -> Option<(Area<'static>, &mut dyn AreaFlash)> {
-        Some((flash::model_area(), &mut self.kept.flash))
+        Some((flash::model_area(false), &mut self.kept.flash))
+    }
+
+    #[cfg(feature = "tiles")]
+    fn uncached_model(&mut self) -> Option<Area<'static>> {
+        Some(flash::model_area(true))
     }
 
     fn invert_driver_pins(&mut self, steps: u8, enable: bool) {

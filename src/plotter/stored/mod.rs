@@ -61,8 +61,10 @@ impl<I: Index> Inner<'_, I> {
     /// Looks for a model in flash, and tells the user of it.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn find_stored<B: Board>(&mut self, board: &mut B) {
-        let Some((area, _)) = board.model_flash() else { return };
-        let Some(model) = StoredModel::new(area) else { return };
+        /// While the voltage rises, flash may return garbage, which is no model.
+        const READINGS: usize = 4;
+        let mut readings = (0..READINGS).map_while(|_| board.uncached_model());
+        let Some(model) = readings.find_map(StoredModel::new) else { return };
         self.large = FlashModel::Whole;
         Reply(board).line(format_args!(
             "[MSG:the flash keeps a model of {} vertices: $plot draws it, $clear removes it]",

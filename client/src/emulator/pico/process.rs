@@ -93,7 +93,7 @@ pub(super) struct State {
     /// How long the status was waited for at the serial line, each time: up to the first byte of
     /// the answer, and up to its end.
     pub(super) waits: [Vec<Duration>; 2],
-    /// How often the records in flash were read, the answer to the last query.
+    /// How often what is kept in flash was read, the answer to the last query.
     pub(super) record_reads: Option<u64>,
     /// How often flash has returned garbage.
     pub(super) garbled: u32,
@@ -169,15 +169,15 @@ pub(super) fn command(image: &Path, log_address: u64) -> Command {
 
 /// What the script must know of the board, as JSON.
 fn board() -> String {
-    let BoardRow { clock_hertz, flash, ram, boot_loader, pins, budget, model_flash, .. } = BOARD;
+    let BoardRow { clock_hertz, flash, ram, boot_loader, pins, budget, .. } = BOARD;
     let Pins { step_x, step_y, dir_x, dir_y, limit_x, limit_y, stop, .. } = pins;
     serde_json::json!({
         "clockHertz": clock_hertz,
         "flash": flash.start,
         "vectors": flash.start + boot_loader,
         "ram": ram.start,
-        // The address in flash at which the records begin.
-        "records": budget.flash + model_flash,
+        // The address in flash at which that begins what is kept: a model, and the records.
+        "kept": budget.flash,
         "steps": [step_x, step_y],
         "directions": [dir_x, dir_y],
         "contacts": [limit_x, limit_y, stop],

@@ -3,6 +3,8 @@
 
 #![allow(clippy::expect_used, reason = "a test fails by panicking")]
 
+mod garbage;
+
 use penup::boards::host::{CutArea, CutFlash, LAYOUT};
 use penup::machine::State;
 use penup::plotter::Board as _;
@@ -409,6 +411,19 @@ fn a_drawing_is_drawn_again_wherever_its_beginning_was_cut() {
         finish(plotter);
     });
     assert_eq!(ink(&again), ink(&whole));
+}
+
+/// A board on which the power fails while a drawing is in progress, the strokes of the whole
+/// drawing, and those that were drawn.
+fn cut_in_the_middle() -> (Off, Run, Run) {
+    let lines = lattice(&[]);
+    let (whole, milliseconds) = undisturbed(&lines);
+    let mut board = Off::new();
+    let begun = board.on(|plotter| {
+        plotter.order(&lines);
+        plotter.run(milliseconds / 2);
+    });
+    (board, whole, begun)
 }
 
 /// The first line of a drawing that is sent comes in the very turn of the main loop in which a
