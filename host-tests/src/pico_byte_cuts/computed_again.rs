@@ -6,7 +6,6 @@ use super::{RecordedPico, Result, Scenario, Shown};
 use crate::cut_jobs::{assert_one_drawing, ink};
 use crate::pico_cuts::{Job, Run};
 use penup_client::emulator::FlashOperation;
-use std::ops::Range;
 
 /// A job of which not all is kept before the pen moves. It is kept in place of a drawing that was
 /// sent while it was drawn, which `$again` does not draw.
@@ -103,9 +102,8 @@ impl Scenario for ComputedAgain {
         let begins = progress.iter().position(Option::is_some).expect("it begins");
         let ends = progress.iter().rposition(Option::is_some).expect("it begins");
         assert!(begins > kept && ends + 1 < progress.len(), "{progress:?}");
-        let Range { start, end } = begins..ends + 1;
-        let known: Vec<_> = progress[start..end].iter().map_while(|progress| *progress).collect();
-        assert_eq!(known.len(), end - start, "it goes on until it ends: {progress:?}");
+        let known: Vec<_> = progress[begins..=ends].iter().copied().flatten().collect();
+        assert_eq!(known.len(), ends + 1 - begins, "it goes on until it ends: {progress:?}");
         assert_eq!(known[0].0, 0);
         assert!(known.windows(2).all(|pair| pair[1].0 - pair[0].0 <= 1), "{known:?}");
         self.judge_totals(&known);
