@@ -260,7 +260,11 @@ impl Interpreter {
                 ('M', 20 | 300) => goes_on = false,
                 ('M', 0 | 10) => self.changes.pause(number),
                 ('M', 60) => changes_tool = true,
-                ('M', 70 | 80 | 90 | 170 | 180 | 840 | 1060 | 1070) => {}
+                ('M', 70 | 80) => self.signals.coolant = Some(true),
+                ('M', 90) => self.signals.coolant = Some(false),
+                ('M', 1060) => self.signals.fan = Some(!words.contains(&('S', 0.0))),
+                ('M', 1070) => self.signals.fan = Some(false),
+                ('M', 170 | 180 | 840) => {}
                 // Modes of speed and of cycles, and the ends of modes that are refused.
                 ('G', 150 | 500 | 690 | 930 | 950 | 960 | 970 | 980 | 990) => {
                     self.skip(format!("{letter}{value}"), number);

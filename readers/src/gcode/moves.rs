@@ -18,6 +18,10 @@ pub(super) struct Signals {
     /// Whether the spindle is on; `None` if the program has not said.
     pub spindle: Option<bool>,
     pub power: Option<f64>,
+    /// Whether the fan is on (`M106`, `M107`); `None` if the program has not said.
+    pub fan: Option<bool>,
+    /// Whether the coolant is on (`M7` to `M9`); `None` if the program has not said.
+    pub coolant: Option<bool>,
     /// Whether the extruder of a 3D printer pushes.
     pub extrudes: bool,
     /// Whether the pen has been lifted to a height of the machine (`G53`, `G28`), and to no other

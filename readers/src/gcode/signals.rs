@@ -3,7 +3,9 @@
 //! In this order: the angle of a servo (`M280`, `M300`, `M340`, `SET_SERVO`); the height Z; the
 //! power S, where the spindle is on from the first move that draws to the last; the spindle or
 //! laser (`M3`, `M4`, `M5`), which with the power 0 does not draw, nor before the first power if
-//! the program says one; or, if none of these changes between moves, G1 to G3 draw and G0 does not.
+//! the program says one; the fan (`M106`, `M107`) or the coolant (`M7` to `M9`), on whose pin some
+//! have a laser or a pen, if nothing moves by G0 while it is on; or, if none of these changes between
+//! moves, G1 to G3 draw and G0 does not.
 //! A height that only sets the focus of a laser is down also while the laser is off: then the laser
 //! must be on, too, for a move to draw. A laser that stays on over G0 does not burn there. But if
 //! any move extrudes, as on a 3D printer, those that do draw, and no others.
@@ -75,7 +77,7 @@ pub(super) fn inked(moves: &Moves, end: &Signals, has_absolute_heights: bool) ->
         .or_else(|| by_height().map(|inked| while_on(moves, inked)))
         .or_else(|| by_power(moves, end))
         .or_else(|| by_spindle(moves).map(Inked::from))
-        .unwrap_or_else(|| moves.iter().map(|it| !it.is_rapid).collect::<Vec<bool>>().into());
+        .unwrap_or_else(|| by_outputs(moves));
     for (draws, it) in inked.draws.iter_mut().zip(moves.iter()) {
         *draws &= !it.signals.is_parked;
     }
@@ -129,6 +131,39 @@ fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
     let draws: Vec<bool> = draws.collect();
     // A spindle that only runs before the first move lifts no pen.
     (draws.contains(&true) && draws.contains(&false)).then_some(draws)
+}
+
+/// By the fan or the coolant, or else, if neither lifts the pen, G1 to G3 draw and G0 does not. Says
+/// what is taken, unless that makes no difference.
+fn by_outputs(moves: &Moves) -> Inked {
+    let by_motion: Vec<bool> = moves.iter().map(|it| !it.is_rapid).collect();
+    let outputs: [(&str, fn(&Signals) -> Option<bool>); 2] =
+        [("M106 and M107", |it| it.fan), ("M7 to M9", |it| it.coolant)];
+    let mut note = None;
+    for (name, output) in outputs {
+        let is_on = |it: &Move<'_>| output(it.signals) == Some(true);
+        let mut long = moves.iter().filter(|it| it.length() > SAME);
+        let is_switched = long.clone().any(|it| is_on(&it)) && long.clone().any(|it| !is_on(&it));
+        if !is_switched {
+            continue;
+        }
+        let draws: Vec<bool> = moves.iter().map(|it| is_on(&it)).collect();
+        let differs = long.clone().any(|it| is_on(&it) == it.is_rapid);
+        if !differs {
+            return draws.into();
+        }
+        if !long.clone().any(|it| is_on(&it) && it.is_rapid) || long.all(|it| it.is_rapid) {
+            let note = format!("{name} are taken to lift the pen, because nothing else does");
+            return Inked { draws, note: Some(note) };
+        }
+        if moves.iter().any(|it| !is_on(&it) && !it.is_rapid && it.length() > SAME) {
+            note.get_or_insert(format!(
+                "{name} are not obeyed: the program moves by G0 while they are on, so they are \
+                 taken to lift no pen"
+            ));
+        }
+    }
+    Inked { draws: by_motion, note }
 }
 
 /// By the power of a spindle that is not switched off between moves, as servos are set.

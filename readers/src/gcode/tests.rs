@@ -723,3 +723,51 @@ fn a_laser_that_travels_by_g1_draws_with_power_alone() {
     let here = "M3 S255\nG1 X10\nM3 S0\nG1 X0\nM5\n";
     assert_eq!(strokes(here), [[[0.0, 0.0], [10.0, 0.0]]]);
 }
+
+/// Lasers and pens on the pin of the fan, as of Marlin, or on that of the coolant, as of Grbl.
+#[test]
+fn a_fan_or_coolant_lifts_the_pen_where_nothing_else_does() {
+    let line = [[[10.0, 10.0], [20.0, 10.0]], [[30.0, 5.0], [40.0, 5.0]]];
+    for (up, down, name) in [
+        ("M107", "M106 S255", "M106 and M107"),
+        ("M106 S0", "M106", "M106 and M107"),
+        ("M9", "M8", "M7 to M9"),
+        ("M09", "M7", "M7 to M9"),
+    ] {
+        let program = format!("G21\n{up}\n{}", by_feeds(up, down, 2, "G1 X0 Y0\n"));
+        assert_eq!(strokes(&program), line, "{program}");
+        let note = format!("{name} are taken to lift the pen, because nothing else does");
+        assert_eq!(notes("a.nc", program.as_bytes()), [note]);
+        // With G0 for the ways there is nothing to say.
+        let rapid = program.replace("G1 X10 Y10", "G0 X10 Y10").replace("G1 X30", "G0 X30");
+        let rapid = rapid.replace("G1 X0", "G0 X0");
+        assert_eq!(strokes(&rapid), line, "{rapid}");
+        assert_eq!(notes("a.nc", rapid.as_bytes()), [""; 0], "{rapid}");
+    }
+    // A program without G1.
+    let rapids = "M9\nG0 X10 Y10\nM8\nG0 X20\nM9\nG0 X30 Y5\nM8\nG0 X40\nM9\nG0 X0 Y0\n";
+    assert_eq!(strokes(rapids), line);
+}
+
+/// On mills, printers and most lasers they are what their names say.
+#[test]
+fn a_fan_or_coolant_lifts_no_pen_where_something_else_does() {
+    let line = [[[10.0, 10.0], [20.0, 10.0]], [[30.0, 5.0], [40.0, 5.0]]];
+    for (on, off) in [("M8", "M9"), ("M106 S99", "M107")] {
+        for (up, down) in [("G1 Z5", "G1 Z-1"), ("M5", "M3 S9"), ("M280 P0 S1", "M280 P0 S9")] {
+            let end = "G1 X0 Y0\n";
+            let program = format!("{up}\n{}", by_feeds(up, down, 2, end));
+            let cooled = program.replace("G1 X20", &format!("{off}\nG1 X20"));
+            let cooled = format!("{on}\n{}{on}\nG1 X1\n{off}\n", cooled);
+            assert_eq!(strokes(&cooled), line, "{cooled}");
+            assert_eq!(notes("a.nc", cooled.as_bytes()), [""; 0], "{cooled}");
+        }
+        // It is on all the time, or during G0.
+        let begin = format!("{on}\nG0 X10 Y10\nG1 X20\nG0 X30 Y5\n");
+        assert_eq!(strokes(&format!("{begin}G1 X40\n{off}\n")), line);
+        let program = format!("{begin}{off}\nG1 X40\n{on}\n");
+        assert_eq!(strokes(&program), line);
+        let [said] = &notes("a.nc", program.as_bytes())[..] else { panic!("{program}") };
+        assert!(said.contains("are not obeyed: the program moves by G0 while"), "{said}");
+    }
+}
