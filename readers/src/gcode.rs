@@ -4,8 +4,9 @@
 //! may lift a pen. [`signals`] decides on the whole program which of them does.
 //!
 //! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
-//! reader refuses arcs that do not exist, numbers that it cannot read, and what would change where
-//! the pen goes in a way that it does not follow: subprograms, loops, splines, turned coordinates.
+//! reader refuses arcs that do not exist, numbers that it cannot read, a word that is twice in a
+//! line, and what would change where the pen goes in a way that it does not follow: subprograms,
+//! loops, splines, turned coordinates.
 //!
 //! A move in the coordinates of the machine (`G53`) goes to a place that only the machine knows, as
 //! to where it parks. It is not drawn; along z it lifts the pen. Ink that would begin at such a
@@ -30,6 +31,7 @@ use crate::lines::Origin;
 use extruder::Extruder;
 use moves::{Move, Moves, Signals};
 use pens::Changes;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 use systems::{Systems, chosen};
@@ -50,6 +52,15 @@ const MOST_POINTS: usize = 10_000_000;
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
+}
+
+/// A text whose lines all end with a line feed, also those that ended with a carriage return alone.
+fn with_line_ends(text: Cow<'_, str>) -> Cow<'_, str> {
+    let mut ends = text.match_indices('\r').map(|(at, _)| text.as_bytes().get(at + 1));
+    match ends.any(|next| next.is_some_and(|next| *next != b'\n')) {
+        true => Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n")),
+        false => text,
+    }
 }
 
 /// The modes of a program, and the moves that it has made so far.
@@ -96,6 +107,25 @@ fn is_power(words: &[(char, f64)], is_setting: bool) -> bool {
     let has = |word: (char, f64)| words.contains(&word);
     let is_other = is_setting || has(('G', 4.0)) || has(('M', 106.0));
     has(('M', 3.0)) || has(('M', 4.0)) || !is_other
+}
+
+/// Checks that no word is more than once among those of a line, and no motion beside another. A
+/// letter may belong to each of several codes (G, M).
+fn refuse_repeated(words: &[(char, f64)]) -> Result<(), RefusalText> {
+    let refused = |what: &str| {
+        Err(format!("{what} in the line, which Grbl refuses, too: give each move its own line"))
+    };
+    let is_motion = |word: &&(char, f64)| word.0 == 'G' && [0.0, 1.0, 2.0, 3.0].contains(&word.1);
+    if words.iter().filter(is_motion).count() > 1 {
+        return refused("two motions (G0 to G3) are");
+    }
+    let mut words = words.iter().filter(|(letter, _)| !matches!(letter, 'G' | 'M'));
+    while let Some((letter, _)) = words.next() {
+        if words.clone().any(|(other, _)| other == letter) {
+            return refused(&format!("{letter} is more than once"));
+        }
+    }
+    Ok(())
 }
 
 /// The reason why a line is refused, as text.
@@ -279,6 +309,9 @@ impl Interpreter {
                 ('L', _) if words.contains(&('G', 10.0)) => {}
                 (letter, _) => self.skip(letter.to_string(), number),
             }
+        }
+        if !is_setting || is_move {
+            refuse_repeated(&words)?;
         }
         if servo {
             self.signals.servo = value('S').or(self.signals.servo);
@@ -488,6 +521,7 @@ impl Format for GCode {
         let Ok(text) = std::str::from_utf8(&beginning[..beginning.len().min(4096)]) else {
             return false;
         };
+        let text = with_line_ends(text.into());
         let mut interpreter = Interpreter::new();
         // The last line may be cut.
         let mut lines: Vec<&str> = text.lines().collect();
@@ -506,7 +540,7 @@ impl Format for GCode {
     }
 
     fn read(&self, file: String, bytes: Vec<u8>, _: &Arrangement) -> Result<Contents, ReadError> {
-        let text = String::from_utf8_lossy(&bytes);
+        let text = with_line_ends(String::from_utf8_lossy(&bytes));
         let mut interpreter = Interpreter::new();
         let origin = |index: usize, line: &str| Origin {
             file: file.clone(),

@@ -771,3 +771,37 @@ fn a_fan_or_coolant_lifts_no_pen_where_something_else_does() {
         assert!(said.contains("are not obeyed: the program moves by G0 while"), "{said}");
     }
 }
+
+/// Grbl refuses such a line, too: in which order its words would act is not said.
+#[test]
+fn a_word_that_is_twice_in_a_line_is_refused() {
+    for (line, reason) in [
+        ("G1 X10 Y0 G1 X10 Y10", "two motions (G0 to G3) are"),
+        ("G1 X10 Y0 X10 Y10", "X is more than once"),
+        ("X5 X6", "X is more than once"),
+        ("G1 X5 F100 F200", "F is more than once"),
+        ("M3 S10 G1 X5 S20", "S is more than once"),
+        ("G1 X10 G1 Y10", "two motions (G0 to G3) are"),
+        ("G0 X10 G1 Y10", "two motions (G0 to G3) are"),
+    ] {
+        let error = sent("a.nc", format!("G1 X1\n{line}\n").as_bytes()).expect_err(line);
+        assert!(
+            error.starts_with(&format!("a.nc:2: {reason} in the line, which Grbl refuses")),
+            "{error}"
+        );
+    }
+    // Codes of several groups may stand in a line, and settings may repeat a letter.
+    assert_eq!(strokes("G90 G21 G17\nM92 X80 X80\nG0 X1 M5 M9\nG1 X5\n").len(), 1);
+}
+
+#[test]
+fn a_line_may_end_with_a_carriage_return_alone() {
+    let unix = "(a; b)\nG21\nG90 ; c\nM3\nG1 X10\nG1 Y20\nM5\nG1 X9\n";
+    for end in ["\r", "\r\n"] {
+        assert_eq!(strokes(&unix.replace('\n', end)), strokes(unix), "{end:?}");
+    }
+    assert_eq!(strokes(unix).len(), 1);
+    assert!(sent("known by its beginning", b"G21\rG0 X5\rG1 X9\r").is_ok());
+    let error = sent("a.nc", b"G21\rG1 X5\r\nG1 Xabc\r").expect_err("refused");
+    assert!(error.starts_with("a.nc:3: \"X\" has no number"), "{error}");
+}
