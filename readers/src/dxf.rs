@@ -630,7 +630,16 @@ impl Format for Dxf {
         if drawing.is_of_paper {
             notes.push("paper space is drawn, because there is nothing in model space".to_owned());
         }
-        if pairs.last().is_none_or(|last| (last.code, last.value()) != (0, "EOF")) {
+        let end = pairs.last().filter(|last| (last.code, last.value()) == (0, "EOF"));
+        if let Some(end) = end.map(|end| end.line()) {
+            let is_blank = |letter: char| letter.is_whitespace() || letter.is_control();
+            if text.lines().skip(end).any(|line| !line.chars().all(is_blank)) {
+                notes.push(format!(
+                    "what stands behind the end of the file (EOF in line {end}) is not drawn: if \
+                     files were joined, draw each by itself"
+                ));
+            }
+        } else {
             notes.push(
                 "the file has no mark of its end (EOF): if it was cut off, a part is missing, so \
                  copy or save it again"

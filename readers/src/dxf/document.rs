@@ -22,7 +22,7 @@ impl<'a> Pair<'a> {
         self.raw.trim()
     }
 
-    fn line(&self) -> usize {
+    pub(super) fn line(&self) -> usize {
         self.line as usize
     }
 }
@@ -219,7 +219,8 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
             Some("HEADER") => {
                 let mut after = section.iter().skip_while(|pair| pair.value() != "$INSUNITS");
                 let unit = after.nth(1).filter(|pair| pair.code == 70);
-                document.unit = unit.map(|pair| number_of(*pair)).transpose()?;
+                let unit = unit.map(|pair| number_of(*pair)).transpose()?;
+                document.unit = unit.or(document.unit);
                 let mut after = section.iter().skip_while(|pair| pair.value() != "$LTSCALE");
                 if let Some(scale) = after.nth(1).filter(|pair| pair.code == 40) {
                     document.type_scale = number(*scale)?;
@@ -269,7 +270,7 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
             }
             Some("ENTITIES") => {
                 let is_own = |it: &Entity<'_>| !matches!(it.kind, "SECTION" | "ENDSEC" | "EOF");
-                document.entities = entities(section).filter(is_own).collect();
+                document.entities.extend(entities(section).filter(is_own));
             }
             Some("OBJECTS") => {
                 // Each object belongs to one block that is inserted.

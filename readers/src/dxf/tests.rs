@@ -633,3 +633,21 @@ fn sides_of_a_face_may_be_invisible() {
     assert_eq!(face("10"), [[[0.0, 0.0], [4.0, 0.0]], [[4.0, 2.0], [0.0, 2.0]]]);
     assert!(face("15").is_empty());
 }
+
+/// Files of which one was appended to another, or whose program writes several sections.
+#[test]
+fn every_section_of_entities_is_drawn_and_what_stands_behind_the_end_is_told() {
+    let line = |y: u32| format!("0 LINE 8 a 10 0 20 {y} 11 9 21 {y}");
+    let sections = format!("{} 0 ENDSEC 0 SECTION 2 ENTITIES {}", line(1), line(2));
+    let sections = dxf("4", "", &sections);
+    let drawn: Vec<f64> = strokes(&sections).iter().map(|(_, points)| points[0][1]).collect();
+    assert_eq!(drawn, [1.0, 2.0]);
+    assert_eq!(notes("a.dxf", sections.as_bytes()), [""; 0]);
+    let first = dxf("4", "", &line(1));
+    let joined = format!("{first}{}", dxf("4", "", &line(2)));
+    assert_eq!(strokes(&joined).len(), 1);
+    let note = "what stands behind the end of the file (EOF in line 30) is not drawn: if files were \
+                joined, draw each by itself";
+    assert_eq!(notes("a.dxf", joined.as_bytes()), [note]);
+    assert_eq!(notes("a.dxf", format!("{first}\r\n \x1A\r\n").as_bytes()), [""; 0]);
+}
