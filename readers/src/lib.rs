@@ -136,6 +136,9 @@ impl SourceFile {
             }
         };
         let sheet = arrangement.arrange(&mut plan, page, &mut notes).map_err(refused)?;
+        // Areas are for the arrangement only. A plan that was made small may lie far off.
+        plan.areas = None;
+        notes.extend(plan.brought_near());
         Ok(Self::of_plan(size, plan, page, sheet, notes))
     }
 

@@ -24,8 +24,11 @@ const PER_MM: f64 = 1000.0;
 pub(crate) const DOT: f64 = 0.08;
 
 /// The coordinate in mm from which on a plan is moved: less than the largest that plotters take.
-#[cfg(feature = "plans")]
 const FARTHEST: f64 = 1e9;
+
+/// The coordinate in mm up to which a plotter, which keeps the sign and 30 bits, divides a
+/// millimetre into 1024 parts: as many as the coordinates have that are written.
+const FINE: f64 = (1 << 20) as f64;
 
 /// A polyline that the pen draws.
 #[derive(Debug, Clone, PartialEq)]
@@ -175,22 +178,27 @@ impl Plan {
     }
 
     /// Moves a plan without areas to the origin if its coordinates are larger than any plotter
-    /// takes, as those of a map are. Returns what the user should know about it.
-    #[cfg(feature = "plans")]
-    fn brought_near(&mut self) -> Option<String> {
+    /// takes, or so large beside the drawing itself that a plotter would keep them too coarsely, as
+    /// those of a map are. Returns what the user should know about it.
+    pub(crate) fn brought_near(&mut self) -> Option<String> {
         let [low, high] = self.bounds()?;
-        let is_near = |[x, y]: Point| x.abs() < FARTHEST && y.abs() < FARTHEST;
-        if is_near(low) && is_near(high) || self.areas.is_some() {
+        let farthest = low.iter().chain(&high).fold(0.0, |most: f64, it| most.max(it.abs()));
+        let size = (high[0] - low[0]).max(high[1] - low[1]);
+        let is_far = farthest >= FARTHEST || farthest > FINE.max(2.0 * size);
+        if !is_far || self.areas.is_some() {
             return None;
         }
+        let rounded = |value: f64| (value * PER_MM).round() / PER_MM;
+        let by = low.map(|value| rounded(0.0 - value));
         for point in self.strokes.iter_mut().flat_map(|stroke| &mut stroke.points) {
             for axis in 0..2 {
-                point[axis] = ((point[axis] - low[axis]) * PER_MM).round() / PER_MM;
+                point[axis] = rounded(point[axis] + by[axis]);
             }
         }
         Some(format!(
-            "the coordinates are too large for a plotter: the drawing is moved by {} and {} mm",
-            -low[0], -low[1]
+            "the coordinates are too large for a plotter to keep them exactly: the drawing is \
+             moved by {} and {} mm",
+            by[0], by[1]
         ))
     }
 

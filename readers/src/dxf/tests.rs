@@ -113,8 +113,8 @@ fn a_map_is_moved_to_the_origin() {
     let line = "0 LINE 8 a 10 500000 20 4600000 11 500000.1 21 4600000.05";
     let map = dxf("6", "", line);
     assert_eq!(strokes(&map)[0].1, [[0.0, 0.0], [100.0, 50.0]]);
-    let note = "the coordinates are too large for a plotter: the drawing is moved by -500000000 \
-                and -4600000000 mm";
+    let note = "the coordinates are too large for a plotter to keep them exactly: the drawing is \
+                moved by -500000000 and -4600000000 mm";
     assert_eq!(notes("a.dxf", map.as_bytes()), [note]);
 }
 
@@ -650,4 +650,27 @@ fn every_section_of_entities_is_drawn_and_what_stands_behind_the_end_is_told() {
                 joined, draw each by itself";
     assert_eq!(notes("a.dxf", joined.as_bytes()), [note]);
     assert_eq!(notes("a.dxf", format!("{first}\r\n \x1A\r\n").as_bytes()), [""; 0]);
+}
+
+/// A map in national coordinates, which a plotter keeps with half a millimetre or less.
+#[test]
+fn a_drawing_is_moved_where_its_coordinates_would_be_coarse() {
+    let line = "0 LINE 8 a 10 530000000 20 180000000.25 11 530000100.125 21 180000050";
+    let map = dxf("4", "", line);
+    assert_eq!(strokes(&map)[0].1, [[0.0, 0.0], [100.125, 49.75]]);
+    let note = "the coordinates are too large for a plotter to keep them exactly: the drawing is \
+                moved by -530000000 and -180000000.25 mm";
+    assert_eq!(notes("a.dxf", map.as_bytes()), [note]);
+    // One that is as large as its coordinates would gain nothing.
+    let large = dxf("4", "", "0 LINE 8 a 10 0 20 1000 11 530000000 21 180000000");
+    assert_eq!(strokes(&large)[0].1, [[0.0, 1000.0], [530_000_000.0, 180_000_000.0]]);
+    assert_eq!(notes("a.dxf", large.as_bytes()), [""; 0]);
+    // It is when it is made small about its middle.
+    let mut arrangement = Arrangement::default();
+    arrangement.set("scale", "0.001").expect("a factor");
+    let file = SourceFile::arranged("a.dxf".to_owned(), large.into_bytes(), &arrangement);
+    let file = file.expect("a DXF");
+    assert_eq!(file.bounds(), Some([[0.0; 2], [530_000.0, 179_999.0]]));
+    let [said] = file.notes() else { panic!("{:?}", file.notes()) };
+    assert!(said.ends_with("is moved by -264735000 and -89910500.5 mm"), "{said}");
 }
