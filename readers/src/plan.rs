@@ -8,8 +8,9 @@ use crate::lines::Lines;
 #[cfg(feature = "plans")]
 use crate::page::Page;
 use crate::region::Regions;
+use penup::model::PenBook;
+use penup::protocol::Command;
 use plan_lines::{Elements, PlanLines};
-use std::collections::HashMap;
 
 /// A point of a plan in mm: x to the right, y upward.
 pub(crate) type Point = [f64; 2];
@@ -257,9 +258,8 @@ pub(crate) fn number_in(name: &str) -> Option<u32> {
 pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
     let mut plan = Plan::new(file.to_owned());
     let mut vertices: Vec<[f64; 3]> = Vec::new();
-    let mut pens: HashMap<String, u32> = HashMap::new();
-    let (mut pen, mut height) = (1, None);
-    let mut has_materials = false;
+    let mut pens = PenBook::default();
+    let mut height = None;
     for line in lines.in_order() {
         let mut words = line.sent.split(' ');
         let keyword = words.next().unwrap_or_default();
@@ -272,17 +272,16 @@ pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
                 vertices.push([x, y, z]);
             }
             "usemtl" | "g" => {
-                let is_material = keyword == "usemtl";
-                // Groups choose pens in a file without materials only.
-                if is_material && !has_materials {
-                    has_materials = true;
-                    pens.clear();
-                }
-                if is_material || !has_materials {
-                    let name = words.collect::<Vec<_>>().join(" ");
-                    let next = u32::try_from(pens.len() + 1).unwrap_or(u32::MAX);
-                    let named = name.strip_prefix("pen").and_then(|number| number.parse().ok());
-                    pen = named.unwrap_or_else(|| *pens.entry(name).or_insert(next));
+                let Ok(Command::Pen { by_material, name }) = Command::parse(&line.sent) else {
+                    return Err("has a pen without a name that is read".to_owned());
+                };
+                let before = pens;
+                pens = pens.after(by_material, name).map_err(|_| "has too many pens".to_owned())?;
+                if pens.is_by_material() != before.is_by_material() {
+                    // Groups choose no pens in a file with materials.
+                    for stroke in &mut plan.strokes {
+                        (stroke.pen, stroke.layer) = (1, 1);
+                    }
                 }
             }
             "l" => {
@@ -302,7 +301,7 @@ pub(crate) fn of_lines(file: &str, lines: &dyn Lines) -> Result<Plan, String> {
                 if let Some(origin) = line.origin {
                     plan.begin(origin.line, &origin.text);
                 }
-                plan.draw(points, None, pen);
+                plan.draw(points, None, u32::from(pens.pen()) + 1);
             }
             "f" => return Err("has faces".to_owned()),
             "curv" => return Err("has curves".to_owned()),

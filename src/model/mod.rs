@@ -27,7 +27,7 @@ pub use curves::{Curves, StoredCurve};
 pub use edit::{Change, Edit, ElementKind, Numbers};
 pub use elements::{Corner, Element, Elements};
 pub use error::ModelError;
-pub use pens::{PEN_LIMIT, PenName, PenRun, PenWriter, Pens};
+pub use pens::{PEN_LIMIT, PenBook, PenName, PenRun, PenWriter, Pens};
 pub use positions::{POSITION_LIMIT, Position, Positions};
 pub use sources::VertexSources;
 #[cfg(feature = "tiles")]
@@ -38,7 +38,7 @@ pub use upload::{Upload, UploadError};
 use crate::fixed::Decimal;
 use crate::index::Index;
 use curves::CurveList;
-use pens::{PenBook, RUN};
+use pens::RUN;
 use positions::truncated;
 use precision::Rounding;
 use store::Store;
@@ -149,14 +149,7 @@ impl<'m, I: Index> Model<'m, I> {
         name: PenName,
         before: BeforeChange<'_, I>,
     ) -> Result<(), ModelError> {
-        if self.pens.by_material && !by_material {
-            return Ok(());
-        }
-        let mut book = self.pens;
-        if by_material != book.by_material {
-            book = PenBook { by_material, ..PenBook::default() };
-        }
-        book.choose(name)?;
+        let book = self.pens.after(by_material, name)?;
         if book != self.pens {
             before(self);
             if book.by_material != self.pens.by_material {

@@ -191,7 +191,7 @@ pub enum PenName {
 
 /// Which pen draws what follows, and which names the pens have been given.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct PenBook {
+pub struct PenBook {
     /// For each pen the hash of its name, or [`FREE`] or [`BY_NUMBER`].
     pub(super) names: [u32; PEN_LIMIT as usize],
     /// The pen that draws the elements that follow, from 0.
@@ -206,11 +206,47 @@ const FREE: u32 = 0;
 const BY_NUMBER: u32 = 1;
 
 impl PenBook {
+    /// Returns the pen, from 0, that draws the elements that follow.
+    pub const fn pen(&self) -> u8 {
+        self.current
+    }
+
+    /// Whether a `usemtl` statement has come. Then `g` statements are ignored, and elements before
+    /// it have the first pen.
+    pub const fn is_by_material(&self) -> bool {
+        self.by_material
+    }
+
+    /// Returns the book after a statement `usemtl` (`by_material`) or `g` with this name.
+    ///
+    /// # Errors
+    /// [`ModelError::TooManyPens`].
+    ///
+    /// ```
+    /// use penup::model::{PenBook, PenName};
+    /// let book = PenBook::default().after(false, PenName::Number(4))?;
+    /// assert_eq!(book.pen(), 4);
+    /// let book = book.after(true, PenName::Other(99))?;
+    /// assert_eq!(book.after(false, PenName::Number(4))?.pen(), 0);
+    /// # Ok::<(), penup::model::ModelError>(())
+    /// ```
+    pub fn after(self, by_material: bool, name: PenName) -> Result<Self, ModelError> {
+        if self.by_material && !by_material {
+            return Ok(self);
+        }
+        let mut book = self;
+        if by_material != book.by_material {
+            book = Self { by_material, ..Self::default() };
+        }
+        book.choose(name)?;
+        Ok(book)
+    }
+
     /// Chooses the pen that a name stands for.
     ///
     /// # Errors
     /// [`ModelError::TooManyPens`]; nothing is changed.
-    pub(super) fn choose(&mut self, name: PenName) -> Result<(), ModelError> {
+    fn choose(&mut self, name: PenName) -> Result<(), ModelError> {
         let pen = match name {
             PenName::Number(pen) => {
                 let name = self.names.get_mut(usize::from(pen)).ok_or(ModelError::TooManyPens)?;

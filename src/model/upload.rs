@@ -193,14 +193,7 @@ impl Upload {
     /// # Errors
     /// [`ModelError::TooManyPens`].
     pub fn choose_pen(&mut self, by_material: bool, name: PenName) -> Result<(), UploadError> {
-        if self.pens.by_material && !by_material {
-            return Ok(());
-        }
-        let mut book = self.pens;
-        if by_material != book.by_material {
-            book = PenBook { by_material, ..PenBook::default() };
-        }
-        book.choose(name)?;
+        let book = self.pens.after(by_material, name)?;
         if book.by_material != self.pens.by_material {
             self.summary.void_before = self.corners;
             self.summary.pens = u32::from(self.corners > 0);

@@ -467,3 +467,29 @@ fn a_plan_is_scaled_into_what_the_title_leaves() {
     // Capitals of 6 mm, as much above them, and a third of that below.
     assert!((low[1] - 19.0).abs() < 0.01 && (high[1] - 205.0).abs() < 0.01, "{low:?} {high:?}");
 }
+
+/// The pens of an OBJ are those that the plotter chooses, whether or not it is arranged here.
+#[test]
+fn an_option_changes_no_pen_of_an_obj() {
+    for (statements, expected) in [
+        (["usemtl pen1", "usemtl red", "usemtl 3", "usemtl red"], [1, 2, 3, 2]),
+        (["usemtl red", "usemtl Pen1", "usemtl blue", "usemtl PEN07"], [1, 1, 2, 7]),
+        (["g wall 3", "g", "g a", "g b"], [3, 1, 2, 4]),
+        (["g a", "g b", "usemtl x", "g a"], [1, 1, 1, 1]),
+        (["g b 3", "g c", "usemtl x", "usemtl y"], [1, 1, 1, 2]),
+    ] {
+        let mut text = String::new();
+        for (statement, y) in statements.iter().zip(1..) {
+            let end = 2 * y;
+            let _ = write!(text, "{statement}\nv 0 {y} 0\nv 9 {y} 0\nl {} {end}\n", end - 1);
+        }
+        let file = arranged("a.obj", &text, &[("scale", "2")]).expect("a plan");
+        let pens: Vec<u32> = strokes(&file).iter().map(|(pen, _)| *pen).collect();
+        assert_eq!(pens, expected, "{text}");
+    }
+    let many: String = (1..=40).map(|at| format!("usemtl m{at}\n")).collect();
+    let line = "v 0 0 0\nv 9 0 0\nl 1 2\n";
+    let plain = SourceFile::new("a.obj".to_owned(), format!("{many}{line}").into_bytes());
+    let scaled = arranged("a.obj", &format!("{many}{line}"), &[("scale", "2")]);
+    assert!(plain.is_ok() && scaled.is_ok(), "{plain:?} {scaled:?}");
+}
