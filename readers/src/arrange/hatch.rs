@@ -1,6 +1,7 @@
 //! Fills areas with parallel lines.
 
 use super::{Hatch, sine_cosine};
+use crate::counted;
 use crate::plan::{Area, Plan, Point, Stroke};
 use crate::region::Regions;
 use std::collections::BTreeMap;
@@ -14,12 +15,16 @@ const MOST_WORK: usize = 10_000_000;
 /// The length in mm below which a line is left out: it would be a dot.
 const SHORTEST: f64 = 0.002;
 
+/// The area in mm² up to which nobody misses lines in a shape.
+const LEAST_AREA: f64 = 0.01;
+
 /// Hatches the areas that the file fills. In a file that does not say which these are, it hatches
-/// what the closed strokes of a pen surround together.
+/// what the closed strokes of a pen surround together. Returns how many got no line, for the user.
 ///
 /// # Errors
 /// There is no area, or there are too many lines.
-pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
+pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<Option<String>, String> {
+    let are_filled = plan.areas.is_some();
     let areas = match plan.areas.take() {
         Some(areas) => areas,
         None => closed(plan),
@@ -27,12 +32,16 @@ pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
     if areas.is_empty() {
         return Err("there is no closed, filled shape to hatch".to_owned());
     }
-    let (mut lines, mut budget) = (0, MOST_WORK);
+    let (mut lines, mut budget, mut without_line) = (0, MOST_WORK, 0);
     for area in areas {
         let Area { outlines, within, pen, layer, element } = area;
         let too_many = || format!("--hatch {} makes more than a million lines", hatch.spacing);
         let hatched = lines_within(&outlines, hatch, MOST_LINES - lines).ok_or_else(too_many)?;
         lines += hatched.len();
+        without_line += match are_filled {
+            true => usize::from(hatched.is_empty() && outlines.iter().any(|it| is_seen(it))),
+            false => outlines.iter().filter(|it| is_seen(it) && !is_crossed(it, hatch)).count(),
+        };
         for line in hatched {
             let parts = within.cut(&line, &mut budget).map_err(|_| {
                 "the clip paths of the drawing have too many sides for --hatch".to_owned()
@@ -41,7 +50,35 @@ pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<(), String> {
             plan.strokes.extend(parts.into_iter().map(stroke));
         }
     }
-    Ok(())
+    let nouns = match are_filled {
+        true => ["filled shape is", "filled shapes are"],
+        false => ["closed line is", "closed lines are"],
+    };
+    Ok((without_line > 0).then(|| {
+        let them = if without_line == 1 { "it" } else { "them" };
+        format!(
+            "{} not hatched: no line of --hatch {} crosses {them}",
+            counted(without_line, nouns),
+            hatch.spacing
+        )
+    }))
+}
+
+/// Whether an outline surrounds an area that would be seen if it were filled.
+fn is_seen(outline: &[Point]) -> bool {
+    let Some(last) = outline.last() else { return false };
+    let before = std::iter::once(last).chain(outline);
+    let twice: f64 = before.zip(outline).map(|(from, to)| from[0] * to[1] - to[0] * from[1]).sum();
+    twice.abs() > 2.0 * LEAST_AREA
+}
+
+/// Whether a line of the hatching crosses an outline.
+fn is_crossed(outline: &[Point], hatch: Hatch) -> bool {
+    let (sine, cosine) = sine_cosine(hatch.angle);
+    let numbers = outline.iter().map(|[x, y]| ((y * cosine - x * sine) / hatch.spacing).ceil());
+    let [low, high] = numbers
+        .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], it| [low.min(it), high.max(it)]);
+    low < high
 }
 
 /// Returns the areas that the closed strokes of each pen surround together.

@@ -198,7 +198,7 @@ impl Arrangement {
             }
         }
         if let Some(hatch) = self.hatch {
-            hatch::hatch(plan, hatch)?;
+            notes.extend(hatch::hatch(plan, hatch)?);
         }
         if let (true, Some([low, high])) = (self.center, plan.bounds()) {
             let middle = [sheet.width / 2.0, sheet.height / 2.0];

@@ -493,3 +493,29 @@ fn an_option_changes_no_pen_of_an_obj() {
     let scaled = arranged("a.obj", &format!("{many}{line}"), &[("scale", "2")]);
     assert!(plain.is_ok() && scaled.is_ok(), "{plain:?} {scaled:?}");
 }
+
+/// Shapes that lie between two lines of the hatching stay white.
+#[test]
+fn a_filled_shape_without_a_hatch_line_is_told() {
+    let svg = |width: u32, small: u32| {
+        format!(
+            "<svg xmlns='http://www.w3.org/2000/svg' width='100mm' height='100mm' \
+             viewBox='0 0 100 100'><rect x='5' y='5' width='{width}' height='{width}'/>\
+             <rect x='71' y='71' width='{small}' height='{small}'/></svg>"
+        )
+    };
+    let said = |text: &str| {
+        let file = arranged("a.svg", text, &[("hatch", "20")]).expect("an SVG");
+        let notes: Vec<String> = file.notes().to_vec();
+        notes.join("; ")
+    };
+    assert_eq!(
+        said(&svg(60, 2)),
+        "1 filled shape is not hatched: no line of --hatch 20 crosses it"
+    );
+    assert_eq!(
+        said(&svg(2, 2)),
+        "2 filled shapes are not hatched: no line of --hatch 20 crosses them"
+    );
+    assert_eq!(said(&svg(60, 29)), "");
+}
