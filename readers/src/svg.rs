@@ -32,6 +32,7 @@ mod lengths;
 mod markup;
 mod pens;
 mod runs;
+mod styles;
 #[cfg_attr(not(feature = "text"), path = "svg/no_text.rs")]
 mod text;
 mod unread;

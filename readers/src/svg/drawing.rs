@@ -277,7 +277,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let is_unseen = fill.is_some() && self.is_white_on_paper(path, paint, context.to_page);
         let dashes = stroke.and_then(|stroke| Some((stroke.dasharray()?, stroke.dashoffset())));
         // Dashes of a fixed length are measured on the page, and others in the file.
-        let is_fixed = element.is_some_and(|element| self.markup.has_fixed_stroke(element));
+        let is_fixed = dashes.is_some()
+            && element.is_some_and(|element| self.markup.has_fixed_stroke(element));
         let on_page = || path.data().clone().transform(single(context.to_page));
         let (path_data, to_page, unit) = match dashes.filter(|_| is_fixed).and_then(|_| on_page()) {
             Some(data) => (Cow::Owned(data), Affine::IDENTITY, PIXEL as f32),

@@ -6,6 +6,7 @@
 use super::axidraw::Control;
 use super::flatten::Arcs;
 use super::pens::Layer;
+use super::styles::Styles;
 use super::uses::Symbols;
 use super::{css, lengths, runs, unread};
 use crate::page::Page;
@@ -164,6 +165,7 @@ pub(super) struct Markup<'a, 'input> {
     by_id: HashMap<&'a str, Option<NodeId>>,
     /// The positions of the line ends in the text.
     line_ends: Vec<usize>,
+    styles: Styles<'a>,
 }
 
 impl<'a, 'input> Markup<'a, 'input> {
@@ -176,7 +178,7 @@ impl<'a, 'input> Markup<'a, 'input> {
         }
         let text = document.input_text();
         let line_ends = text.match_indices('\n').map(|(at, _)| at).collect();
-        Self { document, by_id, line_ends }
+        Self { document, by_id, line_ends, styles: Styles::of(document) }
     }
 
     /// The element with this `id`; `None` if it is empty, unknown, or several have it.
@@ -335,13 +337,17 @@ impl<'a, 'input> Markup<'a, 'input> {
     pub(super) fn asks_for_stroke(&self, element: NodeId) -> bool {
         let mut nodes = self.node(element).into_iter().flat_map(|node| node.ancestors());
         nodes
-            .find_map(|node| property(node, "stroke"))
+            .find_map(|node| self.styles.property(node, "stroke"))
             .is_some_and(|paint| !matches!(paint, "none" | "transparent"))
     }
 
-    /// Whether the element or one that contains it says by itself that it is not shown.
+    /// Whether the element or one that contains it says that it is not shown.
     pub(super) fn is_hidden(&self, element: NodeId) -> bool {
-        self.node(element).is_some_and(is_hidden)
+        let mut nodes = self.node(element).into_iter().flat_map(|node| node.ancestors());
+        nodes.any(|node| {
+            self.styles.property(node, "display") == Some("none")
+                || self.styles.property(node, "visibility") == Some("hidden")
+        })
     }
 
     /// Whether the element is an image.
@@ -351,9 +357,7 @@ impl<'a, 'input> Markup<'a, 'input> {
 
     /// Whether the colours of an element are mixed as light is.
     pub(super) fn is_linear(&self, element: NodeId) -> bool {
-        let node = self.node(element);
-        let value = node.and_then(|node| property(node, "color-interpolation"));
-        value == Some("linearRGB")
+        self.own(element, "color-interpolation") == Some("linearRGB")
     }
 
     /// The length that an element says its path has, 0 or more.
@@ -365,8 +369,12 @@ impl<'a, 'input> Markup<'a, 'input> {
     /// Whether the width of an element's stroke, and with it the length of its dashes, is the same
     /// whatever transforms there are.
     pub(super) fn has_fixed_stroke(&self, element: NodeId) -> bool {
-        let node = self.node(element);
-        node.and_then(|node| property(node, "vector-effect")) == Some("non-scaling-stroke")
+        self.own(element, "vector-effect") == Some("non-scaling-stroke")
+    }
+
+    /// The value of a property that an element has, and not by inheritance.
+    fn own(&self, element: NodeId, property: &str) -> Option<&'a str> {
+        self.styles.property(self.node(element)?, property)
     }
 }
 
@@ -375,13 +383,6 @@ fn without(tag: &str, attribute: &str) -> String {
     let Some((before, rest)) = tag.split_once(attribute) else { return tag.to_owned() };
     let behind = rest.split('"').skip(2 - attribute.matches('"').count()).collect::<Vec<_>>();
     format!("{before}{}", behind.join("\""))
-}
-
-/// The value of a property that the element itself has.
-fn property<'a>(node: Node<'a, '_>, name: &str) -> Option<&'a str> {
-    let style = unread::declarations(node.attribute("style").unwrap_or_default());
-    let own = style.filter(|(own, _)| *own == name).map(|(_, value)| value).last();
-    own.or(node.attribute(name))
 }
 
 /// How many elements of one kind there are, and in which line the first one begins.

@@ -297,6 +297,42 @@ fn what_would_not_be_seen_is_not_drawn_and_is_told() {
 }
 
 /// Text as programs of other systems save it, and compressed.
+/// A class says what an attribute may say, too.
+#[test]
+fn strokes_that_a_style_sheet_sets_are_judged_as_others_are() {
+    let of_class = |style: &str, paths: &str| {
+        in_mm(&format!(
+            "<style>.a{{{style}}} .b{{fill:none;stroke:black}}</style><linearGradient id='g'>\
+             <stop offset='0' stop-color='red'/><stop offset='1'/></linearGradient>{paths}\
+             <path class='b' d='M10 60L90 70'/>"
+        ))
+    };
+    // A gradient has no size along a level line, and `#nope` is nothing.
+    for paint in ["url(#g)", "url(#nope)"] {
+        let path = "<g class='a'><path d='M10 10H90'/></g><path class='a' d='M10 20H90'/>";
+        let svg = of_class(&format!("fill:none;stroke:{paint}"), path);
+        let expected =
+            "2 paths are not drawn: the stroke has no width, or a paint that is not read";
+        assert_eq!(read(&svg).expect("an SVG").notes(), [expected], "{paint}");
+    }
+    // The dashes have their length on the page, whoever says so.
+    let style = "fill:none;stroke:black;stroke-dasharray:10 10;";
+    let effect = "vector-effect:non-scaling-stroke";
+    let dashed = |style: &str, more: &str| {
+        let path = format!("<g transform='scale(10)'><path class='a' {more} d='M1 1H9'/></g>");
+        drawn(&of_class(style, &path)).len() - 1
+    };
+    assert_eq!(dashed(style, ""), 1);
+    for (style, more) in [
+        (format!("{style}{effect}"), String::new()),
+        (format!("{style}{effect} !important"), "style='vector-effect:none'".to_owned()),
+        (style.to_owned(), "vector-effect='non-scaling-stroke'".to_owned()),
+        (format!("{style}vector-effect:none"), format!("style='{effect}'")),
+    ] {
+        assert_eq!(dashed(&style, &more), 16, "{style} {more}");
+    }
+}
+
 #[test]
 fn text_of_other_encodings_is_read() {
     let svg = in_mm("<g id='Räume'><path d='M10 20H30' stroke='red'/></g>");
