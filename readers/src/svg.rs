@@ -23,6 +23,7 @@
 mod areas;
 mod axidraw;
 mod clip;
+mod count;
 mod css;
 mod drawing;
 mod embedded;

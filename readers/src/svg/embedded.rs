@@ -3,11 +3,12 @@
 
 use super::super::counted;
 use super::encoding;
-use super::markup;
-use super::unread;
+use super::markup::{self, Markup};
 use crate::files::Files;
+use std::collections::HashSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
-use usvg::{ImageHrefResolver, ImageKind, Options, Tree};
+use usvg::roxmltree::NodeId;
+use usvg::{Group, ImageHrefResolver, ImageKind, Node, Options, Tree};
 
 /// The most bytes of images in all.
 const MOST_BYTES: usize = 1 << 28;
@@ -71,10 +72,14 @@ impl Embedded {
                 return None;
             }
             found.with_texts += usize::from(markup::has_text(&document));
-            found.unread.extend(unread::sentences(&document));
             found.outside += markup::references_to_files(&document);
         }
-        Tree::from_data_nested(text.as_bytes(), options).ok()
+        let tree = Tree::from_data_nested(text.as_bytes(), options).ok()?;
+        let markup = Markup::new(&document);
+        let mut drawn = HashSet::new();
+        note_drawn(tree.root(), &markup, &mut drawn);
+        self.found().unread.extend(markup.shapes_left_out(&drawn));
+        Some(tree)
     }
 
     /// Says what is not drawn of the images. `reads_text` says whether there are fonts.
@@ -91,5 +96,16 @@ impl Embedded {
         }
         notes.extend(found.unread.iter().map(|said| format!("in an SVG that is an image, {said}")));
         notes
+    }
+}
+
+/// Adds the elements to which a group and its contents belong.
+fn note_drawn(group: &Group, markup: &Markup<'_, '_>, drawn: &mut HashSet<NodeId>) {
+    drawn.extend(markup.element(group.id()));
+    for node in group.children() {
+        drawn.extend(markup.element(node.id()));
+        if let Node::Group(group) = node {
+            note_drawn(group, markup, drawn);
+        }
     }
 }

@@ -4,6 +4,7 @@
 //! given an `id` in a copy of the text, by which the drawn paths are traced back to their elements.
 
 use super::axidraw::Control;
+use super::count::Count;
 use super::flatten::Arcs;
 use super::pens::Layer;
 use super::styles::Styles;
@@ -34,6 +35,9 @@ const NOT_DRAWN: [&str; 13] = [
     "switch",
     "metadata",
 ];
+
+/// The elements whose contents are not looked for in the drawing, wherever they stand.
+const NOT_SHOWN: [&str; 3] = ["clipPath", "mask", "pattern"];
 
 /// A feature of SVG 1.1 that is there. SVG 2 asks for none.
 const FEATURE: &str = "http://www.w3.org/TR/SVG11/feature#Shape";
@@ -240,26 +244,43 @@ impl<'a, 'input> Markup<'a, 'input> {
     pub(super) fn left_out(&self, drawn: &HashSet<NodeId>, reads_text: bool) -> Vec<String> {
         let mut texts = Count::default();
         let mut images = Count::default();
+        for node in self.document.descendants().filter(|node| is_one_of(*node, &["text", "image"]))
+        {
+            if is_within(node, &NOT_SHOWN) || drawn.contains(&node.id()) {
+                continue;
+            }
+            let is_text = is_one_of(node, &["text"]);
+            if is_text && (!has_letters(node) || is_within(node, &NOT_DRAWN)) {
+                continue;
+            }
+            if !is_hidden(node) && !is_in_documentation(node) {
+                let counted = if is_text { &mut texts } else { &mut images };
+                counted.add(self.document, node);
+            }
+        }
+        let mut said = Vec::new();
+        let what = match reads_text {
+            true => "not drawn, because no font for it is found: convert text to paths",
+            false => "not drawn, because a page has no fonts: open the file with penup page",
+        };
+        texts.say(&mut said, ["text is", "texts are"], what);
+        images.say(&mut said, ["image is", "images are"], "not drawn: only those that are SVG are");
+        said.extend(self.shapes_left_out(drawn));
+        said
+    }
+
+    /// Counts what the file has that is never drawn and is neither a text nor an image, in
+    /// sentences for the user. `drawn` are the elements that were found in the drawing.
+    pub(super) fn shapes_left_out(&self, drawn: &HashSet<NodeId>) -> Vec<String> {
         let mut foreign = Count::default();
         let mut broken = Count::default();
         let mut missing = Count::default();
         let mut shortened = Count::default();
         for node in self.document.descendants() {
-            if !node.is_element() || is_within(node, &["clipPath", "mask", "pattern"]) {
+            if !node.is_element() || is_within(node, &NOT_SHOWN) {
                 continue;
             }
-            let counted = if is_one_of(node, &["text"]) {
-                let is_expected = has_letters(node) && !is_within(node, &NOT_DRAWN);
-                if drawn.contains(&node.id()) || !is_expected {
-                    continue;
-                }
-                &mut texts
-            } else if is_one_of(node, &["image"]) {
-                if drawn.contains(&node.id()) {
-                    continue;
-                }
-                &mut images
-            } else if is_one_of(node, &["foreignObject"]) {
+            let counted = if is_one_of(node, &["foreignObject"]) {
                 match has_other_letters(node) {
                     None => &mut foreign,
                     Some(true) => &mut shortened,
@@ -281,12 +302,6 @@ impl<'a, 'input> Markup<'a, 'input> {
             }
         }
         let mut said = Vec::new();
-        let what = match reads_text {
-            true => "not drawn, because no font for it is found: convert text to paths",
-            false => "not drawn, because a page has no fonts: open the file with penup page",
-        };
-        texts.say(&mut said, ["text is", "texts are"], what);
-        images.say(&mut said, ["image is", "images are"], "not drawn: only those that are SVG are");
         let what = "not drawn: it is not SVG";
         foreign.say(&mut said, ["foreignObject is", "foreignObjects are"], what);
         let what = "drawn as another text, which the file has for programs that read no HTML: \
@@ -383,32 +398,6 @@ fn without(tag: &str, attribute: &str) -> String {
     let Some((before, rest)) = tag.split_once(attribute) else { return tag.to_owned() };
     let behind = rest.split('"').skip(2 - attribute.matches('"').count()).collect::<Vec<_>>();
     format!("{before}{}", behind.join("\""))
-}
-
-/// How many elements of one kind there are, and in which line the first one begins.
-#[derive(Debug, Default)]
-pub(super) struct Count {
-    number: usize,
-    line: u32,
-}
-
-impl Count {
-    pub(super) fn add(&mut self, document: &Document<'_>, node: Node<'_, '_>) {
-        if self.number == 0 {
-            // Only once for each kind, because the position is counted from the beginning.
-            self.line = document.text_pos_at(node.range().start).row;
-        }
-        self.number += runs::count(node);
-    }
-
-    pub(super) fn say(&self, said: &mut Vec<String>, [one, many]: [&str; 2], what: &str) {
-        let Self { number, line } = self;
-        match number {
-            0 => {}
-            1 => said.push(format!("1 {one} {what} (line {line})")),
-            _ => said.push(format!("{number} {many} {what} (the first in line {line})")),
-        }
-    }
 }
 
 /// Whether the file has a text, or perhaps an SVG as an image, which may have one.

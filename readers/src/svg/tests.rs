@@ -334,6 +334,34 @@ fn strokes_that_a_style_sheet_sets_are_judged_as_others_are() {
 }
 
 #[test]
+fn what_an_image_that_is_an_svg_leaves_out_is_told() {
+    let image = |contents: &str| {
+        let inner = in_mm(contents).replace('<', "%3C").replace('#', "%23");
+        in_mm(&format!(
+            "<image width='100' height='100' xlink:href=\"data:image/svg+xml,{inner}\"/>"
+        ))
+    };
+    let line = "<path stroke='black' fill='none' d='M0 10L40 10";
+    let whole = image(&format!(
+        "{line}L80 70'/><g><use xlink:href='%23a'/></g><rect id='a' \
+         width='9' height='9' fill='none' stroke='red'/>"
+    ));
+    assert_eq!(read(&whole).expect("an SVG").notes(), [""; 0]);
+    let broken = image(&format!(
+        "{line}L40 oops L80 70'/><rect width='0' height='9'/><circle/><use xlink:href='%23b'/>"
+    ));
+    let file = read(&broken).expect("an SVG");
+    let expected = [
+        "in an SVG that is an image, 1 shape is not drawn as a whole: there is an error in the \
+         data, and the rest is left out (line 1)",
+        "in an SVG that is an image, 3 elements are not drawn: hidden, or without a size or \
+         points, or with one in a unit that is not read, or a reference to nothing (the first in \
+         line 1)",
+    ];
+    assert_eq!(file.notes(), expected);
+}
+
+#[test]
 fn text_of_other_encodings_is_read() {
     let svg = in_mm("<g id='Räume'><path d='M10 20H30' stroke='red'/></g>");
     let of = |bytes: Vec<u8>| {

@@ -1,9 +1,10 @@
 //! What an SVG asks for by means that are not read: properties and rules of CSS, scripts,
 //! animations, and paints of other programs. All of it is counted, for the user.
 
+use super::count::Count;
 use super::css::{UNREAD, VARIABLE, plain_paint, without_comments};
 use super::lengths;
-use super::markup::{Count, SHAPES, is_one_of};
+use super::markup::{SHAPES, is_one_of};
 use std::collections::{BTreeMap, BTreeSet};
 use std::str::FromStr as _;
 use svgtypes::FontShorthand;
