@@ -267,8 +267,9 @@ pub struct PlotArgs {
         help_heading = "Plotter"
     )]
     pub compute: Compute,
-    /// Leave out so many strokes, which were drawn before; this computer computes the drawing then.
-    /// 0 draws all of a drawing that the plotter has stopped
+    /// Leave out so many strokes at the beginning, in the order of --compute host, by which this
+    /// computer then draws. The plotter draws in another order what it computes itself: `penup
+    /// resume` goes on with that. 0 draws all of a drawing that the plotter has stopped
     #[arg(long, value_name = "STROKES", allow_hyphen_values = true, help_heading = "Plotter")]
     pub from: Option<u32>,
     /// Begin closed lines at random points, so that the marks of the pen do not stand in a row;

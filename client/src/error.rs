@@ -157,6 +157,22 @@ pub enum Error {
         /// Whether several passes were asked for.
         is_repeated: bool,
     },
+    /// Strokes were to be left out by their number in this computer's order, and the plotter has
+    /// stopped a drawing that it has computed itself.
+    #[error(
+        "the plotter has stopped a drawing that it computed itself, after {}: `penup resume` goes \
+         on with it\nIt draws in another order than this computer, in which --from counts; if it \
+         is this computer's first {left_out} strokes that are drawn, add --compute host",
+        strokes_drawn(*done, *all)
+    )]
+    StoppedByPlotter {
+        /// The number of strokes that are drawn.
+        done: u64,
+        /// The number of all strokes; 0 if it is not known.
+        all: u64,
+        /// How many strokes were to be left out.
+        left_out: u32,
+    },
     /// The pen cannot be lowered where it stands.
     #[error("cannot lower the pen: {reason}")]
     NotLowered {
@@ -550,6 +566,7 @@ impl Error {
             | Self::NotStreamed { .. }
             | Self::NotResumed { .. }
             | Self::StoppedBefore { .. }
+            | Self::StoppedByPlotter { .. }
             | Self::NoSuchMachine(_)
             | Self::MotionOfOtherMachine
             | Self::Board { .. }

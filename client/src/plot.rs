@@ -174,6 +174,16 @@ impl Plot<'_> {
             true => Compute::Host,
             false => self.args.compute,
         };
+        if left_out > 0 {
+            // Whoever names this computer has counted the strokes in its order.
+            if self.args.compute != Compute::Host {
+                fail_if_stopped_by_plotter(sender, left_out)?;
+            }
+            self.note(&[format!(
+                "--from {left_out} counts in the order of --compute host; the plotter draws in \
+                 another order what it computes itself"
+            )]);
+        }
         let choice = compute::choose(known, &job, compute)?;
         if known.kept > 0 && choice.host.is_none() {
             self.note(&[format!(
@@ -372,6 +382,18 @@ fn fail_if_stopped_before(
             all: stopped.all.into(),
             is_repeated: passes > 1,
         }),
+    }
+}
+
+/// Fails if the plotter has stopped a drawing that it has computed itself. It draws in another order
+/// than this computer, so that the first strokes of that are not those that it has drawn.
+fn fail_if_stopped_by_plotter(sender: &mut Sender<'_>, left_out: u32) -> Result<(), Error> {
+    let Some((done, all)) = sender.stopped_job()? else { return Ok(()) };
+    match sender.stopped_drawing() {
+        Ok(None) => Err(Error::StoppedByPlotter { done, all, left_out }),
+        // A drawing that this computer has sent, whether it can go on or not.
+        Ok(Some(_)) | Err(Error::NotResumed { .. }) => Ok(()),
+        Err(error) => Err(error),
     }
 }
 

@@ -180,19 +180,34 @@ impl Sender<'_> {
         self.follow_drawing(None, Some(sent), &mut FollowedDrawing::default(), progress)
     }
 
-    /// Returns the status, in which no job has stopped that could go on. The plotter notes the last
-    /// stroke a moment after the machine is at rest, so it is asked again.
+    /// Returns the status, in which no job has stopped that could go on.
     fn fail_if_stopped(&mut self) -> Result<Status, Error> {
+        let status = self.settled_status()?;
+        match status.stopped {
+            Some((done, all)) => Err(Error::JobStopped { done, all }),
+            None => Ok(status),
+        }
+    }
+
+    /// The numbers of strokes that are drawn, and of all, of a job that has stopped and could go
+    /// on; `None` if there is none. The second is 0 if it is not known.
+    ///
+    /// # Errors
+    /// As [`Sender::join`].
+    pub fn stopped_job(&mut self) -> Result<Option<(u64, u64)>, Error> {
+        Ok(self.settled_status()?.stopped)
+    }
+
+    /// The status of a machine at rest. The plotter notes the last stroke a moment after it is at
+    /// rest, so it is asked again while a job seems to have stopped.
+    fn settled_status(&mut self) -> Result<Status, Error> {
         let mut status = self.find_state()?;
         for _ in 0..2 {
             if status.stopped.is_some() {
                 status = self.find_state()?;
             }
         }
-        match status.stopped {
-            Some((done, all)) => Err(Error::JobStopped { done, all }),
-            None => Ok(status),
-        }
+        Ok(status)
     }
 
     /// Asks for the status until the machine is idle, and lets it go on after pauses. `began` are

@@ -333,6 +333,29 @@ fn wait_for_strokes(plotter: &Library, client: &mut Child) {
     }
 }
 
+/// The plotter computes a drawing in another order than this computer, so that its strokes are not
+/// those that --from counts.
+#[test]
+fn strokes_of_a_drawing_that_the_plotter_has_computed_are_not_left_out() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let plotter = Library::new();
+    interrupted(&plotter, folder.path(), &[]);
+    let plot = |options: &[&str]| plot_rows(&plotter, folder.path(), options);
+    let (code, error) = plot(&["--from", "3"]);
+    assert_eq!(code, Some(1), "{error}");
+    assert!(error.contains("`penup resume` goes on with it"), "{error}");
+    assert!(error.contains("add --compute host"), "{error}");
+    // Whoever says that this computer has counted is believed, and told what is counted.
+    let (code, noted) = plot(&["--from", "117", "--compute", "host"]);
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("it sends 3 strokes"), "{noted}");
+    assert!(noted.contains("--from 117 counts in the order of --compute host"), "{noted}");
+    // No drawing has stopped any more.
+    let (code, noted) = plot(&["--from", "119"]);
+    assert_eq!(code, Some(0), "{noted}");
+    assert!(noted.contains("--from 119 counts in the order of --compute host"), "{noted}");
+}
+
 /// The user says where the pen is, and the plotter believes that it is elsewhere.
 #[test]
 fn a_pen_at_the_origin_is_not_believed_to_be_elsewhere() {
