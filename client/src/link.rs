@@ -9,11 +9,11 @@ use crate::keyboard::{Key, Keyboard};
 use crate::ports;
 use crate::rejoin::Rejoining;
 use crate::stderr;
+use crate::typed::TypedLines;
 use penup_job::protocol::ABORT;
 use serialport::SerialPort;
 use std::collections::VecDeque;
 use std::io;
-use std::sync::mpsc::{self, Receiver, TryRecvError};
 use std::time::{Duration, Instant};
 
 /// The user's answer to a question.
@@ -94,26 +94,14 @@ pub trait Link {
 pub struct SerialLink {
     port: Rejoining<Box<dyn SerialPort>>,
     requested_pen: Option<u8>,
-    /// Receives a message for each line that the user types; created when the user is asked for the
-    /// first time.
-    typed: Option<Receiver<()>>,
+    /// Who answers where the keys of the terminal are not taken.
+    typed: TypedLines,
     /// The keys of the terminal, once they were taken.
     keyboard: Option<Keyboard>,
     /// The requests that were typed and not yet asked for.
     requests: VecDeque<UserRequest>,
     /// Whether Enter was pressed since the last question.
     is_answered: bool,
-}
-
-/// Starts a thread that sends a message for each line on the standard input. The thread runs until
-/// the process or the input ends.
-fn typed_lines() -> Receiver<()> {
-    let (sender, receiver) = mpsc::channel();
-    std::thread::spawn(move || {
-        let is_heard = |line: io::Result<String>| line.is_ok() && sender.send(()).is_ok();
-        io::stdin().lines().all(is_heard)
-    });
-    receiver
 }
 
 /// The speed of the serial line in bits per second.
@@ -133,7 +121,7 @@ impl SerialLink {
         Ok(Self {
             port,
             requested_pen: None,
-            typed: None,
+            typed: TypedLines::default(),
             keyboard: None,
             requests,
             is_answered: false,
@@ -221,16 +209,9 @@ impl SerialLink {
             let is_answered = std::mem::take(&mut self.is_answered);
             return if is_answered { Answer::Yes } else { Answer::NotYet };
         }
-        let typed = self.typed.get_or_insert_with(typed_lines);
-        if first {
-            // Lines that were typed before the question do not count.
-            while typed.try_recv().is_ok() {}
+        if first && self.typed.begin_question() {
             stderr::say(question);
         }
-        match typed.try_recv() {
-            Ok(()) => Answer::Yes,
-            Err(TryRecvError::Empty) => Answer::NotYet,
-            Err(TryRecvError::Disconnected) => Answer::Nobody,
-        }
+        self.typed.answer()
     }
 }

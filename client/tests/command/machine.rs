@@ -5,6 +5,7 @@
 
 mod going_on;
 mod library;
+mod questions;
 mod setup;
 
 use super::*;
