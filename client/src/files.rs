@@ -123,19 +123,34 @@ pub fn parse(
     bytes: Vec<u8>,
     arrangement: &Arrangement,
 ) -> Result<SourceFile, ReadError> {
+    parse_or_panic(name.clone(), bytes, arrangement).unwrap_or_else(|_| {
+        let reason = "this file cannot be read: simplify it, for example with Inkscape".to_owned();
+        Err(ReadError::Content { file: name, reason })
+    })
+}
+
+/// Does the same as [`parse`], but tells a panic on that stack of its own from a refusal: it is the
+/// outer error.
+///
+/// # Errors
+/// The inner error is that of [`parse`].
+pub fn parse_or_panic(
+    name: String,
+    bytes: Vec<u8>,
+    arrangement: &Arrangement,
+) -> thread::Result<Result<SourceFile, ReadError>> {
     let arrangement = arrangement.clone().with_fonts(Fonts::found_by(fonts_of_this_computer));
     if !takes_deep_stack(&name, &bytes) {
-        return SourceFile::arranged(name, bytes, &arrangement);
+        return Ok(SourceFile::arranged(name, bytes, &arrangement));
     }
-    let broken =
-        |reason: &str| ReadError::Content { file: name.clone(), reason: reason.to_owned() };
     let reader = thread::Builder::new().stack_size(STACK).spawn({
         let name = name.clone();
         move || SourceFile::arranged(name, bytes, &arrangement)
     });
-    let reader = reader.map_err(|error| broken(&error.to_string()))?;
-    let damaged = "this file cannot be read: simplify it, for example with Inkscape";
-    reader.join().map_err(|_| broken(damaged))?
+    match reader {
+        Ok(reader) => reader.join(),
+        Err(error) => Ok(Err(ReadError::Content { file: name, reason: error.to_string() })),
+    }
 }
 
 fn fonts_of_this_computer() -> Database {

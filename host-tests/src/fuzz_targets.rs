@@ -7,7 +7,7 @@
 
 mod drawing;
 mod edits;
-mod files;
+pub mod files;
 mod gcode;
 mod hpgl;
 mod scene;

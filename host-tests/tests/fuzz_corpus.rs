@@ -2,9 +2,14 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use penup_client::files::parse;
 use penup_host_tests::fuzz_targets::TARGETS;
+use penup_host_tests::fuzz_targets::files::{check, is_accepted, names};
 use penup_host_tests::fuzz_targets::stored::{KeptJob, interrupted_jobs};
 use penup_host_tests::random::Random;
+use penup_readers::Arrangement;
+use penup_readers::files::Files;
+use std::panic::catch_unwind;
 use std::path::PathBuf;
 
 /// The number of random inputs for each target.
@@ -83,4 +88,32 @@ fn a_stopped_job_of_each_kind_is_kept_in_its_present_layout() {
             job.marks()
         );
     }
+}
+
+/// The fuzzer finds a whole file of a binary format only if it begins with one.
+#[test]
+fn each_reader_accepts_an_input_of_the_corpus() {
+    let inputs = corpus("files");
+    for name in names() {
+        let is_read = inputs.iter().any(|input| is_accepted(&name, input));
+        assert!(is_read, "fuzz/corpus/files has no file that is accepted as {name}");
+    }
+}
+
+/// An SVG is read on a stack of its own, where the client takes a panic for a file that cannot be
+/// read.
+#[test]
+fn a_reader_that_panics_is_found() {
+    let image = br#"<svg xmlns="http://www.w3.org/2000/svg" width="9mm" height="9mm">
+        <image href="other.svg" width="9" height="9"/></svg>"#;
+    let found = || {
+        let panics = Files::read_by(|_| panic!("as a reader with a mistake"));
+        let arrangement = Arrangement::default().with_files(panics);
+        let refused = parse("a.svg".to_owned(), image.to_vec(), &arrangement);
+        let refusal = refused.expect_err("a file that cannot be read").to_string();
+        assert!(refusal.contains("simplify it"), "{refusal}");
+        check("a.svg", image, &arrangement);
+    };
+    let panic = catch_unwind(found).expect_err("the target takes the panic for a refusal");
+    assert_eq!(panic.downcast_ref(), Some(&"as a reader with a mistake"));
 }

@@ -290,7 +290,12 @@ pub fn list() -> String {
 
 /// The extensions of the files that are read, without the dot.
 pub fn extensions() -> impl Iterator<Item = &'static str> {
-    FORMATS.iter().flat_map(|format| format.extensions()).copied()
+    extensions_of_formats().flatten().copied()
+}
+
+/// The extensions of the files of each format, without the dot: at least one for each.
+pub fn extensions_of_formats() -> impl Iterator<Item = &'static [&'static str]> {
+    FORMATS.iter().map(|format| format.extensions())
 }
 
 /// Describes each format by `describe`, which is given the format and the list of its extensions.

@@ -133,3 +133,12 @@ fn every_format_has_extensions_in_lower_case() {
         }
     }
 }
+
+/// So the name of a file can choose any reader, whatever the content is.
+#[test]
+fn every_format_has_an_extension_of_its_own() {
+    for extensions in extensions_of_formats() {
+        let first = extensions.first().expect("an extension");
+        assert_eq!(crate::extensions().filter(|other| other == first).count(), 1, "{first}");
+    }
+}
