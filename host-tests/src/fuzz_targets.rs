@@ -12,7 +12,7 @@ mod gcode;
 mod hpgl;
 mod scene;
 mod sender;
-mod session;
+pub mod session;
 pub mod stored;
 pub mod usb;
 

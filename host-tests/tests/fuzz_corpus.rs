@@ -2,9 +2,12 @@
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
+use penup::machine::SETTINGS;
+use penup::plotter::help;
 use penup_client::files::parse;
 use penup_host_tests::fuzz_targets::TARGETS;
 use penup_host_tests::fuzz_targets::files::{check, is_accepted, names};
+use penup_host_tests::fuzz_targets::session::{output, sessions};
 use penup_host_tests::fuzz_targets::stored::{KeptJob, interrupted_jobs};
 use penup_host_tests::random::Random;
 use penup_readers::Arrangement;
@@ -116,4 +119,64 @@ fn a_reader_that_panics_is_found() {
     };
     let panic = catch_unwind(found).expect_err("the target takes the panic for a refusal");
     assert_eq!(panic.downcast_ref(), Some(&"as a reader with a mistake"));
+}
+
+/// The sessions of the corpus that were written by hand still do what they were written for.
+#[test]
+fn whole_sessions_are_kept() {
+    for (name, session, says) in sessions() {
+        let file = folder("session").join(name);
+        if std::env::var_os("PENUP_WRITE_INPUTS").is_some() {
+            std::fs::write(&file, session).expect("an input can be written");
+        }
+        let kept = std::fs::read(&file).unwrap_or_else(|error| panic!("{name}: {error}"));
+        let output = output(&kept);
+        assert!(output.contains(says), "{name}: {output}");
+        let sets_ends = name.starts_with("settings-");
+        assert!(sets_ends || !output.contains("error:"), "{name}: {output}");
+    }
+}
+
+#[test]
+fn each_setting_is_set_to_both_ends_of_its_range() {
+    let inputs = corpus("session");
+    for info in SETTINGS {
+        for end in [info.least, info.greatest] {
+            let line = format!("\n${}={end}\n", info.number());
+            let has_line =
+                |input: &Vec<u8>| input.windows(line.len()).any(|part| part == line.as_bytes());
+            assert!(
+                inputs.iter().any(has_line),
+                "fuzz/corpus/session has no input with {line}: write one by \
+                 PENUP_WRITE_INPUTS=1 cargo test -p penup-host-tests --test fuzz_corpus"
+            );
+        }
+    }
+}
+
+/// The words in the dictionary of this target, as they stand between quotation marks.
+fn dictionary(target: &str) -> Vec<String> {
+    let file = folder("../dictionaries").join(format!("{target}.dict"));
+    let text = std::fs::read_to_string(&file).expect("a dictionary");
+    let words = text.lines().filter(|line| !line.starts_with('#'));
+    let between = |word: &str| Some(word.strip_prefix('"')?.strip_suffix('"')?.to_owned());
+    words.map(|word| between(word).unwrap_or_else(|| panic!("{target}: {word}"))).collect()
+}
+
+#[test]
+fn dictionaries_have_all_settings_and_commands() {
+    for target in ["session", "edits"] {
+        let words = dictionary(target);
+        let number = |word: &String| word.strip_prefix('$')?.strip_suffix('=')?.parse::<u16>().ok();
+        let found: Vec<u16> = words.iter().filter_map(number).collect();
+        let expected: Vec<u16> = SETTINGS.iter().map(|info| info.number()).collect();
+        assert_eq!(found, expected, "the settings in {target}.dict are not those of the table");
+        help(&mut |usage, _| {
+            let usage = usage.to_string();
+            let end = usage.find(['=', ' ']).map_or(usage.len(), |at| at + 1);
+            let command = usage[..end].trim_end();
+            let is_known = words.iter().any(|word| word.starts_with(command));
+            assert!(!command.starts_with('$') || is_known, "{target}.dict lacks {command}");
+        });
+    }
 }
