@@ -11,7 +11,7 @@ pub mod files;
 mod gcode;
 mod hpgl;
 mod scene;
-mod sender;
+pub mod sender;
 pub mod session;
 pub mod stored;
 pub mod usb;

@@ -43,10 +43,18 @@ impl StreamedDrawing {
     /// # Panics
     /// Panics if it has not so many strokes.
     pub fn from(&mut self, strokes: u32) -> StreamedJob {
+        self.from_as(strokes, Form::Strokes)
+    }
+
+    /// The same in this form.
+    ///
+    /// # Panics
+    /// As [`StreamedDrawing::from`].
+    pub fn from_as(&mut self, strokes: u32, form: Form) -> StreamedJob {
         let settings = *self.bench.plotter.machine().settings();
         let mut path = self.bench.plotter.strokes();
         assert!(strokes == 0 || path.begin_at(strokes), "so many strokes");
-        StreamedJob::new(&settings, &mut path, Form::Strokes).expect("lines of strokes")
+        StreamedJob::new(&settings, &mut path, form).expect("lines of strokes")
     }
 
     /// The lines with which it goes on where so many strokes are drawn, and so many points within

@@ -1,4 +1,7 @@
 //! Replays the inputs that the fuzzers kept, and gives the same targets random ones.
+//!
+//! `PENUP_INPUTS` sets the number of random inputs for each target; the default is 60. `PENUP_SEED`
+//! makes them others.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 
@@ -7,16 +10,15 @@ use penup::plotter::help;
 use penup_client::files::parse;
 use penup_host_tests::fuzz_targets::TARGETS;
 use penup_host_tests::fuzz_targets::files::{check, is_accepted, names};
+use penup_host_tests::fuzz_targets::sender::outcome;
 use penup_host_tests::fuzz_targets::session::{output, sessions};
 use penup_host_tests::fuzz_targets::stored::{KeptJob, interrupted_jobs};
 use penup_host_tests::random::Random;
+use penup_host_tests::wish::wish;
 use penup_readers::Arrangement;
 use penup_readers::files::Files;
 use std::panic::catch_unwind;
 use std::path::PathBuf;
-
-/// The number of random inputs for each target.
-const INPUTS: u32 = 60;
 
 /// The folder of the inputs for a target.
 fn folder(target: &str) -> PathBuf {
@@ -46,10 +48,10 @@ fn the_kept_inputs_break_no_promise() {
 
 #[test]
 fn damaged_and_joined_inputs_break_no_promise() {
-    let mut random = Random::new(1980);
+    let mut random = Random::new(wish("PENUP_SEED", 1980));
     for (name, target) in TARGETS {
         let inputs = corpus(name);
-        for _ in 0..INPUTS {
+        for _ in 0..wish("PENUP_INPUTS", 60) {
             let mut input = inputs[random.below(inputs.len() as u64) as usize].clone();
             let other = &inputs[random.below(inputs.len() as u64) as usize];
             let cut = random.below(input.len() as u64 + 1) as usize;
@@ -179,4 +181,18 @@ fn dictionaries_have_all_settings_and_commands() {
             assert!(!command.starts_with('$') || is_known, "{target}.dict lacks {command}");
         });
     }
+}
+
+/// Otherwise the fuzzer would change conversations that have ended before they have begun.
+#[test]
+fn each_conversation_with_a_real_plotter_comes_to_its_end() {
+    for name in
+        ["draws", "streams", "streams-gcode", "rejoins", "watches", "pauses", "resumes", "sets"]
+    {
+        let file = folder("sender").join(format!("real-{name}"));
+        let input = std::fs::read(&file).unwrap_or_else(|error| panic!("{name}: {error}"));
+        outcome(&input).unwrap_or_else(|error| panic!("{name}: {error}"));
+    }
+    let damaged = std::fs::read(folder("sender").join("real-damaged")).expect("an input");
+    outcome(&damaged).expect("a conversation that goes on behind damage");
 }
