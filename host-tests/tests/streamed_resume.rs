@@ -254,7 +254,7 @@ fn garbage_from_the_flash_at_a_start_loses_nothing() {
     let (found, left) = start(MANY);
     let (greeting, numbers) = &found;
     assert!(greeting.contains("[MSG:a job stopped at stroke "), "{greeting}");
-    let [_, drawn, all, _] = numbers.expect("it has stopped");
+    let [_, drawn, all, ..] = numbers.expect("it has stopped");
     assert!(drawn > 0 && all as usize == whole.len() && before.len() < whole.len(), "{drawn}");
     let count = MANY - left.expect("there are fewer reads");
     assert!(count > 100, "{count}");
@@ -268,9 +268,8 @@ fn garbage_from_the_flash_while_the_rest_is_sent_loses_nothing() {
     let (mut drawing, whole, flash, before) = cut_in_the_middle();
     let mut go_on = |garbage_after: usize| {
         let (flash, changes) = switch_on_early::<WORDS>(flash.clone(), None, |plotter| {
-            let [id, drawn, ..] = stopped(plotter).expect("it has stopped");
-            let mut rest = drawing.from(drawn);
-            rest.set_id(id);
+            let [_, drawn, _, _, points] = stopped(plotter).expect("it has stopped");
+            let rest = drawing.rest(drawn, points);
             plotter.board.flash().expect("flash").garbage_after = Some(garbage_after);
             assert!(plotter.say("$resume=origin").ends_with("ok\n"));
             assert!(send(plotter, &rest, 0, u64::MAX / 2, &mut Random::new(5)));

@@ -160,8 +160,7 @@ fn talk(conversation: u8, link: &mut dyn Link) -> Result<(), Error> {
                     other => other?,
                 },
                 Some(stopped) => with_drawing(|drawing| {
-                    let mut job = drawing.from_as(stopped.drawn.min(1), Form::Strokes);
-                    job.set_id(stopped.id);
+                    let job = drawing.rest(stopped.drawn.min(1), stopped.points);
                     sender.draw_streamed(&job, &mut Quiet)
                 })?,
             }
