@@ -59,11 +59,13 @@ pub fn run(cli: &Cli, interrupt: &AtomicBool) -> Result<Outcome, Error> {
             encode_tape(args, quiet, interrupt).map_err(|error| error.of_file(&args.file))
         }
         Command::Tape(TapeCommand::Decode { file, .. }) => {
-            let text = tape::decode(&files::bytes(file)?).map_err(damaged(file))?;
+            let tape = files::bytes(file)?;
+            let text = tape::decode(&tape).map_err(damaged(file))?;
+            note_end(file, &tape, quiet);
             let instructions: Vec<&str> = text.lines().collect();
             Ok(Outcome::answer(text.trim_end(), json!({ "instructions": instructions })))
         }
-        Command::Tape(TapeCommand::Show(args)) => show_tape(args),
+        Command::Tape(TapeCommand::Show(args)) => show_tape(args, quiet),
         Command::Ports(args) => operate::ports(args),
         Command::Status(args) => operate::status(args, interrupt),
         Command::Watch(args) => operate::watch(args, quiet, interrupt),
@@ -355,17 +357,25 @@ fn encode_tape(
     Ok(Outcome::done(text, json!({ "files": [output], "bytes": tape.len() })))
 }
 
-fn show_tape(args: &TapeShowArgs) -> Result<Outcome, Error> {
+fn show_tape(args: &TapeShowArgs, quiet: bool) -> Result<Outcome, Error> {
     let outputs = Outputs::of(&args.pictures, None);
     output::check(&args.file, &outputs.files())?;
     let tape = files::bytes(&args.file)?;
     let shown = tape::show(&tape, args.page, args.steps);
     let (picture, moves) = shown.map_err(damaged(&args.file))?;
+    note_end(&args.file, &tape, quiet);
     let files = write_pictures(&picture, &outputs)?;
     let names = names(&files);
     let text = format!("{}: {moves} moves from {} bytes", names.join(", "), tape.len());
     let json = json!({ "files": names, "moves": moves, "bytes": tape.len() });
     Ok(Outcome::done(text, json))
+}
+
+/// Tells the user what of a tape is missing or not shown.
+fn note_end(file: &Path, tape: &[u8], quiet: bool) {
+    if !quiet {
+        note(file, penup_readers::end_note(tape).as_slice());
+    }
 }
 
 fn damaged(file: &Path) -> impl Fn(BadCode) -> Error {

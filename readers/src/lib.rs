@@ -45,6 +45,8 @@ pub mod words;
 pub use arrange::{Arrangement, PLAN_OPTIONS, PlanOption, Turn, sine_cosine};
 pub use error::ReadError;
 pub use format::SIZE_LIMIT;
+#[cfg(feature = "tape")]
+pub use tape::end_note;
 
 use crate::lines::{JobLine, Lines, Origin, extent};
 use crate::page::{A4, Page};

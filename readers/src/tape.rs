@@ -4,6 +4,7 @@
 //! tapes `penup tape encode` writes. The reader refuses codes that are no instruction.
 
 use super::arrange::Arrangement;
+use super::counted;
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::Plan;
@@ -65,13 +66,59 @@ impl Format for Tape {
         if plan.is_empty() {
             return Err(refused("the pen is never down on this tape".to_owned()));
         }
-        Ok(plan.contents(None, Vec::new()))
+        Ok(plan.contents(None, end_note(&bytes).into_iter().collect()))
     }
+}
+
+/// Says what of a tape is missing or not drawn, because it has no stop, or more behind one.
+///
+/// ```
+/// assert_eq!(penup_readers::end_note(&[0x33, 0xB0]), None);
+/// assert!(penup_readers::end_note(&[0x33]).is_some());
+/// ```
+pub fn end_note(tape: &[u8]) -> Option<String> {
+    let mut decoder = Decoder::new(tape.iter().copied());
+    decoder.by_ref().for_each(drop);
+    if decoder.damage().is_some() {
+        return None;
+    }
+    if !decoder.has_stopped() {
+        return Some(
+            "the tape has no stop at its end: if it was cut off, a part is missing, so copy or \
+             record it again"
+                .to_owned(),
+        );
+    }
+    let behind = decoder.count_rest();
+    (behind > 0).then(|| {
+        let instructions = counted(behind, ["instruction is", "instructions are"]);
+        format!(
+            "{instructions} not drawn, behind the stop of the tape: if tapes were joined, draw \
+             each by itself"
+        )
+    })
 }
 
 #[cfg(test)]
 mod tests {
-    use crate::tests::sent;
+    use crate::tests::{notes, sent};
+
+    /// Tapes of which a part is lost, or that were joined.
+    #[test]
+    fn a_tape_without_its_stop_and_what_is_behind_one_are_told() {
+        let whole = [0xA0, 0x00, 0x33, 0x23, 0xB0, 0x00];
+        assert_eq!(notes("a.tape", &whole), [""; 0]);
+        let cut = "the tape has no stop at its end: if it was cut off, a part is missing, so copy \
+                   or record it again";
+        assert_eq!(notes("a.tape", whole.get(..4).expect("bytes")), [cut]);
+        let behind = |count: &str| {
+            format!(
+                "{count} not drawn, behind the stop of the tape: if tapes were joined, draw each by itself"
+            )
+        };
+        assert_eq!(notes("a.tape", &[&whole[..], &whole].concat()), [behind("5 instructions are")]);
+        assert_eq!(notes("a.tape", &[&whole[..], &[3, 0]].concat()), [behind("1 instruction is")]);
+    }
 
     #[test]
     fn runs_of_steps_are_lines_of_a_plan() {

@@ -127,6 +127,28 @@ impl<I: Iterator<Item = u8>> Decoder<I> {
         self.damage
     }
 
+    /// Whether a stop has ended the tape.
+    pub const fn has_stopped(&self) -> bool {
+        self.ended && self.damage.is_none()
+    }
+
+    /// The number of instructions that are not read yet, as those behind the stop, and that are
+    /// neither nothing nor a stop. Codes that mean no instruction count, too.
+    ///
+    /// ```
+    /// use penup::step::tape::Decoder;
+    /// let mut decoder = Decoder::new([0x33, 0xB0, 0x2B].into_iter());
+    /// assert_eq!(decoder.by_ref().count(), 2);
+    /// assert!(decoder.has_stopped());
+    /// assert_eq!(decoder.count_rest(), 1);
+    /// ```
+    pub fn count_rest(mut self) -> usize {
+        let codes = core::iter::from_fn(|| self.next_code()).map(Instruction::from_code);
+        let is_idle =
+            |it: &Option<Instruction>| matches!(it, Some(Instruction::Nothing | Instruction::Stop));
+        codes.filter(|it| !is_idle(it)).count()
+    }
+
     /// The next four-bit code, or `None` at the end of the rows.
     fn next_code(&mut self) -> Option<u8> {
         if let Some(second) = self.second.take() {
