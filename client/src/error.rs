@@ -339,6 +339,17 @@ pub enum Error {
         /// The number of all strokes; 0 if it is not known.
         all: u64,
     },
+    /// A job that was followed is over before its end, and the plotter keeps nothing of it.
+    #[error(
+        "the job is over before its end{}: it was given up or refused, or the plotter was reset or \
+         lost its power\nIt does not keep how far it came, so `penup resume` cannot go on: look at \
+         the sheet, and plot it anew",
+        drawn.map_or(String::new(), |(done, all)| format!(", after {}", strokes_drawn(done, all)))
+    )]
+    JobUnfinished {
+        /// The numbers of strokes that were begun, and of all, if the plotter still knows them.
+        drawn: Option<(u64, u64)>,
+    },
     /// A pass was drawn to its end whose beginning another program has sent.
     #[error(
         "one of the {passes} passes is drawn to its end, and this program cannot tell which: draw \
@@ -547,6 +558,7 @@ impl Error {
             | Self::Alarm { .. }
             | Self::Restarted
             | Self::JobStopped { .. }
+            | Self::JobUnfinished { .. }
             | Self::EndedMeanwhile
             | Self::PassesLeft { .. }
             | Self::Damaged { .. }

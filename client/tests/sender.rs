@@ -545,3 +545,92 @@ fn a_job_that_stopped_before_is_no_failure_of_what_is_watched() {
         assert_eq!((is_told, watched.is_ok()), (has_stopped, !has_stopped), "{reports:?}");
     }
 }
+
+/// A plotter that gives these reports one after the other, and the last one for ever.
+struct Reports(VecDeque<&'static str>, VecDeque<u8>);
+
+impl Reports {
+    fn of(reports: &[&'static str]) -> Self {
+        Self(reports.iter().copied().collect(), VecDeque::new())
+    }
+}
+
+impl Link for Reports {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        for _ in bytes.iter().filter(|byte| **byte == b'?') {
+            let report =
+                if self.0.len() > 1 { self.0.pop_front() } else { self.0.front().copied() };
+            self.1.extend(report.unwrap_or_default().bytes().chain(*b"\r\n"));
+        }
+        Ok(())
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], _: Duration) -> io::Result<usize> {
+        let count = buffer.len().min(self.1.len());
+        buffer.iter_mut().zip(self.1.drain(..count)).for_each(|(slot, byte)| *slot = byte);
+        Ok(count)
+    }
+
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Nobody)
+    }
+}
+
+/// Watches a plotter that gives these reports. Returns the error, if that is what it comes to.
+fn watched(reports: &[&'static str]) -> Option<Error> {
+    let interrupt = AtomicBool::new(false);
+    let mut link = Reports::of(reports);
+    let (mut sender, first) = Sender::join(&mut link, TIMEOUTS, &interrupt).expect("a plotter");
+    match first.is_idle() {
+        true => sender.fail_if_unfinished(first).err(),
+        false => sender.watch(&mut Quiet).err(),
+    }
+}
+
+const RUNS: &str = "<Run|MPos:1.000,2.000,0.000|Drawn:12/60|Ink:10/90|Left:9>";
+
+#[test]
+fn a_job_that_is_over_before_its_end_is_not_taken_for_done() {
+    let over = "<Idle|MPos:1.000,2.000,0.000|Drawn:12/60|Ink:10/90|Left:0>";
+    let in_stroke = "<Idle|MPos:1.000,2.000,0.000|Drawn:1/1|Ink:10/90|Left:0>";
+    let restarted = "<Idle|MPos:0.000,0.000,0.000|Drawn:0/0|Ink:0/0|Left:0>";
+    let stopped = "<Idle|MPos:0.000,0.000,0.000|Stopped:3/9|Drawn:0/0|Ink:0/0|Left:0>";
+    for (reports, said) in [
+        (&[RUNS, RUNS, over][..], "the job is over before its end, after 12 of 60 strokes"),
+        (&[RUNS, RUNS, in_stroke], "the job is over before its end, after 1 of 1 stroke"),
+        (&[RUNS, RUNS, restarted], "the job is over before its end: it was given up"),
+        (&[RUNS, RUNS, stopped], "the job has stopped after 3 of 9 strokes"),
+        (&[stopped], "the job has stopped after 3 of 9 strokes"),
+        (&[over], "the job is over before its end, after 12 of 60 strokes"),
+        (&[in_stroke], "the job is over before its end, after 1 of 1 stroke"),
+    ] {
+        let error = watched(reports).expect("an error");
+        assert!(error.to_string().starts_with(said), "{reports:?}: {error}");
+        assert_eq!(error.exit_code(), 5, "{error}");
+    }
+}
+
+/// Strokes of G-code that are shorter than a motor step are not counted, and lengths are rounded.
+/// A digit that is damaged in one report is right in the next.
+#[test]
+fn what_has_ended_is_taken_for_done() {
+    let ended = "<Idle|MPos:1.000,2.000,0.000|Drawn:60/60|Ink:90/90|Left:0>";
+    let program = "<Idle|MPos:1.000,2.000,0.000|Drawn:59/60|Ink:89/90|Left:0>";
+    let after = "<Idle|MPos:1.000,2.000,0.000|Stopped:3/9|Drawn:60/60|Ink:90/90|Left:0>";
+    let damaged = "<Idle|MPos:1.000,2.000,0.000|Drawn:50/60|Ink:20/90|Left:0>";
+    let moved = "<Jog|MPos:1.000,2.000,0.000|Drawn:0/0|Ink:0/0|Left:0>";
+    let empty = "<Idle|MPos:1.000,2.000,0.000|Drawn:0/0|Ink:0/0|Left:0>";
+    for reports in [
+        &[RUNS, RUNS, ended][..],
+        &[RUNS, RUNS, program],
+        &[RUNS, RUNS, after],
+        &[RUNS, RUNS, damaged, ended],
+        &[moved, moved, empty],
+        &[ended],
+        &[empty],
+        &[after],
+        &[damaged, ended],
+    ] {
+        assert!(watched(reports).is_none(), "{reports:?}");
+    }
+}

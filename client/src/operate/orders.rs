@@ -194,7 +194,7 @@ fn progress(json: bool, is_quiet: bool) -> Box<dyn Progress> {
 /// Follows what the machine draws until it is idle, whoever has sent it.
 ///
 /// # Errors
-/// See [`Sender::watch`].
+/// See [`Sender::watch`] and [`Sender::fail_if_unfinished`].
 pub fn watch(args: &WatchArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result<Outcome, Error> {
     let mut link = open(&args.plotter.port)?;
     link.rejoin(&args.rejoin, is_quiet);
@@ -202,7 +202,8 @@ pub fn watch(args: &WatchArgs, is_quiet: bool, interrupt: &AtomicBool) -> Result
     let mut progress = progress(args.plotter.format.json, is_quiet);
     let (mut sender, first) = Sender::join(&mut link, Timeouts::default(), interrupt)?;
     if first.is_idle() {
-        return Ok(Outcome::done("nothing is being drawn", as_json(&first)));
+        let status = sender.fail_if_unfinished(first)?;
+        return Ok(Outcome::done("nothing is being drawn", as_json(&status)));
     }
     let status = sender.watch(progress.as_mut())?;
     Ok(Outcome::done(described(&status), as_json(&status)))

@@ -76,10 +76,35 @@ impl FollowedDrawing {
     /// report. A job that stopped earlier is reported all the time, also after a program of G-code,
     /// whose moves are not kept.
     fn has_stopped(&self, last: &Status) -> bool {
-        let Some(strokes) = self.strokes else { return false };
-        let is_left = |(done, all): (u64, u64)| done < all;
-        let has_restarted = strokes > 0 && last.strokes.is_none_or(|(_, all)| all == 0);
-        has_restarted || last.strokes.is_some_and(is_left) || last.ink.is_some_and(is_left)
+        self.strokes.is_some() && (self.has_restarted(last) || is_left(last))
+    }
+
+    /// Whether the plotter has forgotten what it drew, according to the `last` report.
+    fn has_restarted(&self, last: &Status) -> bool {
+        self.strokes.is_some_and(|strokes| strokes > 0)
+            && last.strokes.is_none_or(|(_, all)| all == 0)
+    }
+
+    /// Whether what was drawn has ended before its end according to the `last` report, though no
+    /// job has stopped that the plotter keeps. It `is_job` unless it may be a program of G-code,
+    /// whose strokes are counted less exactly than its ink.
+    fn is_unfinished(&self, last: &Status, is_job: bool) -> bool {
+        let has_ended_early = if is_job { is_left(last) } else { is_ink_left(last) };
+        self.strokes.is_some() && (self.has_restarted(last) || has_ended_early)
+    }
+}
+
+/// Whether strokes or ink are left according to a report.
+fn is_left(status: &Status) -> bool {
+    [status.strokes, status.ink].into_iter().flatten().any(|(done, all)| done < all)
+}
+
+/// Whether more ink is left according to a report than its lengths are rounded by; where nothing
+/// has a length, whether strokes are.
+pub(super) fn is_ink_left(status: &Status) -> bool {
+    match status.ink {
+        Some((done, all)) if all > 0 => done.saturating_add(1 + all / 1000) < all,
+        _ => status.strokes.is_some_and(|(done, all)| done < all),
     }
 }
 
@@ -160,14 +185,50 @@ impl Sender<'_> {
         if status.stopped.is_some() && followed.has_stopped(&status) {
             return self.fail_if_stopped();
         }
-        Ok(status)
+        self.fail_if(status, |status| followed.is_unfinished(status, false))
+    }
+
+    /// Fails if the last job of an idle machine, which has this `status`, has not come to its end.
+    /// Returns the status, also where a program of G-code has ended since a job stopped.
+    ///
+    /// # Errors
+    /// [`Error::JobStopped`] or [`Error::JobUnfinished`], or as [`Sender::join`].
+    pub fn fail_if_unfinished(&mut self, status: Status) -> Result<Status, Error> {
+        let is_of_job =
+            |status: &Status| is_left(status) || status.strokes.is_none_or(|(_, all)| all == 0);
+        if status.stopped.is_some() && is_of_job(&status) {
+            return self.fail_if_stopped();
+        }
+        self.fail_if(status, is_ink_left)
+    }
+
+    /// Fails if the drawing `is_unfinished` according to this status and those that follow: reports
+    /// have no checksum.
+    fn fail_if(
+        &mut self,
+        mut status: Status,
+        is_unfinished: impl Fn(&Status) -> bool,
+    ) -> Result<Status, Error> {
+        for _ in 0..2 {
+            if is_unfinished(&status) {
+                status = self.find_state()?;
+            }
+        }
+        match is_unfinished(&status) {
+            true => Err(Error::JobUnfinished { drawn: status.strokes.filter(|(_, all)| *all > 0) }),
+            false => Ok(status),
+        }
     }
 
     /// As [`Sender::watch`], where this program has sent the drawing as strokes. The plotter keeps
     /// how far it comes, in place of any job that has stopped before.
     pub(super) fn watch_strokes(&mut self, progress: &mut dyn Progress) -> Result<Status, Error> {
-        self.follow_drawing(None, None, &mut FollowedDrawing::default(), progress)?;
-        self.fail_if_stopped()
+        let mut followed = FollowedDrawing::default();
+        self.follow_drawing(None, None, &mut followed, progress)?;
+        let status = self.fail_if_stopped()?;
+        // It was seen, or may have been.
+        followed.strokes = Some(followed.strokes.unwrap_or(0).max(1));
+        self.fail_if(status, |status| followed.is_unfinished(status, true))
     }
 
     /// As [`Sender::watch`], where this program has `sent` the drawing as G-code. The plotter does
