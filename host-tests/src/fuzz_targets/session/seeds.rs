@@ -23,8 +23,8 @@ const OUTAGE_IN_SECTOR: [u8; 2] = [ORDER, 0xEB];
 /// What is sent after a loss of power to go on with the job.
 const GO_ON: &str = "$resume=origin\n";
 
-/// The sessions, each with its name and something that the plotter says in it. It accepts
-/// all lines but some settings that conflict with the others.
+/// The sessions, each with its name and something that the plotter says in it. It accepts all lines
+/// but some settings that conflict with the others.
 pub fn sessions() -> Vec<(&'static str, Vec<u8>, &'static str)> {
     let cube = job_lines("cube.obj", &SMALL);
     let point = job_lines("cube.obj", &[&SMALL[..], &["$219=0.01"]].concat());
