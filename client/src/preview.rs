@@ -321,6 +321,11 @@ impl<I: Index> InMemory<I> {
         tape.map_err(|error| Error::NotDrawn { refusal: CommandError::Machine(error) })
     }
 
+    /// Whether several pens draw what was computed last.
+    pub fn has_several_pens(&mut self) -> bool {
+        has_several_pens(&mut self.plotter.strokes())
+    }
+
     /// Records the motion of the drawing by this plotter ([`crate::motion_plot`]).
     ///
     /// # Errors

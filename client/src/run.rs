@@ -350,7 +350,11 @@ fn encode_tape(
     }
     let tape = plotter.tape()?;
     if !quiet {
-        note(&args.file, &plotter.left_out());
+        let has_several_pens = plotter.has_several_pens();
+        let merged = has_several_pens.then(|| {
+            "several pens draw it, and a tape has no pens: one pen draws all of them".to_owned()
+        });
+        note(&args.file, &merged.into_iter().chain(plotter.left_out()).collect::<Vec<_>>());
     }
     output::write(&output, &tape)?;
     let text = format!("{}: {} bytes", output.display(), tape.len());

@@ -51,6 +51,16 @@ fn all_pens_and_every_refill_are_on_a_tape_and_in_the_plot_of_the_motion() {
         words.filter_map(|word| word.parse::<u32>().ok()).sum::<u32>()
     };
     assert_eq!(lengths("pens.obj"), lengths("one.obj"));
+    for (name, options, is_told) in [
+        ("pens.obj", &[][..], true),
+        ("pens.obj", &["--pens", "one"], false),
+        ("one.obj", &[], false),
+    ] {
+        let encode = [&["tape", "encode", name][..], options].concat();
+        let (code, _, noted) = penup(folder.path(), &encode);
+        let told = "several pens draw it, and a tape has no pens: one pen draws all of them";
+        assert_eq!((code, noted.contains(told)), (Some(0), is_told), "{name}: {noted}");
+    }
     let lines = format!("{vertices}v 20 30 0\nl 1 2\nl 3 4\n");
     fs::write(folder.path().join("lines.obj"), &lines).expect("written");
     let by_pens = lines.replace("l 3", "usemtl b\nl 3");
