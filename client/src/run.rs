@@ -406,7 +406,12 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Sourc
         }
         note(file, &notes::idle_options(&settings, source.bounds().is_some()));
     }
-    let (extent, is_plan) = (source.extent(), source.bounds().is_some());
+    let (mut extent, is_plan) = (source.extent(), source.bounds().is_some());
+    if let Some(by) = source.bounds().and_then(|bounds| settings.moves_plan_by(bounds)) {
+        for corner in extent.iter_mut().flatten() {
+            corner.iter_mut().zip(by).for_each(|(part, by)| *part += by);
+        }
+    }
     let is_scaled_by_plotter =
         is_plan && settings.value("fit") == Some("on") && !view.arrangement().scales_to_page();
     let job = Job::new(source, &settings);
@@ -417,7 +422,7 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Sourc
 pub struct Source {
     /// The settings of the drawing.
     pub settings: Settings,
-    /// The least and the greatest coordinates.
+    /// The least and the greatest coordinates; of a plan at true size, those on the page.
     extent: Option<[[f64; 3]; 2]>,
     is_plan: bool,
     /// Whether the coordinates are those of a plan before the plotter scales it to the page.

@@ -1,6 +1,7 @@
 //! A job to send to a plotter, and its settings.
 
 use crate::protocol::{CLEAR, PENS, VIEW_AUTO};
+use penup::plotter::PlotOptions;
 use penup_readers::lines::{JobLine, Lines};
 use penup_readers::page::Page;
 
@@ -22,35 +23,74 @@ impl Settings {
         self.values.iter().find(|(own, _)| *own == name).map(|(_, value)| value.as_str())
     }
 
+    /// The options of the plotter with these settings. A plotter tells by itself which one it
+    /// refuses.
+    pub(crate) fn options(&self) -> PlotOptions {
+        let mut options = PlotOptions::default();
+        for (name, value) in &self.values {
+            let _ = options.set(name, value);
+        }
+        options
+    }
+
+    /// The margin, and the height that the title takes below the drawing, in mm.
+    fn margin_and_foot(&self) -> Option<[f64; 2]> {
+        let foot = self.options().sheet().foot;
+        Some([self.value("margin")?.parse().ok()?, foot.to_num()])
+    }
+
     /// Says that a plan with these least and greatest coordinates, in mm, is too large for the
     /// page, but fits it if the page is turned, which the plotter does not know. `None` if the plan
     /// fits, is scaled, or is too large for the turned page, too.
     pub fn fits_turned(&self, [low, high]: [[f64; 2]; 2]) -> Option<String> {
-        let margin: f64 = self.value("margin")?.parse().ok()?;
+        let [margin, foot] = self.margin_and_foot()?;
         let [width, height] = [0, 1].map(|axis| high[axis] - low[axis] + 2.0 * margin);
-        let fits = |page: Page| width <= page.width && height <= page.height;
+        let fits = |page: Page| width <= page.width && height + foot <= page.height;
         let turned = Page { width: self.page.height, height: self.page.width };
         let helps = !fits(self.page) && fits(turned) && self.value("fit") == Some("off");
         helps.then(|| "the drawing fits the page if that is turned: --landscape=auto".to_owned())
     }
 
-    /// Says that the plotter moves a plan with these least and greatest coordinates, in mm, because
-    /// it does not lie within the margins of the page. `None` if the plan keeps its place, is
-    /// scaled, or is too large for the page, which the plotter says by itself.
+    /// By how many mm the plotter moves a plan with these least and greatest coordinates, in mm,
+    /// because it does not lie within the margins of the page and above the title. `None` if the
+    /// plan keeps its place, is scaled, or is too large for the page, which the plotter says by
+    /// itself.
+    pub fn moves_plan_by(&self, [low, high]: [[f64; 2]; 2]) -> Option<[f64; 2]> {
+        let [margin, foot] = self.margin_and_foot()?;
+        let (first, last) =
+            ([margin, margin + foot], [self.page.width - margin, self.page.height - margin]);
+        let fits = |axis: usize| high[axis] - low[axis] <= last[axis] - first[axis];
+        let is_flat = self.value("fit") == Some("off") && self.options().shows_plans_flat();
+        if !is_flat || ![0, 1].into_iter().all(fits) {
+            return None;
+        }
+        let by = [0, 1].map(|axis: usize| match low[axis] < first[axis] {
+            true => first[axis] - low[axis],
+            false => (last[axis] - high[axis]).min(0.0),
+        });
+        (by != [0.0; 2]).then_some(by)
+    }
+
+    /// Says that the plotter moves a plan with these least and greatest coordinates, in mm, and
+    /// where to. `None` as by [`Settings::moves_plan_by`].
     pub fn moves_plan(&self, [low, high]: [[f64; 2]; 2]) -> Option<String> {
-        let margin: f64 = self.value("margin")?.parse().ok()?;
-        let size = [self.page.width, self.page.height];
-        let fits = |axis: usize| high[axis] - low[axis] <= size[axis] - 2.0 * margin;
-        let lies = |axis: usize| low[axis] >= margin && high[axis] <= size[axis] - margin;
-        let is_moved = [0, 1].into_iter().all(fits) && ![0, 1].into_iter().all(lies);
-        (is_moved && self.value("fit") == Some("off")).then(|| {
-            let [width, height] = size;
-            format!(
-                "the drawing is moved onto the page of {width} x {height} mm with its margin of \
-                 {margin} mm: it reaches from {}, {} to {}, {} mm",
-                low[0], low[1], high[0], high[1]
-            )
-        })
+        let by = self.moves_plan_by([low, high])?;
+        let [margin, foot] = self.margin_and_foot()?;
+        let Page { width, height } = self.page;
+        // Less than a thousandth of a millimetre is less than a step.
+        let digits = |length: f64| (length * 1e3).round() / 1e3 + 0.0;
+        let title = match foot > 0.0 {
+            true => format!(" and the {} mm of its title", digits(foot)),
+            false => String::new(),
+        };
+        let [to_low, to_high] =
+            [low, high].map(|at| [0, 1].map(|axis: usize| digits(at[axis] + by[axis])));
+        Some(format!(
+            "the drawing is moved onto the page of {width} x {height} mm with its margin of \
+             {margin} mm{title}: the file has it from {}, {} to {}, {} mm, and it is drawn from \
+             {}, {} to {}, {} mm",
+            low[0], low[1], high[0], high[1], to_low[0], to_low[1], to_high[0], to_high[1]
+        ))
     }
 }
 

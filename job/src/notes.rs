@@ -124,12 +124,8 @@ fn is_of_camera(name: &str) -> bool {
 
 /// The options of the plotter with these settings, and the names of those that are not as usual.
 fn changed(settings: &Settings) -> (PlotOptions, Vec<String>) {
-    let mut options = PlotOptions::default();
-    let usual: Vec<String> = options.lines().map(|line| line.to_string()).collect();
-    for (name, value) in &settings.values {
-        // If the plotter refuses an option, the user is told when the job is sent.
-        let _ = options.set(name, value);
-    }
+    let usual: Vec<String> = PlotOptions::default().lines().map(|it| it.to_string()).collect();
+    let options = settings.options();
     let name = |line: String| Some(line.strip_prefix('$')?.split('=').next()?.to_owned());
     let names = options
         .lines()

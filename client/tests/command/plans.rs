@@ -79,6 +79,41 @@ fn a_plan_that_the_margin_moves_is_told_and_a_solid_is_not() {
     assert!(!told("v 0 0 0\nv 20 30 1\nl 1 2\n", &[]));
 }
 
+/// Below the drawing is the title, whose height the plotter keeps free, too.
+#[test]
+fn a_plan_that_the_title_moves_is_told_with_its_place() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("a.obj"), "v 20 12 0\nv 60 42 0\nl 1 2\n").expect("written");
+    let preview = |options: &[&str]| {
+        let usual = ["preview", "a.obj", "--svg", "a.svg", "--json", "a.json"];
+        let (code, said, noted) = penup(folder.path(), &[&usual[..], options].concat());
+        assert_eq!(code, Some(0), "{noted}");
+        let result = fs::read_to_string(folder.path().join("a.json")).expect("readable");
+        let result: serde_json::Value = serde_json::from_str(&result).expect("JSON");
+        let y = |value: &serde_json::Value| value.as_f64().expect("a number");
+        // The line of the plan is the longest stroke.
+        let strokes = result["strokes"].as_array().expect("strokes");
+        let ends = |stroke: &serde_json::Value| [y(&stroke[0][1]), y(&stroke[1][1])];
+        let height = |stroke: &&serde_json::Value| {
+            let [from, to] = ends(stroke);
+            ((from - to).abs() * 1000.0) as i64
+        };
+        let [from, to] = ends(strokes.iter().max_by_key(height).expect("a stroke"));
+        let told = [0, 1].map(|end| y(&result["bounds"][end][1]));
+        (from.min(to), told, said, noted)
+    };
+    let (drawn, told, said, noted) = preview(&[]);
+    assert!((drawn - 12.0).abs() < 0.02 && told == [12.0, 42.0], "{drawn} {told:?}");
+    assert!(!noted.contains("is moved") && said.contains("from 20, 12 to 60, 42 mm"), "{said}");
+    let (drawn, told, said, noted) = preview(&["--title", "Ada"]);
+    assert!(drawn > 12.5 && (drawn - told[0]).abs() < 0.02, "{drawn} {told:?}");
+    assert!(
+        noted.contains(" mm of its title: the file has it from 20, 12 to 60, 42 mm"),
+        "{noted}"
+    );
+    assert!(!said.contains("from 20, 12 to"), "{said}");
+}
+
 #[test]
 fn a_plan_that_is_too_small_to_be_drawn_is_told_its_size() {
     let folder = tempfile::tempdir().expect("a folder");
