@@ -196,6 +196,12 @@ fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
             "beyond the page of the SVG: the rest is cut off",
         ),
         (
+            drawing.coarse,
+            ["path lies", "paths lie"],
+            "so far from the origin of its coordinates that it is drawn less exactly than a motor \
+             step: move the drawing to the origin in the program that wrote it",
+        ),
+        (
             drawing.backgrounds,
             ["filled shape covers", "filled shapes cover"],
             "the whole page, as a background does: its outline is not drawn",

@@ -2,7 +2,7 @@
 
 use super::areas::rectangle;
 use super::clip::ConvexArea;
-use super::flatten::{Arcs, Polyline, TooManyPoints, flatten, path_length};
+use super::flatten::{Arcs, Polyline, TooManyPoints, flatten, is_coarse, path_length};
 use super::markup::Markup;
 use super::pens::Marks;
 use crate::arrange::clip_outline;
@@ -76,6 +76,8 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) documentation: usize,
     /// The number of paths that reach beyond the page and are cut there.
     pub(super) cut: usize,
+    /// The number of paths so far from 0 that single precision moves their points.
+    pub(super) coarse: usize,
     /// The number of filled shapes whose outline is that of the page.
     pub(super) backgrounds: usize,
     /// The number of paths that are only filled and have no area.
@@ -137,6 +139,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             strokeless: 0,
             documentation: 0,
             cut: 0,
+            coarse: 0,
             backgrounds: 0,
             flat: 0,
             white: 0,
@@ -360,6 +363,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let layer = context.element.or(own).and_then(|element| self.markup.layer(element));
         let marks = Marks { layer, colour };
         if !parts.is_empty() || !outlines.is_empty() {
+            self.coarse += count * usize::from(is_coarse(path, context.to_page));
             let within = context.areas.clone();
             let has_dots = stroke.is_some_and(|stroke| stroke.linecap() != LineCap::Butt);
             let unseen = if is_unseen { count } else { 0 };

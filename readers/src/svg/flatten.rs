@@ -10,6 +10,9 @@ use crate::region::TooMuch;
 use kurbo::{Affine, BezPath, ParamCurveArclen as _, PathEl, Point};
 use usvg::tiny_skia_path::{Path, PathSegment};
 
+/// How far off a point may be, in mm, before it is told: less than half of a usual motor step.
+const MOST_ERROR: f64 = 0.01;
+
 /// The tolerance of flattening curves, in mm. Together with [`COARSE`] and the rounding to
 /// thousandths of a millimetre it stays below half a motor step, 0.00625 mm.
 const FINE: f64 = 0.0001;
@@ -288,4 +291,14 @@ impl Beam {
             high: self.high.min(turn + other.high),
         }
     }
+}
+
+/// Whether single precision, in which the coordinates of a path are read, moves its points by more
+/// than [`MOST_ERROR`] on the page. Of a path that only reaches far, what is near counts.
+pub(super) fn is_coarse(path: &usvg::Path, to_page: Affine) -> bool {
+    let bounds = path.bounding_box();
+    let nearest = |from: f32, to: f32| f64::from(from.max(-to).max(0.0));
+    let far = nearest(bounds.left(), bounds.right()).max(nearest(bounds.top(), bounds.bottom()));
+    let scale = to_page.determinant().abs().sqrt();
+    far * f64::from(f32::EPSILON) * scale > MOST_ERROR
 }

@@ -361,6 +361,31 @@ fn what_an_image_that_is_an_svg_leaves_out_is_told() {
     assert_eq!(file.notes(), expected);
 }
 
+/// A map in national coordinates, by its viewBox or by a transform.
+#[test]
+fn what_lies_too_far_from_the_origin_to_be_exact_is_told() {
+    let path = |x: f64, y: f64| {
+        let [right, top] = [x + 50.0, y + 70.0];
+        format!("<path stroke='black' fill='none' d='M{x} {y}L{right} {top}'/>")
+    };
+    let told = |svg: &str| read(svg).expect("an SVG").notes().join("; ");
+    let note = "1 path lies so far from the origin of its coordinates that it is drawn less exactly \
+                than a motor step: move the drawing to the origin in the program that wrote it";
+    let map = in_mm(&path(500_010.0, 5_500_010.0));
+    let boxed = map.replace("viewBox='0 0", "viewBox='500000 5500000");
+    assert_eq!(told(&boxed), note);
+    let moved =
+        format!("<g transform='translate(-500000,-5500000)'>{}</g>", path(500_010.0, 5.5e6));
+    assert_eq!(told(&in_mm(&moved)), note);
+    assert_eq!(told(&in_mm(&path(20.0, 10.0))), "");
+    // A line that only reaches far, and coordinates that are fine on a small scale.
+    let long = "<path stroke='black' d='M-9e6 10L9e6 10'/>";
+    assert!(!told(&in_mm(long)).contains("less exactly"));
+    let fine = in_mm(&path(500_010.0, 500_010.0))
+        .replace("viewBox='0 0 100 100'", "viewBox='0 0 900000 900000'");
+    assert_eq!(told(&fine), "");
+}
+
 #[test]
 fn text_of_other_encodings_is_read() {
     let svg = in_mm("<g id='Räume'><path d='M10 20H30' stroke='red'/></g>");
