@@ -133,11 +133,14 @@ fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
     (draws.contains(&true) && draws.contains(&false)).then_some(draws)
 }
 
+/// Whether a fan or the coolant is on, if the program has said.
+type Output = fn(&Signals) -> Option<bool>;
+
 /// By the fan or the coolant, or else, if neither lifts the pen, G1 to G3 draw and G0 does not. Says
 /// what is taken, unless that makes no difference.
 fn by_outputs(moves: &Moves) -> Inked {
     let by_motion: Vec<bool> = moves.iter().map(|it| !it.is_rapid).collect();
-    let outputs: [(&str, fn(&Signals) -> Option<bool>); 2] =
+    let outputs: [(&str, Output); 2] =
         [("M106 and M107", |it| it.fan), ("M7 to M9", |it| it.coolant)];
     let mut note = None;
     for (name, output) in outputs {
