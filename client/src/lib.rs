@@ -12,9 +12,9 @@
 //! [`penup_job::results`] are what is known about a job afterwards.
 //!
 //! [`operate`] are the commands for the machine itself, [`ports`] finds it, [`rejoin`] waits for it
-//! when it is gone, [`keyboard`] are the keys that act while it draws, and [`typed`] are the answers
-//! where there are none. Every command returns an [`outcome`]. [`penup_job::notes`] tells which
-//! options change nothing.
+//! when it is gone, [`keyboard`] are the keys that act while it draws, and [`typed`] are the
+//! answers where there are none. Every command returns an [`outcome`]. [`penup_job::notes`] tells
+//! which options change nothing.
 //!
 //! [`serve`] serves the page to a browser, which [`bridge`] joins to a plotter. [`tape`] records a
 //! job as single motor steps, and [`motion_plot`] plots its speed.

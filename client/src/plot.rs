@@ -385,8 +385,8 @@ fn fail_if_stopped_before(
     }
 }
 
-/// Fails if the plotter has stopped a drawing that it has computed itself. It draws in another order
-/// than this computer, so that the first strokes of that are not those that it has drawn.
+/// Fails if the plotter has stopped a drawing that it has computed itself. It draws in another
+/// order than this computer, whose first strokes are therefore not those that it has drawn.
 fn fail_if_stopped_by_plotter(sender: &mut Sender<'_>, left_out: u32) -> Result<(), Error> {
     let Some((done, all)) = sender.stopped_job()? else { return Ok(()) };
     match sender.stopped_drawing() {

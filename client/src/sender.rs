@@ -15,6 +15,7 @@
 
 mod delivery;
 mod drawing;
+mod ending;
 mod orders;
 mod refusals;
 mod timeouts;

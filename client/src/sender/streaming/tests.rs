@@ -335,3 +335,59 @@ fn a_damaged_answer_about_a_drawing_is_not_believed() {
     assert_eq!(told, stopped);
     assert!((4..40).contains(&told.drawn) && told.all == 40, "{told:?}");
 }
+
+/// A plotter in memory whose power goes and comes back while it draws, and nobody hears how it
+/// greets.
+struct Restarting {
+    plotter: InMemory<u32>,
+    /// The number of reports until then, once strokes have come.
+    reports: u32,
+    has_strokes: bool,
+}
+
+impl Link for Restarting {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.has_strokes |= bytes.windows(3).any(|part| part == b"$s=");
+        if self.has_strokes && bytes.contains(&b'?') && self.reports > 0 {
+            self.reports -= 1;
+            if self.reports == 0 {
+                self.plotter = InMemory::new(Room::usual(), Settings::default());
+                while self.plotter.receive(&mut [0; 64], Duration::ZERO)? > 0 {}
+            }
+        }
+        self.plotter.send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        self.plotter.receive(buffer, timeout)
+    }
+
+    fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
+        Ok(Answer::Yes)
+    }
+
+    fn now(&self) -> Instant {
+        self.plotter.now()
+    }
+}
+
+#[test]
+fn a_drawing_that_a_plotter_has_forgotten_is_not_taken_for_drawn() {
+    let mut lines: Vec<String> =
+        (0..20).map(|n| format!("v {} {} 0", 10 + 180 * (n % 2), 20 + n / 2)).collect();
+    lines.extend((0..10).map(|n| format!("l {} {}", 2 * n + 1, 2 * n + 2)));
+    let lines: Vec<_> = lines.iter().map(JobLine::command).collect();
+    let mut host = InMemory::<u32>::new(Room::usual(), Settings::default());
+    assert!(host.take(&lines), "all lines are accepted");
+    let (job, _) = host.streamed(Form::Strokes, 0).expect("a drawing");
+    for (reports, is_drawn) in [(0, true), (10, false)] {
+        let plotter = InMemory::new(Room::usual(), Settings::default());
+        let mut link = Restarting { plotter, reports, has_strokes: false };
+        let interrupt = AtomicBool::new(false);
+        let mut sender =
+            Sender::open(&mut link, Timeouts::default(), &interrupt).expect("a plotter");
+        let drawn = sender.draw_streamed(&job, &mut Quiet);
+        let is_noticed = matches!(&drawn, Err(Error::JobUnfinished { .. }));
+        assert_eq!((drawn.is_ok(), is_noticed), (is_drawn, !is_drawn), "{reports}: {drawn:?}");
+    }
+}
