@@ -4,6 +4,8 @@
 //! Every line passes through the library's own protocol, and the job through its own planner, whose
 //! steps a [`PlannedBoard`] carries out. A preview therefore shows what a plotter would do,
 //! including its refusals.
+//!
+//! The file is longer than 500 lines, because one type has a method for each result of a drawing.
 
 use crate::error::Error;
 use crate::link::{Answer, Link};
