@@ -1,5 +1,5 @@
 //! Drawings that a computer sends while they are drawn, and whose plotter loses its power: judged
-//! by the ink that the pins leave.
+//! by the ink that the pins leave. The cases share one sender, so this is longer than 500 lines.
 
 #![allow(clippy::expect_used, clippy::panic, reason = "a test fails by panicking")]
 

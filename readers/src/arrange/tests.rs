@@ -1,4 +1,5 @@
-//! Tests of what each option of a plan promises, on drawings of any shape.
+//! Tests of what each option of a plan promises, on drawings of any shape, which all of them share.
+//! So this is longer than 500 lines.
 
 use super::simplify::to_line;
 use super::{Arrangement, PLAN_OPTIONS, Turn};
