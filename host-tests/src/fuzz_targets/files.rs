@@ -21,7 +21,7 @@ const TOLERANCE: f64 = 0.1;
 /// polylines, and reads it as a file of settings. A file that is refused is refused in a sentence,
 /// and a line that is sent to the plotter is one line without control characters.
 ///
-/// The bytes behind the last [`MARK`] choose the arrangement; see [`arrangement`]. Of an input
+/// The bytes behind the last `MARK` choose the arrangement; see `arrangement`. Of an input
 /// without a mark, the first bytes do.
 ///
 /// # Panics

@@ -21,7 +21,7 @@ const MOST: usize = 12;
 /// of three bytes is a triangle between those vertices, or a bar if two of the three are the same.
 ///
 /// If the sixth bit of the options is set, the points are those of a model that a camera sees; see
-/// [`camera`].
+/// `camera`.
 pub fn fuzz(input: &[u8]) {
     let [options, count, rest @ ..] = input else { return };
     let has_camera = options & 32 != 0;

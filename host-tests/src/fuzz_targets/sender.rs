@@ -24,7 +24,7 @@ use std::time::{Duration, Instant};
 /// error in words or without one.
 ///
 /// If the first byte is from 1 to 8 or from 17 to 24, its lower bits choose the conversation;
-/// otherwise a small job is drawn. From 17 on, a real plotter is at the other end; see [`Script`].
+/// otherwise a small job is drawn. From 17 on, a real plotter is at the other end; see `Script`.
 pub fn fuzz(input: &[u8]) {
     if let Err(error) = outcome(input) {
         assert!(!error.to_string().is_empty());

@@ -273,8 +273,19 @@ fn strokes_that_stop_coming_come_again_from_the_same_file() {
 /// The client of the rest ends, too: the same command sends what is left of the rest.
 #[test]
 fn the_rest_of_a_drawing_that_went_on_is_joined_again() {
+    join_rest_again("219=0");
+}
+
+/// The rest begins within a stroke.
+#[test]
+fn a_rest_within_a_stroke_is_joined_again() {
+    join_rest_again("219=0.05");
+}
+
+fn join_rest_again(setting: &str) {
     let folder = tempfile::tempdir().expect("a folder");
     let plotter = Library::new();
+    assert_eq!(plotter.run(folder.path(), &["set", setting]).0, Some(0));
     leave_waves(&plotter, folder.path(), &[], 30_000);
     plotter.cut.store(true, Ordering::Relaxed);
     while plotter.cut.load(Ordering::Relaxed) {}
