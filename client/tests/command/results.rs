@@ -170,12 +170,12 @@ fn an_output_that_is_closed_is_no_error_and_a_full_one_is() {
     };
     for line in [
         "penup --help | head -1; exit ${PIPESTATUS[0]}",
-        "penup tape decode long.tape | true; exit ${PIPESTATUS[0]}",
-        "penup tape decode long.tape >&-",
+        "penup --quiet tape decode long.tape | true; exit ${PIPESTATUS[0]}",
+        "penup --quiet tape decode long.tape >&-",
     ] {
         assert_eq!(shell(line), (Some(0), String::new()), "{line}");
     }
-    let (code, said) = shell("penup tape decode long.tape > /dev/full");
+    let (code, said) = shell("penup --quiet tape decode long.tape > /dev/full");
     assert_eq!(code, Some(1));
     assert!(said.starts_with("penup: cannot write the standard output: "), "{said}");
     assert_eq!(shell("penup preview none.obj 2> /dev/full").0, Some(1));
