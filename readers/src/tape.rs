@@ -113,7 +113,8 @@ mod tests {
         assert_eq!(notes("a.tape", whole.get(..4).expect("bytes")), [cut]);
         let behind = |count: &str| {
             format!(
-                "{count} not drawn, behind the stop of the tape: if tapes were joined, draw each by itself"
+                "{count} not drawn, behind the stop of the tape: if tapes were joined, draw \
+                 each by itself"
             )
         };
         assert_eq!(notes("a.tape", &[&whole[..], &whole].concat()), [behind("5 instructions are")]);

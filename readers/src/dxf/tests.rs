@@ -646,8 +646,8 @@ fn every_section_of_entities_is_drawn_and_what_stands_behind_the_end_is_told() {
     let first = dxf("4", "", &line(1));
     let joined = format!("{first}{}", dxf("4", "", &line(2)));
     assert_eq!(strokes(&joined).len(), 1);
-    let note = "what stands behind the end of the file (EOF in line 30) is not drawn: if files were \
-                joined, draw each by itself";
+    let note = "what stands behind the end of the file (EOF in line 30) is not drawn: if files \
+                were joined, draw each by itself";
     assert_eq!(notes("a.dxf", joined.as_bytes()), [note]);
     assert_eq!(notes("a.dxf", format!("{first}\r\n \x1A\r\n").as_bytes()), [""; 0]);
 }

@@ -4,8 +4,8 @@
 //! power S, where the spindle is on from the first move that draws to the last; the spindle or
 //! laser (`M3`, `M4`, `M5`), which with the power 0 does not draw, nor before the first power if
 //! the program says one; the fan (`M106`, `M107`) or the coolant (`M7` to `M9`), on whose pin some
-//! have a laser or a pen, if nothing moves by G0 while it is on; or, if none of these changes between
-//! moves, G1 to G3 draw and G0 does not.
+//! have a laser or a pen, if nothing moves by G0 while it is on; or, if none of these changes
+//! between moves, G1 to G3 draw and G0 does not.
 //! A height that only sets the focus of a laser is down also while the laser is off: then the laser
 //! must be on, too, for a move to draw. A laser that stays on over G0 does not burn there. But if
 //! any move extrudes, as on a 3D printer, those that do draw, and no others.
@@ -136,8 +136,8 @@ fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
 /// Whether a fan or the coolant is on, if the program has said.
 type Output = fn(&Signals) -> Option<bool>;
 
-/// By the fan or the coolant, or else, if neither lifts the pen, G1 to G3 draw and G0 does not. Says
-/// what is taken, unless that makes no difference.
+/// By the fan or the coolant, or else, if neither lifts the pen, G1 to G3 draw and G0 does not.
+/// Says what is taken, unless that makes no difference.
 fn by_outputs(moves: &Moves) -> Inked {
     let by_motion: Vec<bool> = moves.iter().map(|it| !it.is_rapid).collect();
     let outputs: [(&str, Output); 2] =

@@ -369,8 +369,9 @@ fn what_lies_too_far_from_the_origin_to_be_exact_is_told() {
         format!("<path stroke='black' fill='none' d='M{x} {y}L{right} {top}'/>")
     };
     let told = |svg: &str| read(svg).expect("an SVG").notes().join("; ");
-    let note = "1 path lies so far from the origin of its coordinates that it is drawn less exactly \
-                than a motor step: move the drawing to the origin in the program that wrote it";
+    let note = "1 path lies so far from the origin of its coordinates that it is drawn less \
+                exactly than a motor step: move the drawing to the origin in the program that \
+                wrote it";
     let map = in_mm(&path(500_010.0, 5_500_010.0));
     let boxed = map.replace("viewBox='0 0", "viewBox='500000 5500000");
     assert_eq!(told(&boxed), note);
