@@ -76,8 +76,12 @@ pub fn value(settings: &[AssignedSetting], setting: Setting) -> f64 {
     own.and_then(|it| it.value.parse::<f64>().ok()).unwrap_or_default()
 }
 
+/// The number of the setting after which silence of the computer a drawing waits.
+const SILENCE_BEFORE_HOLD: u16 = 218;
+
 /// The settings that a machine has with `assigned`, and otherwise with the defaults. It needs no
-/// homing, because a machine on a computer stands at its origin.
+/// homing, because a machine on a computer stands at its origin, and it never waits for a silent
+/// computer.
 ///
 /// # Errors
 /// A setting is unknown or out of its range, or settings do not fit each other.
@@ -101,8 +105,11 @@ pub fn simulated(assigned: &[AssignedSetting]) -> Result<Settings, NoSuchMachine
             _ => left = refused,
         }
     }
-    // It is a switch, which conflicts with nothing.
+    // These conflict with nothing. Some builds of the library do not have the second one.
     let _ = settings.set(Setting::Homing, Value::ZERO);
+    if let Some(silence) = Setting::numbered(SILENCE_BEFORE_HOLD) {
+        let _ = settings.set(silence, Value::ZERO);
+    }
     Ok(settings)
 }
 

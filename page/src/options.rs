@@ -27,8 +27,9 @@ const RELOOP: &str = "reloop";
 const SET: &str = "set";
 
 /// The settings of a plotter whose effect is left out of the page, because its program must be
-/// small: those of shaped motion, and of backlash that is taken up while the pen draws.
-const LEFT_OUT: [u16; 6] = [SHAPER, 227, 228, 229, SPREAD_BACKLASH, 238];
+/// small: those of shaped motion, of backlash that is taken up while the pen draws, and of drawings
+/// that wait while the computer is silent.
+const LEFT_OUT: [u16; 7] = [218, SHAPER, 227, 228, 229, SPREAD_BACKLASH, 238];
 /// Those of them that turn an effect on.
 const SHAPER: u16 = 226;
 const SPREAD_BACKLASH: u16 = 237;

@@ -146,6 +146,8 @@ impl<B: Board, I: Index> Cancel for OrderCancel<'_, '_, B, I> {
     fn check(&mut self) -> Result<(), Aborted> {
         let Self { inner, board, begun } = self;
         let requests = board.take_real_time();
+        #[cfg(feature = "hold-in-silence")]
+        inner.watch_silence(requests, *board);
         let settings = Some(inner.machine.settings());
         report::greet_opened(inner.machine.state(), inner.resumption, settings, *board);
         if requests.has(RealTime::ABORT) {

@@ -30,6 +30,8 @@ mod records;
 mod reply;
 mod report;
 mod resume;
+#[cfg(feature = "hold-in-silence")]
+mod silence;
 #[cfg(feature = "convex")]
 mod solid;
 #[cfg(feature = "tiles")]
@@ -173,6 +175,9 @@ struct Inner<'m, I> {
     parameters: Parameters,
     /// What is known of a job that can be resumed.
     resumption: Resumption,
+    /// For how long the computer has been silent.
+    #[cfg(feature = "hold-in-silence")]
+    silence: silence::Silence,
     /// When the plotter last had something to do, in microseconds of the board's clock.
     busy_at: u32,
     /// The time of the last movement, as [`Board::microseconds`] tells it.
@@ -243,6 +248,8 @@ impl<'m, I: Index> Plotter<'m, I> {
                 z_before_check: Millimetres::ZERO,
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
+                #[cfg(feature = "hold-in-silence")]
+                silence: silence::Silence::default(),
                 busy_at: 0,
                 #[cfg(feature = "driver-pins")]
                 moved_at: 0,

@@ -30,6 +30,8 @@ impl<I: Index> Plotter<'_, I> {
     /// anything to do.
     pub fn poll<B: Board>(&mut self, board: &mut B) -> bool {
         let requests = board.take_real_time();
+        #[cfg(feature = "hold-in-silence")]
+        self.inner.watch_silence(requests, board);
         self.act(requests, board);
         self.inner.watch(board);
         self.inner.watch_idleness(board);
@@ -73,6 +75,8 @@ impl<I: Index> Plotter<'_, I> {
             return planned || requests != RealTime::default();
         };
         self.inner.busy_at = board.microseconds();
+        #[cfg(feature = "hold-in-silence")]
+        self.inner.silence.note_byte();
         let mut left = BYTES_IN_TURN;
         #[cfg(feature = "hpgl")]
         if self.hpgl.port().is_some() {

@@ -454,7 +454,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Whether the machine draws a job, or holds within one: not G-code that is sent line by line.
-    fn draws_job(&self) -> bool {
+    pub(super) fn draws_job(&self) -> bool {
         matches!(self.machine.state(), State::Run | State::Hold { .. })
             && !self.machine.is_streaming()
     }

@@ -40,7 +40,7 @@ fn settings_whose_effect_the_page_does_not_have_are_passed_over() {
         let options = machine(settings);
         sheet.open("notched.obj", NOTCHED.to_vec(), false, &options).map(|_| sheet.notes())
     };
-    let of_pico = "226=0,227=30.0,228=30.0,229=0.1,237=0,238=1";
+    let of_pico = "218=60,226=0,227=30.0,228=30.0,229=0.1,237=0,238=1";
     let usual = notes("").expect("shown");
     assert_eq!(notes(of_pico).expect("shown"), usual);
     assert!(drawn(of_pico) == drawn(""));

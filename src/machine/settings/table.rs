@@ -121,6 +121,10 @@ pub enum Setting {
     PenS,
     /// `$217` Whether the pen is down below that S. Otherwise above.
     PenSBelow,
+    /// `$218` For how long no byte may come from the computer before a drawing that the plotter has
+    /// computed holds until one comes; 0 if it never holds.
+    #[cfg(feature = "hold-in-silence")]
+    SilenceBeforeHold,
     /// `$219` How much of a stroke is drawn from one point at which the machine rests, to keep how
     /// far it has come, to the next. 0 if it does not rest.
     PointDistance,
@@ -214,8 +218,8 @@ impl SettingInfo {
 }
 
 /// All units of settings. A row holds the index of its unit, which takes less flash than a text.
-const UNITS: [&str; 15] = [
-    "", "us", "ms", "mm", "m", "mm/min", "mm/s2", "m/s3", "step/mm", "mask", "0|1", "0|1|2",
+const UNITS: [&str; 16] = [
+    "", "us", "ms", "s", "mm", "m", "mm/min", "mm/s2", "m/s3", "step/mm", "mask", "0|1", "0|1|2",
     "0|1|2|3", "of 127", "Hz",
 ];
 
@@ -349,6 +353,15 @@ pub const SETTINGS: &[SettingInfo] = {
         row(InkBeforePause, 215, "drawn length before a pause", "m", (0.0, 10000.0, 0.0), false),
         row(PenS, 216, "pen down at S", "", (0.0, 32767.0, 45.0), false),
         row(PenSBelow, 217, "pen down at higher S, lower S", "0|1", (0.0, 1.0, 0.0), true),
+        #[cfg(feature = "hold-in-silence")]
+        row(
+            SilenceBeforeHold,
+            218,
+            "silence before a drawing waits",
+            "s",
+            (0.0, 3600.0, 0.0),
+            true,
+        ),
         row(PointDistance, 219, POINT_NAME, "m", POINT_RANGE, false),
         row(DotLength, 220, "length of a dot", "mm", (0.1, 100.0, 1.0), false),
         row(StrokeOverlap, 221, "closed lines go on by", "mm", (0.0, 10.0, 0.0), false),
