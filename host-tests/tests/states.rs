@@ -483,6 +483,73 @@ fn z_is_after_a_check_what_it_was_before() {
     bench.say("$C\nG0 Z-7\n");
     send(&mut bench, &[0x18]);
     assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,3.000");
+    // An alarm ends the check, too.
+    bench.say("$C\nG1 Z5 X5 F600\n");
+    send(&mut bench, &[0xFD]);
+    bench.say("$X\n");
+    assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,3.000");
+    bench.say("G91\nG0 Z1\n");
+    bench.finish();
+    assert_eq!(status(&mut bench), "<Idle|MPos:1.000,0.000,4.000");
+}
+
+/// What such a line counts from is where the machine stops, and not where it would have gone.
+#[test]
+fn a_startup_line_waits_until_the_machine_stands() {
+    for moves in ["G53 G1 X100 Y50 F600\n", "v 10 10 0\nv 60 10 0\nl 1 2\n$plot\n"] {
+        let mut bench = Bench::new();
+        bench.heard();
+        bench.say("$N0=G92X0Y0\n");
+        bench.board.receive(moves.as_bytes());
+        bench.work(2500);
+        let mut heard = send(&mut bench, b"\x18$#\n");
+        bench.finish();
+        heard += &bench.heard();
+        let at = |text: &str, from: &str| {
+            let (_, rest) = text.split_once(from).expect(from);
+            rest.split([']', '|']).next().expect("a position").to_owned()
+        };
+        let order = ["Grbl", ">G92X0Y0:ok", "[G92:"].map(|part| heard.find(part));
+        assert!(order.is_sorted() && order[0].is_some(), "{heard}");
+        let stood = at(&status(&mut bench), "MPos:");
+        assert_eq!(at(&heard, "[G92:"), stood, "{heard}");
+        assert!(!stood.starts_with("0.000"), "the machine has not moved");
+    }
+}
+
+/// The end of the travel is within the travel, however many steps to a millimetre there are.
+#[test]
+fn the_end_of_the_travel_is_within_it() {
+    for steps in ["80", "157.4803", "78.74", "100.0013", "2.005"] {
+        let mut bench = Bench::new();
+        bench.heard();
+        bench.say(&format!("$100={steps}\n$101={steps}\n$130=420\n$131=297\n"));
+        let answer = bench.say("G53 G0 X420 Y297\n");
+        bench.finish();
+        assert!(answer.ends_with("ok\n"), "{steps}: {answer}");
+        bench.say("G53 G0 X0 Y0\n$240=420\n$241=297\n");
+        let answer = bench.say("G28\n");
+        bench.finish();
+        assert!(answer.ends_with("ok\n"), "{steps}: {answer}");
+        assert_eq!(bench.plotter.machine().state(), State::Idle, "{steps}");
+        // A step further is beyond it.
+        let beyond = 420.0 + 1.5 / steps.parse::<f64>().expect("a number");
+        let answer = bench.say(&format!("G53 G0 X{beyond:.4}\n"));
+        assert!(answer.contains("error:15"), "{steps}: {answer}");
+    }
+}
+
+/// `$RST` would end the sleep, and a machine that must be homed would be in an alarm.
+#[test]
+fn nothing_is_restored_in_sleep() {
+    for line in ["$RST=#", "$RST=$", "$RST=*"] {
+        let mut bench = Bench::new();
+        bench.say("$SLP\n");
+        bench.work(10);
+        let answer = send(&mut bench, format!("{line}\n").as_bytes());
+        assert!(answer.ends_with("error:8\n"), "{line}: {answer}");
+        assert_eq!(bench.plotter.machine().state(), State::Sleep, "{line}");
+    }
 }
 
 /// Such a line would wait for the end of the job, and all lines behind it with it.
@@ -494,16 +561,19 @@ fn what_needs_rest_is_refused_while_a_job_is_drawn() {
     bench.work(200);
     for hold in ["", "!"] {
         send(&mut bench, hold.as_bytes());
-        for line in ["M0", "M6", "M2", "G4 P1", "G10 L20 P1 X0", "G28.1", "G91 G2 X1 Y1 R5"] {
+        for line in
+            ["M0", "M6", "M2", "G4 P1", "G10 L20 P1 X0", "G28.1", "G91 G2 X1 Y1 R5", "G92 X7"]
+        {
             let answer = send(&mut bench, format!("{line}\n").as_bytes());
             assert!(answer.ends_with("error:8\n"), "{hold}{line}: {answer}");
         }
     }
-    // A line that is refused sets no mode.
+    // A line that is refused sets no mode, and shifts nothing.
     assert!(send(&mut bench, b"$G\n").contains(" G90 "));
     send(&mut bench, b"~");
     bench.finish();
     assert_eq!(status(&mut bench).split('|').next(), Some("<Idle"));
+    assert!(send(&mut bench, b"$#\n").contains("[G92:0.000,0.000,0.000]"));
     let answer = bench.say("G4 P0.1\n");
     bench.finish();
     let answer = answer + &bench.heard();

@@ -259,7 +259,7 @@ fn jobs_take_as_long_as_they_did_with_all_settings() {
         (&[(Setting::PenRamp, 300.0), (Setting::PenUpHeight, 30.0)], [42.116, 47.408]),
         (&[(Setting::Tool, 1.0)], [87.633, 92.925]),
         (&[(Setting::DotLength, 3.0), (Setting::SteadySpeed, 1.0)], [19.695, 22.968]),
-        (&[(Setting::BacklashX, 0.3), (Setting::BacklashY, 0.2)], [30.869, 38.596]),
+        (&[(Setting::BacklashX, 0.3), (Setting::BacklashY, 0.2)], [30.907, 38.653]),
         (&[(Setting::PointDistance, 0.02)], [29.330, 34.625]),
     ];
     let targets = strokes();

@@ -168,9 +168,9 @@ impl<I: Index> Inner<'_, I> {
                 self.program = self.program.at(&self.machine, is_over);
                 self.machine.check(!is_over).map_err(|_| CommandError::Busy)?;
                 if is_over {
-                    self.program = self.program.with_z(self.z_before_check);
+                    self.restore_z();
                 } else {
-                    self.z_before_check = self.program.z();
+                    self.z_before_check = Some(self.program.z());
                 }
                 let text = if is_over { "Disabled" } else { "Enabled" };
                 Reply(board).line(format_args!("[MSG:{text}]"));

@@ -234,9 +234,15 @@ impl<I: Index> Inner<'_, I> {
         }
     }
 
-    /// Carries out the startup lines and says how each went, unless the plotter is locked.
+    /// Carries out the startup lines and says how each went, unless the plotter is locked. While
+    /// the machine still slows down behind ctrl-X they wait, as all lines do: a position that they
+    /// use is the one at which it stops.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     pub(super) fn run_startup_lines<B: Board>(&mut self, board: &mut B) {
+        self.startup_due = self.machine.state() == State::Abort;
+        if self.startup_due {
+            return;
+        }
         if let State::Alarm(_) = self.machine.state() {
             Reply(board).line(format_args!("[MSG:'$H'|'$X' to unlock]"));
             return;
@@ -248,6 +254,7 @@ impl<I: Index> Inner<'_, I> {
             }
             match GCode::new(&line).and_then(|line| self.after_startup_line(line)) {
                 Ok(program) => {
+                    self.note_shift(&program);
                     self.program = program;
                     Reply(board).line(format_args!(">{line}:ok"));
                 }
@@ -335,8 +342,9 @@ impl<I: Index> Inner<'_, I> {
         board: &mut B,
     ) -> Result<bool, CommandError> {
         self.check_idle()?;
-        // Steps that are planned may still be due, and none is made while flash is written.
-        if !self.machine.is_stopped() {
+        // Steps that are planned may still be due, and none is made while flash is written. What
+        // follows would end the sleep.
+        if !self.machine.is_stopped() || self.machine.state() == State::Sleep {
             return Err(CommandError::Busy);
         }
         if settings {

@@ -169,8 +169,10 @@ struct Inner<'m, I> {
     parts: stored::Parts<I>,
     /// The modes that lines of G-code have set.
     program: Program,
-    /// Z of the program when the check mode (`$C`) began, which moves nothing.
-    z_before_check: Millimetres,
+    /// Whether the startup lines are carried out once the machine has stopped behind ctrl-X.
+    startup_due: bool,
+    /// Z of the program when the check mode (`$C`) began, which moves nothing; `None` outside it.
+    z_before_check: Option<Millimetres>,
     /// What is kept when a program ends.
     parameters: Parameters,
     /// What is known of a job that can be resumed.
@@ -245,7 +247,8 @@ impl<'m, I: Index> Plotter<'m, I> {
                 #[cfg(feature = "tiles")]
                 parts: stored::Parts::default(),
                 program: Program::default(),
-                z_before_check: Millimetres::ZERO,
+                startup_due: false,
+                z_before_check: None,
                 parameters: Parameters::default(),
                 resumption: Resumption::default(),
                 #[cfg(feature = "hold-in-silence")]

@@ -39,6 +39,9 @@ impl<I: Index> Plotter<'_, I> {
         #[cfg(feature = "driver-pins")]
         self.inner.watch_drivers(board);
         let planned = self.inner.plan(BegunJob::default(), board);
+        if self.inner.startup_due {
+            self.inner.run_startup_lines(board);
+        }
         #[cfg(feature = "early-ink")]
         let planned = self.inner.follow_order(board) || planned;
         #[cfg(feature = "hpgl")]
@@ -287,12 +290,18 @@ impl<I: Index> Inner<'_, I> {
         self.machine.planned_position() != before
     }
 
+    /// Restores Z of the program as it was before the check mode, if that is on or an alarm has
+    /// ended it: it moves nothing.
+    pub(super) fn restore_z(&mut self) {
+        if let Some(z) = self.z_before_check.take() {
+            self.program = self.program.with_z(z);
+        }
+    }
+
     /// Forgets the modes of G-code and the overrides, and leaves check mode and sleep.
     #[inline(never)] // Keeps its frame off the stack while the stages run.
     fn reset(&mut self) {
-        if self.machine.state() == State::Check {
-            self.program = self.program.with_z(self.z_before_check);
-        }
+        self.restore_z();
         self.program = self.program.reset();
         self.report_counts = ReportCounts::default();
         self.machine.set_override(100);

@@ -143,6 +143,7 @@ impl<I: Index> Inner<'_, I> {
         if alarm != self.alarm_reported {
             self.alarm_reported = alarm;
             if let Some(alarm) = alarm {
+                self.restore_z();
                 if alarm != Alarm::SoftLimit {
                     self.resumption.lose_position();
                 }
@@ -365,7 +366,9 @@ impl<I: Index> Inner<'_, I> {
             || matches!(
                 action,
                 MachineAction::Arc(_) | MachineAction::Dwell(_) | MachineAction::Set(..)
-            );
+            )
+            // A shift counts from the position, which only the rest of the job decides.
+            || program.shifts() != self.program.shifts();
         if waits_for_rest && self.draws_job() {
             return Err(CommandError::Busy);
         }

@@ -183,8 +183,10 @@ pub(crate) fn next_number(rest: &mut Significant<'_>) -> Option<Decimal> {
             *rest = before;
             break;
         }
-        // Digits behind the point that do not fit are too small to matter.
-        if text.push(char::from(byte)).is_err() && !has_point {
+        // Digits behind the point that do not fit are too small to matter, if the number is not one
+        // of leading zeros, which leave them no room.
+        let is_full = byte == b'.' && text.len() > NUMBER_CHARACTERS / 2;
+        if is_full || (text.push(char::from(byte)).is_err() && !has_point) {
             return None;
         }
     }
@@ -217,5 +219,11 @@ mod tests {
         assert!((numbers[0] - 1.0 / 3.0).abs() < 1e-15 && numbers[1] == 1.0);
         assert!(GCode::new(&"X1".repeat(50)).is_ok());
         assert!(GCode::new(&std::format!("X{}", "1".repeat(50))).is_err());
+        for zeros in 1..60 {
+            let text = std::format!("X{}1.5", "0".repeat(zeros));
+            let read =
+                GCode::new(&text).map(|line| line.words().next().expect("X").number.to_f64());
+            assert!(read.is_err() || read == Ok(1.5), "{zeros}: {read:?}");
+        }
     }
 }

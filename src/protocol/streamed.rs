@@ -99,6 +99,10 @@ impl StreamHeader {
         if parts.next().is_some() {
             return Err(wrong_count);
         }
+        // A job without targets would count as drawn at once, and take the place of the kept one.
+        if header.targets == 0 {
+            return Err(CommandError::NumberOutOfRange);
+        }
         Ok(header)
     }
 

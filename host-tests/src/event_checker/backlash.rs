@@ -39,6 +39,6 @@ impl Backlash {
 pub fn backlash_steps(settings: &Settings) -> [i32; 2] {
     let [x, y] = settings.page_steps();
     [(Setting::BacklashX, x), (Setting::BacklashY, y)].map(|(backlash, steps)| {
-        (settings.get(backlash).to_num::<f64>() * steps.to_num::<f64>()) as i32
+        (settings.get(backlash).to_num::<f64>() * steps.to_num::<f64>()).round() as i32
     })
 }

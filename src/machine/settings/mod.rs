@@ -189,21 +189,29 @@ impl Settings {
         self.steps_per_mm().map_each(|setting| self.get(setting))
     }
 
-    /// Converts two settings in millimetres, one for x and one for y, to steps on the page.
+    /// Converts two settings in millimetres, one for x and one for y, to steps on the page, rounded
+    /// to the nearest step as every target is: a target that lies just at the end of the travel is
+    /// within it.
     pub(super) fn page_point(&self, settings: [Setting; 2]) -> PagePoint {
         let [x, y] = self.steps_per_mm();
         PagePoint {
-            x: self.millimetres_as_steps(settings[0], x),
-            y: self.millimetres_as_steps(settings[1], y),
+            x: self.rounded_steps(settings[0], x, 1 << (2 * Value::FRAC_NBITS - 1)),
+            y: self.rounded_steps(settings[1], y, 1 << (2 * Value::FRAC_NBITS - 1)),
         }
     }
 
     /// Converts a setting in millimetres to steps, rounded down.
     pub(super) fn millimetres_as_steps(&self, setting: Setting, steps_per_mm: Setting) -> i32 {
+        self.rounded_steps(setting, steps_per_mm, 0)
+    }
+
+    /// Converts a setting in millimetres to steps, rounded down once `addend` is added, in units of
+    /// 2^-32 steps, which is at most one step.
+    fn rounded_steps(&self, setting: Setting, steps_per_mm: Setting, addend: i64) -> i32 {
         let steps =
             i64::from(self.get(setting).to_bits()) * i64::from(self.get(steps_per_mm).to_bits());
         // The result is at most 8000 mm times 4000 steps per millimetre.
-        (steps >> (2 * Value::FRAC_NBITS)) as i32
+        ((steps + addend) >> (2 * Value::FRAC_NBITS)) as i32
     }
 
     /// Converts steps on the page to millimetres, clamped to the range of a value.

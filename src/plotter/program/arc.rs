@@ -113,7 +113,7 @@ fn center_of_radius(
     let distance = (dx * dx + dy * dy).unsigned_abs();
     let wide = 2 * halved(radius).unsigned_abs();
     let length = distance.isqrt();
-    // With rounded ends, the points may be up to a step further apart than the diameter.
+    // With rounded ends, the points may be further apart than the diameter, by 0.05 mm at most.
     if length == 0 || length > wide + (1 << 15) / 20 {
         return None;
     }

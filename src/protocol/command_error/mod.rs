@@ -262,10 +262,9 @@ impl CommandError {
                 error(1, ""),
                 format_args!("G-code is letters with numbers: X-12.5, or a comment in (...)"),
             ),
-            Self::NotANumber => row(
-                error(2, "not a number"),
-                format_args!("a number is written like -12.5 or 3e-2"),
-            ),
+            Self::NotANumber => {
+                row(error(2, "not a number"), format_args!("a number is written like -12.5"))
+            }
             Self::UnknownSystemCommand => {
                 row(UNKNOWN_SYSTEM_COMMAND, format_args!("$ lists the commands"))
             }

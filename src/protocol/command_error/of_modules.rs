@@ -343,7 +343,7 @@ pub(super) fn explain_machine(refusal: &MachineError, row: Row<'_>) {
                 error(15, "beyond the travel"),
                 format_args!(
                     "it would go {x},{y} mm beyond the travel: choose a smaller $page, or set \
-                     $130 and $131"
+                     $130 and $131 (1048576 steps at most)"
                 ),
             );
         }
