@@ -69,6 +69,8 @@ struct Reader {
     endless: Option<usize>,
     /// The byte where the comment begins that the file does not end.
     endless_comment: Option<usize>,
+    /// The byte where the first name in quotation marks begins that its line does not end.
+    endless_name: Option<usize>,
     /// The byte where the polygon begins that is not complete.
     polygon: Option<usize>,
 }
@@ -89,6 +91,7 @@ impl Reader {
             unknown: BTreeMap::new(),
             endless: None,
             endless_comment: None,
+            endless_name: None,
             polygon: None,
         }
     }
@@ -229,35 +232,30 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
         dialect.take(byte);
     }
     let mut instruction = Instruction::default();
-    // The byte at which what is passed over ends: a line of PJL, or a name in quotation marks.
-    let mut passed_to = None;
-    for (at, &byte) in bytes.iter().chain(b";").enumerate() {
-        if let Some(end) = passed_to {
-            passed_to = passed_to.filter(|_| byte != end);
-            continue;
-        }
-        if !dialect.is_in_text() && bytes.get(at..).is_some_and(|rest| rest.starts_with(b"@PJL")) {
-            passed_to = Some(b'\n');
-            continue;
-        }
-        // Only in a parameter of the instruction is it a name; behind CO it begins a comment.
-        if byte == b'"' && instruction.name == "BP" && !dialect.is_in_text() {
-            let rest = bytes.get(at + 1..).unwrap_or_default();
-            passed_to = rest.contains(&byte).then_some(byte);
-            continue;
-        }
+    // The byte where the name in quotation marks begins.
+    let mut name_from = None;
+    for (at, &byte) in bytes.iter().chain(b"\n;").enumerate() {
         // The end of the file ends its last instruction, but is not a letter of a label.
         let ends_with_semicolon = dialect.is_in_data() || dialect.is_in_comment();
         if at == bytes.len() && dialect.is_in_text() && !ends_with_semicolon {
             reader.endless = Some(instruction.begin);
             break;
         }
+        let before = dialect;
         let token = dialect.take(byte);
         let name = instruction.name.as_str();
+        match (before.is_in_comment(), dialect.is_in_comment()) {
+            (false, true) => name_from = (byte == b'"').then_some(at),
+            (true, false) if byte != b'"' => {
+                reader.endless_name = reader.endless_name.or(name_from.take());
+            }
+            _ => {}
+        }
         match token {
             Token::Control => continue,
             // In a label it is a letter of Latin-1; in texts that are not drawn it is nothing.
             Token::Text if byte == DAMAGED && !matches!(name, "PE" | "DT" | "SM") => {
+                dialect = before;
                 let letter = if name == "LB" { "ÿ" } else { "" };
                 for byte in letter.bytes() {
                     reader.push(byte, instruction.begin).map_err(|why| (instruction.begin, why))?;
@@ -368,6 +366,13 @@ impl Format for HpGl {
             notes.push(format!(
                 "the comment that begins in line {} has no end (another \"): all that follows it \
                  is left out",
+                line_of(begin)
+            ));
+        }
+        if let Some(begin) = reader.endless_name {
+            notes.push(format!(
+                "the name that begins in line {} has no end (another \"): all that follows it in \
+                 its line is left out",
                 line_of(begin)
             ));
         }

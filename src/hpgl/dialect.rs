@@ -4,6 +4,7 @@
 //! [`Dialect`] of its own, and come to the same conclusions, because both see the same bytes.
 
 use super::{DAMAGED, ESCAPE, LABEL_END};
+use crate::array::MapEach;
 
 /// The line that begins HP-GL by command.
 const COMMAND: &[u8] = b"$hpgl";
@@ -59,6 +60,8 @@ pub struct Dialect {
     terminator: u8,
     /// The first letter of an instruction, 0 if none has come.
     letter: u8,
+    /// Whether a quotation mark would begin a name.
+    takes_name: bool,
     /// Whether the last byte ended a line.
     begins_line: bool,
 }
@@ -87,35 +90,43 @@ enum State {
     Symbol,
     /// Data up to a semicolon, after `PE`.
     Data,
-    /// A comment, after `CO`.
+    /// A comment after `CO`, a name in quotation marks, or a line of PJL after `@`.
     Comment(Comment),
 }
 
-/// The progress of a comment. It ends with the second of two quotation marks if it begins with one,
-/// and otherwise with a semicolon.
+/// The progress of a comment, or of another text that has no effect. A comment ends with the second
+/// of two quotation marks if it begins with one, and otherwise with a semicolon. Where bytes were
+/// lost, each text ends with a semicolon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Comment {
-    /// The byte that ends it, 0 as long as it is not known. The first mode of an interpreter must
-    /// consist of zero bits, which it would not beside an `Option`.
-    end: u8,
+    /// The bytes that end it, of which a line feed also stands for a carriage return; 0 as long as
+    /// they are not known. The first mode of an interpreter must consist of zero bits, which it
+    /// would not beside an `Option`, a `bool` or an enum.
+    ends: [u8; 2],
 }
 
 impl Comment {
-    /// Before its first byte.
-    pub(super) const BEGUN: Self = Self { end: 0 };
+    /// A comment before its first byte.
+    pub(super) const BEGUN: Self = Self { ends: [0; 2] };
+    /// A name behind its first quotation mark. A line end ends it, too.
+    pub(super) const NAME: Self = Self { ends: [b'"', b'\n'] };
+    /// The rest of a line.
+    pub(super) const LINE: Self = Self { ends: [b'\n'; 2] };
 
-    /// Takes the next byte. Returns whether it ends the comment.
+    /// Takes the next byte. Returns whether it ends the text.
     pub(super) fn ends_with(&mut self, byte: u8) -> bool {
-        match self.end {
-            0 if byte.is_ascii_whitespace() => return false,
-            0 if byte == b'"' => {
-                self.end = byte;
+        let byte = if byte == b'\r' { b'\n' } else { byte };
+        match self.ends {
+            _ if byte == DAMAGED => self.ends = [b';'; 2],
+            [0, _] if byte.is_ascii_whitespace() => return false,
+            [0, _] if byte == b'"' => {
+                self.ends = [byte; 2];
                 return false;
             }
-            0 => self.end = b';',
+            [0, _] => self.ends = [b';'; 2],
             _ => {}
         }
-        self.end == byte
+        self.ends.contains(&byte)
     }
 }
 
@@ -138,7 +149,8 @@ impl Dialect {
     /// Before the first byte.
     pub const fn new() -> Self {
         let (state, control) = (State::LineBegin, Control::None);
-        Self { state, control, terminator: LABEL_END, letter: 0, begins_line: false }
+        let (terminator, letter) = (LABEL_END, 0);
+        Self { state, control, terminator, letter, takes_name: false, begins_line: false }
     }
 
     /// Whether HP-GL is in force.
@@ -164,7 +176,7 @@ impl Dialect {
         self.control == Control::None && self.state == State::Data
     }
 
-    /// Whether the next byte belongs to a comment.
+    /// Whether the next byte belongs to a comment, a name in quotation marks or a line of PJL.
     pub fn is_in_comment(&self) -> bool {
         matches!(self.state, State::Comment(_))
     }
@@ -197,6 +209,9 @@ impl Dialect {
             State::Comment(mut comment) => {
                 let is_over = comment.ends_with(byte);
                 self.state = if is_over { State::Code } else { State::Comment(comment) };
+                if is_over && byte != b'"' {
+                    self.take_code(byte);
+                }
                 Token::Text
             }
             State::Data => {
@@ -219,7 +234,7 @@ impl Dialect {
             Control::Dot if has_parameters(byte) => Control::Parameters,
             Control::Dot => {
                 if byte == b'K' {
-                    (self.state, self.letter) = (State::Code, 0);
+                    (self.state, self.letter, self.takes_name) = (State::Code, 0, false);
                 }
                 Control::None
             }
@@ -282,20 +297,32 @@ impl Dialect {
             return Token::Leaves;
         }
         self.begins_line = byte == b'\n' || byte == b'\r';
-        if byte == DAMAGED || !byte.is_ascii_alphabetic() {
+        if !byte.is_ascii_alphabetic() {
             self.letter = 0;
+            match byte {
+                b'@' => self.state = State::Comment(Comment::LINE),
+                b'"' if self.takes_name => self.state = State::Comment(Comment::NAME),
+                b';' | b'\n' | b'\r' | DAMAGED => {}
+                _ => return Token::Code,
+            }
+            self.takes_name &= byte == b'"';
             return Token::Code;
         }
         let first = core::mem::replace(&mut self.letter, byte);
+        self.takes_name = false;
         if first != 0 {
             self.letter = 0;
-            match &[first.to_ascii_uppercase(), byte.to_ascii_uppercase()] {
+            let name = [first, byte].map_each(|letter| letter.to_ascii_uppercase());
+            self.takes_name = takes_name(name);
+            if resets_terminator(name) {
+                self.terminator = LABEL_END;
+            }
+            match &name {
                 b"LB" | b"BL" | b"WD" => self.state = State::Text,
                 b"DT" => self.state = State::Terminator,
                 b"SM" => self.state = State::Symbol,
                 b"PE" => self.state = State::Data,
                 b"CO" => self.state = State::Comment(Comment::BEGUN),
-                b"IN" | b"DF" => self.terminator = LABEL_END,
                 _ => {}
             }
         }
@@ -315,6 +342,16 @@ pub(super) fn terminator(byte: u8) -> u8 {
         b';' | b'\n' | b'\r' | 0 | ESCAPE | DAMAGED => LABEL_END,
         byte => byte,
     }
+}
+
+/// Whether an instruction with this name takes names in quotation marks.
+pub(super) fn takes_name(name: [u8; 2]) -> bool {
+    matches!(&name, b"BP" | b"MG")
+}
+
+/// Whether labels end with ETX again from an instruction with this name on, whatever follows it.
+pub(super) fn resets_terminator(name: [u8; 2]) -> bool {
+    matches!(&name, b"IN" | b"DF")
 }
 
 /// Whether the instruction to the interface with this letter has parameters and ends with a colon.
@@ -385,5 +422,11 @@ mod tests {
         assert_eq!(kinds(b"IN;DT#IN;LBa#\x03PU"), "llBcctccccctttcc");
         assert_eq!(kinds(b"IN;LBa\x1B.Bb\x03PU"), "llBccteeettcc");
         assert_eq!(kinds(b"IN;LBa\x1B.KPU"), "llBccteeecc");
+        assert_eq!(kinds(b"IN;BP1,\"LB\"PU"), "llBccccctttcc");
+        assert_eq!(kinds(b"IN;MG\"LB\x1B.KPU"), "llBccctteeecc");
+        assert_eq!(kinds(b"IN;BP\x1B.K\"PU"), "llBcceeeccc");
+        assert_eq!(kinds(b"IN;MG\"\n$"), "llBccctL");
+        assert_eq!(kinds(b"\x1B%-12345X@PJL?\r\n$"), "lBeeeeeeectttttcL");
+        assert_eq!(kinds(b"IN;@LB\x1B.KPU"), "llBctteeecc");
     }
 }

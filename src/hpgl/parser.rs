@@ -7,7 +7,7 @@ use super::line_type::{LineStyle, PatternLength};
 use super::number::Parsed;
 use super::outline::{Chord, sine_and_cosine};
 use super::polygon::PolygonBuffer;
-use super::{DAMAGED, dialect};
+use super::{DAMAGED, LABEL_END, dialect};
 
 /// How the next byte is interpreted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -18,7 +18,7 @@ pub(super) enum Mode {
     Label,
     /// A text that is not drawn.
     Skipped,
-    /// A comment.
+    /// A comment, a name in quotation marks, or a line of PJL.
     Comment(Comment),
     /// The byte that ends labels.
     Terminator,
@@ -32,9 +32,9 @@ pub(super) enum Mode {
 #[rustfmt::skip]
 const WITHOUT_EFFECT: &[[u8; 2]] = &[
     *b"AC", *b"AD", *b"AP", *b"AS", *b"BP", *b"CM", *b"CR", *b"CV", *b"DC", *b"DP", *b"EC",
-    *b"FI", *b"FN", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY", *b"LA", *b"MC", *b"NP", *b"NR",
-    *b"PB", *b"PC", *b"PS", *b"PW", *b"QL", *b"RF", *b"RP", *b"SB", *b"SG", *b"SV", *b"TD", *b"TR",
-    *b"UL", *b"WU",
+    *b"FI", *b"FN", *b"FS", *b"GM", *b"GC", *b"GP", *b"IM", *b"KY", *b"LA", *b"MC", *b"MG", *b"NP",
+    *b"NR", *b"PB", *b"PC", *b"PS", *b"PW", *b"QL", *b"RF", *b"RP", *b"SB", *b"SG", *b"SV", *b"TD",
+    *b"TR", *b"UL", *b"WU",
 ];
 
 impl<B: PolygonBuffer> Interpreter<B> {
@@ -51,6 +51,10 @@ impl<B: PolygonBuffer> Interpreter<B> {
             Mode::Comment(ref mut comment) => {
                 if comment.ends_with(byte) {
                     self.mode = Mode::Code;
+                    // A semicolon or a line end also ends the instruction.
+                    if byte != b'"' {
+                        self.push_code(byte);
+                    }
                 }
             }
             Mode::Skipped => {}
@@ -94,10 +98,17 @@ impl<B: PolygonBuffer> Interpreter<B> {
             }
             b';' => self.end_instruction(),
             b'\n' | b'\r' => self.end_line(),
+            b'@' => {
+                self.end_instruction();
+                self.mode = Mode::Comment(Comment::LINE);
+            }
             DAMAGED => self.forget_instruction(),
             _ => {
                 let number = self.number.end();
                 self.take_number(number);
+                if byte == b'"' && dialect::takes_name(self.name) {
+                    self.mode = Mode::Comment(Comment::NAME);
+                }
             }
         }
     }
@@ -122,6 +133,9 @@ impl<B: PolygonBuffer> Interpreter<B> {
                 self.begin_polyline();
             }
             _ => self.name = name,
+        }
+        if dialect::resets_terminator(name) {
+            self.text.terminator = LABEL_END;
         }
         // PD alone makes a dot, which is known at its end only.
         if &name == b"PU" {

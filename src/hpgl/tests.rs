@@ -3,6 +3,7 @@
 //! The file is longer than 500 lines, because it is a list of tests, which share a few short
 //! functions.
 
+use super::parser::Mode;
 use super::{
     Action, Beginning, DAMAGED, Dialect, Interpreter, Point, RECEIVED_BYTES, Rectangle, Session,
     Token, UNIT,
@@ -71,6 +72,123 @@ fn instructions_end_with_a_semicolon_a_line_or_the_next_letter() {
         let found = actions(text.as_bytes()).replace(" dot 10,20", "");
         assert_eq!(found, "go 10,20 10,20>30,40 30,40>50,60", "{text}");
     }
+}
+
+#[test]
+fn names_in_quotation_marks_are_no_instructions() {
+    let drawn = "go 10,20 10,20>30,20 '0'";
+    for name in [
+        "BP;BP1,\"SPLAT\";",
+        "BP1,\"LB\",2,\"PE?;!\"",
+        "bp 1.5\"CO\"2.5;",
+        "MG\"SPEED\";",
+        "MG;MG \"LB\"",
+        // A line ends a name that has no end.
+        "BP1,\"LB\n",
+        "MG\"LB\r\n",
+    ] {
+        let found = actions(format!("{name}PU10,20;PD30,20;OE;").as_bytes());
+        assert_eq!(found, drawn, "{name}");
+    }
+    // Behind other names, and behind the end of the instruction, it is no name.
+    for text in ["SP1,\"PU7,8", "BP;\"PU7,8", "BP\n\"PU7,8", "BP1PU\"7,8"] {
+        let found = actions(format!("{text};").as_bytes());
+        assert!(found.ends_with("go 7,8"), "{text}: {found}");
+    }
+    // Of a damaged name, all is left out up to the end of the instruction.
+    for name in [&b"BP1,\"A\xFFLB\";"[..], b"BP1,\"LB\xFF;", b"MG\"\xFF\",PE;"] {
+        let found = actions(&[name, b"PU10,20;PD30,20;"].concat());
+        assert_eq!(found.replace("pen 0 ", ""), "go 10,20 10,20>30,20", "{}", name.escape_ascii());
+    }
+}
+
+#[test]
+fn lines_of_pjl_are_no_instructions() {
+    for lines in ["@PJL SET COPIES=1\r\n@PJL LBPE\n", "PU;@PJL CO\r", "@\n", "@PJL \"\r\n\r\n"] {
+        let found = actions(format!("{lines}PU10,20;PD30,20;OE;").as_bytes());
+        assert_eq!(found, "go 10,20 10,20>30,20 '0'", "{lines}");
+    }
+    // The line ends an instruction, and a label may have the letter.
+    assert_eq!(actions(b"PD10,20@PJL\nPD30,20;"), "0,0>10,20 10,20>30,20");
+    assert!(actions(b"LB@\x03PU10,20;").ends_with("go 10,20"));
+    let damaged = b"@PJL LB\xFFLB;PU10,20;PD30,20;";
+    assert_eq!(actions(damaged), "go 10,20 10,20>30,20");
+}
+
+/// The receive interrupt must not take for a command what the interpreter takes for text.
+#[test]
+fn dialect_and_interpreter_agree_which_bytes_are_text() {
+    let mut state = 7u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        state >> 8
+    };
+    let words = [
+        &b"LB"[..],
+        b"BL",
+        b"WD",
+        b"DT",
+        b"SM",
+        b"PE",
+        b"CO",
+        b"BP",
+        b"MG",
+        b"MG\"",
+        b"BP1,\"",
+        b"IN",
+        b"DF",
+        b"DT#",
+        b"DT#,1",
+        b"PU",
+        b"B",
+        b"P",
+        b"\"",
+        b"\"",
+        b"@",
+        b"@PJL",
+        b"#",
+        b"\x03",
+        b";",
+        b";",
+        b";",
+        b",",
+        b" ",
+        b"1",
+        b"1.2.3",
+        b"-",
+        b"\n",
+        b"\r\n",
+        b"\xFF",
+        b"\xC3",
+        b"\xA9",
+        b"\xE2",
+        b"a",
+        b"\0",
+    ];
+    let (mut texts, mut codes) = (0, 0);
+    for _ in 0..2000 {
+        let (mut dialect, mut interpreter) = (Dialect::new(), interpreter());
+        for byte in b"IN;" {
+            dialect.take(*byte);
+        }
+        let mut sent = Vec::new();
+        for _ in 0..60 {
+            for byte in words[random() as usize % words.len()] {
+                sent.push(*byte);
+                dialect.take(*byte);
+                interpreter.push(*byte);
+                while let Some(action) = interpreter.next_action() {
+                    if action == Action::Initialize {
+                        interpreter.initialize(Point::default(), LIMITS);
+                    }
+                }
+                let is_text = interpreter.mode != Mode::Code;
+                assert_eq!(dialect.is_in_text(), is_text, "{}", sent.escape_ascii());
+                *if is_text { &mut texts } else { &mut codes } += 1;
+            }
+        }
+    }
+    assert!(texts > 10_000 && codes > 10_000, "{texts} {codes}");
 }
 
 #[test]

@@ -260,6 +260,8 @@ mod tests {
         assert_eq!(requests(b"IN;LB\xFD\x18?"), [RealTime::EMERGENCY, RealTime::ABORT, both[0]]);
         assert_eq!(requests(b"IN;PE?!~\xFD\xFB\x91;?!"), both);
         assert_eq!(requests(b"IN;LB\n$?\x03\n$\n?!"), both);
+        assert_eq!(requests(b"IN;BP1,\"?!\",2,\"~\";?!"), both);
+        assert_eq!(requests(b"\x1B%-12345X@PJL?!\r\n?!"), both);
     }
 
     #[test]

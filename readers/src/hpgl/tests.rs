@@ -38,9 +38,22 @@ fn lines_of_pjl_and_names_in_quotation_marks_are_passed_over() {
     for text in [
         "\x1B%-12345X@PJL JOB NAME=\"PD1\"\r\n@PJL SET PD9,9\r\n\x1B%0BIN;PU40,40;PD80,40;",
         "IN;BP1,\"PD1\",2,\"PD9,9\";PU40,40;PD80,40;",
+        "IN;MG\"LBSPEED\";PU40,40;PD80,40;\x1B%-12345X@PJL EOJ",
     ] {
         assert_eq!(lines(text), plain, "{text:?}");
+        assert!(notes("a.plt", text.as_bytes()).is_empty(), "{text:?}");
     }
+    let latin_1 = b"IN;BP1,\"\xFFLB\";PU40,40;PD80,40;";
+    assert_eq!(sent("a.plt", latin_1).expect("HP-GL"), plain);
+}
+
+#[test]
+fn a_name_without_an_end_is_told() {
+    let told = "the name that begins in line 2 has no end (another \"): all that follows it in its \
+                line is left out";
+    assert_eq!(notes("a.plt", b"IN;\nBP1,\"LB;PD9,9;\nPU0,0;PD40,0;"), [told]);
+    assert_eq!(notes("a.plt", b"PU0,0;PD40,0;\nBP1,\"LB;PD9,9;"), [told]);
+    assert!(notes("a.plt", b"PU0,0;PD40,0;\nCO\"LB;\n\";BP1,\"\";").is_empty());
 }
 
 #[test]
