@@ -302,9 +302,11 @@ impl Frame {
         Point { x: hundredths(p2.x - p1.x, x), y: hundredths(p2.y - p1.y, y) }
     }
 
-    /// `IP`: sets P1 and P2. Returns `false` for a wrong number of numbers.
+    /// `IP`: sets P1 and P2. Returns `false` for a wrong number of numbers. Without numbers these
+    /// are the default corners of the page as it is turned. A later `RO` does not change them.
     pub(super) fn set_corners(&mut self, numbers: &[i64]) -> bool {
         self.corners = match *numbers {
+            [] if self.quarters & 1 == 1 => CORNERS.map_each(|Point { x, y }| Point { x: y, y: x }),
             [] => CORNERS,
             [x, y] => {
                 let [p1, p2] = self.corners;

@@ -57,6 +57,11 @@ fn a_name_without_an_end_is_told() {
 }
 
 #[test]
+fn default_corners_are_those_of_the_turned_page() {
+    assert_eq!(lines("RO90;IP;SC0,1,0,1;PU0,0;PD1,0;"), lines("RO90;PU521,603;PD7721,603;"));
+}
+
+#[test]
 fn scales_turns_arcs_and_outlines_are_drawn() {
     assert_eq!(lines("IP0,0,4000,4000;SC0,10,0,10;PU1,1;PD2,1;")[1..3], ["v 10 10 0", "v 20 10 0"]);
     assert_eq!(lines("RO90;PU40,0;PD80,0;")[1..3], ["v 0 1 0", "v 0 2 0"]);
