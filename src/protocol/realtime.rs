@@ -82,8 +82,8 @@ impl RealTime {
 /// character of UTF-8 mean the command. All other commands act anywhere, whatever came before them:
 /// 0xFB and 0xFD, which are penup's own, never occur in UTF-8.
 ///
-/// In the texts of HP-GL, `?`, `!` and `~` are text. In its encoded data every byte is data but
-/// ctrl-X.
+/// In the texts of HP-GL all bytes are text but ctrl-X, 0xFB and 0xFD: labels may be in Latin-1, or
+/// in the set of letters of an old computer. In its encoded data these two are data, too.
 ///
 /// ```
 /// use penup::protocol::{RealTime, Sorter};
@@ -119,9 +119,12 @@ impl Sorter {
     /// The request that the byte makes. `None` for a byte of a line or of HP-GL.
     #[cfg(feature = "hpgl")]
     pub fn sort(&mut self, byte: u8) -> Option<RealTime> {
-        let dialect = &mut self.dialect;
-        let is_data = dialect.is_in_data() || matches!(byte, b'?' | b'!' | b'~');
-        if dialect.is_in_text() && is_data && byte != 0x18 {
+        let is_text = match byte {
+            0x18 => false,
+            0xFB | 0xFD => self.dialect.is_in_data(),
+            _ => self.dialect.is_in_text(),
+        };
+        if is_text {
             (self.inner, self.last) = (0, byte);
             self.dialect.take(byte);
             return None;
@@ -207,6 +210,8 @@ impl Sorter {
 #[cfg(test)]
 mod tests {
     use super::*;
+    #[cfg(feature = "hpgl")]
+    use std::format;
     use std::vec::Vec;
 
     /// The requests that the bytes make, in order.
@@ -262,6 +267,18 @@ mod tests {
         assert_eq!(requests(b"IN;LB\n$?\x03\n$\n?!"), both);
         assert_eq!(requests(b"IN;BP1,\"?!\",2,\"~\";?!"), both);
         assert_eq!(requests(b"\x1B%-12345X@PJL?!\r\n?!"), both);
+        // All letters of Latin-1 and of older sets of letters but two.
+        let stops = [RealTime::PAUSE, RealTime::EMERGENCY];
+        for text in ["LB", "BL", "CO\"", "BP\""] {
+            let bytes = |low, high| (low..=high).collect::<Vec<u8>>();
+            let begin = format!("IN;{text}");
+            assert_eq!(requests(&[begin.as_bytes(), &bytes(0x80, 0xFA)].concat()), []);
+            assert_eq!(requests(&[begin.as_bytes(), &bytes(0xFB, 0xFF)].concat()), stops);
+        }
+        assert_eq!(requests(b"IN;DT\x85;LBa\x84\x85\x84"), [RealTime::HOLD]);
+        assert_eq!(requests("IN;LBÅ€😀\u{91}\u{3}".as_bytes()), []);
+        // The letter that has begun in a label is over behind it.
+        assert_eq!(requests(b"IN;LB\xE2\x82\x03\x84"), [RealTime::HOLD]);
     }
 
     #[test]

@@ -321,6 +321,20 @@ fn control_x_and_a_dollar_line_end_it() {
 }
 
 #[test]
+fn bytes_of_a_label_that_would_act_elsewhere_are_letters() {
+    let label = |bytes: &[u8]| {
+        let mut bench = Bench::small();
+        let text = [b"IN;PU400,400;LB", bytes, b"\x03OC;OE;"].concat();
+        let heard = draw(&mut bench, &text);
+        (heard, inked(&bench))
+    };
+    let (heard, ink) = label(b"\xA1a\xA0b");
+    assert_eq!((heard, ink), label("¡a\u{A0}b".as_bytes()));
+    // 0x84 would hold and 0x91 would change the speed. Each is a box, as letters that are unknown.
+    assert_eq!(label(b"\x84\x91"), label("\u{4E2D}\u{4E2D}".as_bytes()));
+}
+
+#[test]
 fn the_other_port_watches_and_cannot_interrupt() {
     let mut bench = Bench::small();
     bench.board.receive_by(1, b"$I\n");
