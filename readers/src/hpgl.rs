@@ -305,7 +305,8 @@ impl Format for HpGl {
     /// The file begins with an instruction that HP-GL files begin with, or with an escape.
     fn recognises(&self, beginning: &[u8]) -> bool {
         let text = beginning.trim_ascii_start();
-        let begins = [&b"IN;"[..], b"in;", b"DF;", b"PU;", b"SP1;", b"\x1B.", b"\x1B%"];
+        let begins =
+            [&b"IN;"[..], b"in;", b";IN;", b"\x03IN;", b"DF;", b"PU;", b"SP1;", b"\x1B.", b"\x1B%"];
         begins.iter().any(|begin| text.starts_with(begin))
     }
 

@@ -74,6 +74,8 @@ enum State {
     LineBegin,
     /// So many bytes of `IN` have come of a line.
     In(u8),
+    /// So many bytes of `IN;` have come of a line behind semicolons and ends of labels.
+    InBehindEnd(u8),
     /// So many bytes of the command have come of a line.
     Command(u8),
     /// ESC has come at the beginning of a line.
@@ -187,9 +189,12 @@ impl Dialect {
             return token;
         }
         match self.state {
-            State::LineBegin | State::In(_) | State::Command(_) | State::Escape | State::Rest => {
-                self.take_line(byte)
-            }
+            State::LineBegin
+            | State::In(_)
+            | State::InBehindEnd(_)
+            | State::Command(_)
+            | State::Escape
+            | State::Rest => self.take_line(byte),
             State::Code => self.take_code(byte),
             State::Text => {
                 if byte == self.terminator {
@@ -256,7 +261,7 @@ impl Dialect {
     fn take_line(&mut self, byte: u8) -> Token {
         let ends_line = byte == b'\n' || byte == b'\r';
         self.state = match (self.state, byte) {
-            (State::In(2), b';' | b'\n' | b'\r') => {
+            (State::In(2), b';' | b'\n' | b'\r') | (State::InBehindEnd(2), b';') => {
                 return self.begin(Beginning::Initialize, byte);
             }
             (State::Escape, b'.' | b'%') => {
@@ -271,6 +276,11 @@ impl Dialect {
             (State::LineBegin, ESCAPE) => State::Escape,
             (State::LineBegin, b'I') => State::In(1),
             (State::In(1), b'N') => State::In(2),
+            // Some programs first end what the plotter may still be at. With more or less behind it
+            // than `IN;`, the semicolon begins a comment of G-code.
+            (State::LineBegin | State::InBehindEnd(0), b';' | LABEL_END) => State::InBehindEnd(0),
+            (State::InBehindEnd(0), b'I') => State::InBehindEnd(1),
+            (State::InBehindEnd(1), b'N') => State::InBehindEnd(2),
             (State::LineBegin, b'$') => State::Command(1),
             (State::Command(count), _) if COMMAND.get(usize::from(count)) == Some(&byte) => {
                 State::Command(count + 1)
@@ -396,6 +406,17 @@ mod tests {
             (b"IN3\n", "llll"),
             (b"$hpg\n", "lllll"),
             (b"\xFFIN;\nIN;", "lllllllB"),
+            // Before `IN;` there may be what ends an instruction or a label.
+            (b";IN;SP1", "lllBccc"),
+            (b"\x03IN;PU", "lllBcc"),
+            (b" ;;\x03IN;PU", "llllllBcc"),
+            // These are comments of G-code.
+            (b";IN\n;PU", "lllllll"),
+            (b";INTRO;\n", "llllllll"),
+            (b";in;\n", "lllll"),
+            (b"; IN;\n", "llllll"),
+            (b";IIN;\n", "llllll"),
+            (b";$hpgl\nPU", "lllllllll"),
         ] {
             assert_eq!(kinds(bytes), expected, "{}", bytes.escape_ascii());
         }

@@ -321,6 +321,15 @@ fn control_x_and_a_dollar_line_end_it() {
 }
 
 #[test]
+fn hp_gl_may_begin_behind_the_end_of_an_instruction() {
+    let mut bench = Bench::small();
+    assert_eq!(bench.say(";INTRO\n;in;\n"), "ok\nok\n");
+    let heard = draw(&mut bench, b";IN;SP1;PU100,100;PD200,100;PU200,300;");
+    assert_eq!(heard, "");
+    assert_eq!(units(&bench), [[100, 100], [200, 100]]);
+}
+
+#[test]
 fn bytes_of_a_label_that_would_act_elsewhere_are_letters() {
     let label = |bytes: &[u8]| {
         let mut bench = Bench::small();
