@@ -187,16 +187,14 @@ impl<B: PolygonBuffer> Interpreter<B> {
         }
     }
 
-    /// Ends a line, which ends an instruction; but coordinates may go on in the next line.
+    /// Ends a line, which ends an instruction; but coordinates may go on in the next line. So it is
+    /// known only there whether `PD` makes a dot.
     fn end_line(&mut self) {
         if !self.draws_pairs() {
             return self.end_instruction();
         }
         let number = self.number.end();
         self.take_number(number);
-        if !self.has_pairs && self.count == 0 {
-            self.end_instruction();
-        }
     }
 
     /// Ends the instruction and carries it out.

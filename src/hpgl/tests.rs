@@ -68,9 +68,23 @@ fn instructions_end_with_a_semicolon_a_line_or_the_next_letter() {
         "PU10,20PD30,40 50 60;",
         "pu10 20\npd30,40,\n50,60;",
         "PU10,20;PD;PA30,40,50,60;",
+        "PU\r\n10,20;PD\r\n30,40\r\n50,60;",
+        "PU10,20;PD;PA\n 30,40,50,60;",
     ] {
         let found = actions(text.as_bytes()).replace(" dot 10,20", "");
         assert_eq!(found, "go 10,20 10,20>30,40 30,40>50,60", "{text}");
+    }
+}
+
+#[test]
+fn pd_at_the_end_of_a_line_makes_a_dot_unless_coordinates_follow() {
+    for end in ["PU;", "\nPU;", ";", "\r\nPA50,60;"] {
+        let found = actions(format!("PU10,20;PD\n{end}").as_bytes());
+        assert!(found.starts_with("go 10,20 dot 10,20"), "{end}: {found}");
+    }
+    for end in ["30,40;", "+30,40;", " 30,40;", ".5,40;"] {
+        let found = actions(format!("PU10,20;PD\n{end}OE;").as_bytes());
+        assert!(!found.contains("dot") && found.ends_with("'0'"), "{end}: {found}");
     }
 }
 

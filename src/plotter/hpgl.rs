@@ -89,6 +89,10 @@ impl<'m, I: Index> Plotter<'m, I> {
         match token {
             Token::Line => return Taken::Line,
             Token::Leaves => {
+                if is_mine {
+                    // Nothing more comes that would tell whether the last line has gone on.
+                    self.hpgl.session.receive(b';', Token::Code);
+                }
                 if let Some(reader) = self.readers.get_mut(port) {
                     reader.clear();
                 }

@@ -321,12 +321,15 @@ fn control_x_and_a_dollar_line_end_it() {
 }
 
 #[test]
-fn hp_gl_may_begin_behind_the_end_of_an_instruction() {
+fn hp_gl_may_begin_behind_the_end_of_an_instruction_and_end_behind_the_name_of_one() {
     let mut bench = Bench::small();
     assert_eq!(bench.say(";INTRO\n;in;\n"), "ok\nok\n");
-    let heard = draw(&mut bench, b";IN;SP1;PU100,100;PD200,100;PU200,300;");
+    let heard = draw(&mut bench, b";IN;SP1;PU100,100;PD200,100;PU200,300;PD\n");
     assert_eq!(heard, "");
     assert_eq!(units(&bench), [[100, 100], [200, 100]]);
+    // The dot is made as soon as nothing more can come.
+    assert!(draw(&mut bench, b"$G\n").starts_with("[GC:"));
+    assert_eq!(units(&bench), [[100, 100], [200, 300]]);
 }
 
 #[test]

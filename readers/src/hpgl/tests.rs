@@ -39,7 +39,7 @@ fn lines_of_pjl_and_names_in_quotation_marks_are_passed_over() {
         "\x1B%-12345X@PJL JOB NAME=\"PD1\"\r\n@PJL SET PD9,9\r\n\x1B%0BIN;PU40,40;PD80,40;",
         "IN;BP1,\"PD1\",2,\"PD9,9\";PU40,40;PD80,40;",
         "IN;MG\"LBSPEED\";PU40,40;PD80,40;\x1B%-12345X@PJL EOJ",
-        ";IN;PU40,40;PD80,40;",
+        ";IN;PU40,40;PD\r\n80,40;",
     ] {
         assert_eq!(lines(text), plain, "{text:?}");
         assert!(notes("a.plt", text.as_bytes()).is_empty(), "{text:?}");
