@@ -2,7 +2,7 @@
 
 use super::DAMAGED;
 use super::coordinates::Point;
-use super::interpreter::{ErrorNumber, Interpreter, Step};
+use super::interpreter::{ErrorNumber, Interpreter};
 use super::polygon::PolygonBuffer;
 
 /// The progress of an encoded polyline.
@@ -104,10 +104,11 @@ impl<B: PolygonBuffer> Interpreter<B> {
         let value = if line.value & 1 == 1 { -magnitude } else { magnitude };
         (line.value, line.bits) = (0, 0);
         match core::mem::take(&mut line.meaning) {
-            Meaning::Pen => match u8::try_from(value) {
-                Ok(pen) => self.add(Step::Pen(pen)),
-                Err(_) => self.fail(ErrorNumber::BadParameter),
-            },
+            Meaning::Pen => {
+                if let Err(error) = self.choose_pen(value) {
+                    self.fail(error);
+                }
+            }
             Meaning::Fraction => match u32::try_from(value) {
                 Ok(bits) if bits <= 26 => line.fraction = bits,
                 _ => self.fail(ErrorNumber::BadParameter),

@@ -267,11 +267,7 @@ impl<B: PolygonBuffer> Interpreter<B> {
         match &name {
             b"IN" => self.add(Step::Initialize),
             b"DF" => self.set_defaults(),
-            b"SP" => {
-                let pen = numbers.first().map_or(0, |pen| pen / UNIT);
-                let pen = u8::try_from(pen).ok().filter(|pen| *pen <= 32).ok_or(bad)?;
-                self.add(Step::Pen(pen));
-            }
+            b"SP" => self.choose_pen(numbers.first().map_or(0, |pen| pen / UNIT))?,
             b"VS" => {
                 let speed = numbers.first().copied().unwrap_or(0);
                 if speed != 0 && !(UNIT / 1000..=128 * UNIT).contains(&speed) {
@@ -443,6 +439,13 @@ impl<B: PolygonBuffer> Interpreter<B> {
             name if WITHOUT_EFFECT.contains(name) => {}
             _ => return Err(ErrorNumber::Unknown),
         }
+        Ok(())
+    }
+
+    /// `SP`, and the pens of `PE`: the pen with this number is needed.
+    pub(super) fn choose_pen(&mut self, number: i64) -> Result<(), ErrorNumber> {
+        let pen = u8::try_from(number).ok().filter(|pen| *pen <= 32);
+        self.add(Step::Pen(pen.ok_or(ErrorNumber::BadParameter)?));
         Ok(())
     }
 

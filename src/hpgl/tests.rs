@@ -503,6 +503,13 @@ fn encoded_polylines() {
     let flagged = [&b"PE"[..], &[b'=' | 0x80, number(5), number(6)], b";OE;"].concat();
     assert_eq!(actions(&flagged), "0,0>5,6 '0'");
     assert_eq!(actions(b"PE\x85;OE;"), "'3'");
+    // The same pens as of `SP`.
+    for (pen, found) in [(32, "pen 32 '0'"), (33, "'3'"), (255, "'3'"), (-1, "'3'")] {
+        // 33 is 2 and 1 times 32, two digits of base 64; the sign is the lowest bit.
+        let code = 2 * i32::abs(pen) as u32 + u32::from(pen < 0);
+        let digits = [63 + (code % 64) as u8, 191 + (code / 64 % 64) as u8];
+        assert_eq!(actions(&[b"PE:", &digits[..], b";OE;"].concat()), found, "{pen}");
+    }
 }
 
 #[test]
