@@ -201,7 +201,7 @@ pub const LM3S6965: BoardRow = BoardRow {
         limit_y: 5,
         stop: 6,
     },
-    // Enough for a lattice of 125 cubes, and for a stack of 9,840 bytes besides.
+    // Enough for a lattice of 125 cubes, and for a stack of 9,832 bytes besides.
     memory: Capacities {
         vertices: 1000,
         corners: 3000,

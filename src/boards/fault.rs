@@ -1,9 +1,10 @@
 //! Handling of panics and faults: the machine is made safe at once, and the cause is reported.
 //!
 //! This is the same on every board, and written here only: interrupts off, pen up, drivers off, the
-//! message, the restart. A board implements [`Fault`] with what differs. By default the cause is
-//! written to the serial line, and ctrl-X resets the board. A board that can keep the cause through
-//! a reset restarts by itself and reports the cause afterwards.
+//! message, the restart. A board implements [`Fault`] with what differs. A board that can keep the
+//! cause through a reset restarts by itself and reports the cause afterwards; another one writes
+//! the cause to the serial line and then restarts. A board that faults again and again soon after
+//! its start does not restart by itself: there ctrl-X resets it.
 
 use core::fmt::{self, Write};
 use core::panic::PanicInfo;
@@ -25,10 +26,9 @@ pub trait Fault {
     /// the flash has no room for its text. The stack grows down from the address `stack_start`.
     fn cause(info: &PanicInfo, stack_start: usize) -> impl fmt::Display;
 
-    /// Reports the cause, or restarts the board, which then reports it.
-    fn report(cause: fmt::Arguments) {
-        say(cause);
-    }
+    /// Reports the cause and restarts the board, in either order. It returns only if the board must
+    /// not be restarted by itself.
+    fn report(cause: fmt::Arguments);
 
     /// Prepares for waiting: from now on nothing feeds a watchdog.
     fn begin_to_wait() {}
@@ -139,11 +139,14 @@ pub fn make_safe() {
     ThisBoard::release();
 }
 
-/// Reports the cause of a panic or a fault, as one line on the serial line.
-pub fn say(cause: fmt::Arguments) {
+/// Says in the report of a fault that the board waits to be restarted.
+pub const WAITS: &str = "ctrl-X resets";
+
+/// Reports the cause of a panic or a fault, and what comes `next`, as one line on the serial line.
+pub fn say(next: &str, cause: fmt::Arguments) {
     ThisBoard::UART.write(b"\r\n");
     // This never fails, because `OneLine` accepts every byte.
-    let _ = write!(OneLine, "[MSG:stopped by a fault, ctrl-X resets: {cause}]");
+    let _ = write!(OneLine, "[MSG:stopped by a fault, {next}: {cause}]");
     ThisBoard::UART.write(b"\r\n");
 }
 

@@ -31,6 +31,9 @@ mod offset {
     /// The register that says whether DMA is asked to fetch received bytes.
     pub const DMA: Offset = Offset::new(0x048);
 }
+/// The bit of [`offset::FLAGS`] that says that bytes wait to be sent, or that the last bit of one,
+/// its stop bit, is not out yet.
+const BUSY: u32 = 1 << 3;
 /// The bit of [`offset::FLAGS`] that says that no received byte waits.
 const RECEIVER_EMPTY: u32 = 1 << 4;
 /// The bit of [`offset::FLAGS`] that says that the sender's FIFO has no room.
@@ -84,6 +87,11 @@ impl Uart {
             while !self.has_place() {}
             self.put(byte);
         }
+    }
+
+    /// Waits until all bytes have left the chip, the stop bit of the last one included.
+    pub fn flush(self) {
+        while self.0.read(offset::FLAGS) & BUSY != 0 {}
     }
 
     /// Reads a byte with its error bits directly from the receiver, as

@@ -100,6 +100,11 @@ pub fn cycles_24() -> u32 {
     !count_down() & CYCLE_MASK
 }
 
+/// Whether the board has been awake for five seconds since its start, so that it counts as started.
+pub fn has_started() -> bool {
+    WRAPS.load(Ordering::Relaxed) > 5 * HERTZ / (CYCLE_MASK + 1)
+}
+
 /// Returns SysTick's own count, which goes down. The step interrupt uses it because it costs least.
 #[inline(always)]
 pub fn count_down() -> u32 {

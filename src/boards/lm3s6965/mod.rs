@@ -75,6 +75,8 @@ pub struct Lm3s6965 {
     serial: serial::Serial,
     /// The main loop's end of the queue of step events.
     steps: steps::Steps,
+    /// Whether a fault has ended the previous run of the program.
+    is_after_fault: bool,
 }
 
 /// Sets up the clock, the pins, the serial line and the timers. Afterwards the drivers are off, the
@@ -91,7 +93,8 @@ pub fn take() -> (Lm3s6965, MemorySlices<'static>, &'static PulserState) {
     static BLOCKS: StaticCell<[Block; ROW.memory.blocks]> = StaticCell::new();
     let blocks = once(BLOCKS.try_init([Block::EMPTY; ROW.memory.blocks]));
     let memory = once(MEMORY.try_take()).lend(blocks);
-    (Lm3s6965 { clock, serial, steps }, memory, &steps::STATE)
+    let is_after_fault = emergency::is_after_fault();
+    (Lm3s6965 { clock, serial, steps, is_after_fault }, memory, &steps::STATE)
 }
 
 impl Board for Lm3s6965 {
@@ -120,6 +123,11 @@ impl Board for Lm3s6965 {
 
     fn step_now(&mut self) {
         self.steps.start_now();
+    }
+
+    /// The cause was told before the restart and is not kept.
+    fn fault(&self) -> Option<&str> {
+        self.is_after_fault.then_some("told before")
     }
 
     fn microseconds(&mut self) -> u32 {

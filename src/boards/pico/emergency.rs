@@ -247,7 +247,7 @@ impl Fault for Pico {
             }
             restart(FAULT)
         }
-        fault::say(cause);
+        fault::say(fault::WAITS, cause);
     }
 
     fn begin_to_wait() {
