@@ -60,7 +60,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         board.wait_for("<Idle")?;
         let counts = board.end()?;
         let sums = |handler| {
-            let calls = counts.get(&handler).into_iter().flatten();
+            let calls = counts.handlers.get(&handler).into_iter().flatten();
             calls.fold((0, 0), |sum, (count, calls)| (sum.0 + calls, sum.1 + count * calls))
         };
         let all: usize =
