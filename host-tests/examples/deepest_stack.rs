@@ -9,7 +9,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| board | after | deepest stack so far, bytes | of |");
     println!("|---|---|---|---|");
     on_the_lm3s6965(|job, stack| row("lm3s6965", job, stack))?;
-    on_the_pico(|job, stack| row("pico", job, stack))
+    on_the_pico(|job, stack, _| row("pico", job, stack))
 }
 
 fn row(board: &str, job: &str, Stack { size, deepest }: Stack) {

@@ -1,10 +1,11 @@
-//! Runs the jobs that use the most stack of a board, and measures how much they leave.
+//! Runs the jobs that use the most stack of a board, and measures how much they leave, and how long
+//! the main loop of the Pico does not look at what is asked in real time.
 
 use crate::emulated_jobs::Line;
 use crate::meshes::soup;
 use crate::whole_jobs::job_lines;
 use penup_client::emulator::{
-    EmulatedBoard, Emulator, EmulatorError, Options, Pico, Stack, image_path,
+    CallGaps, EmulatedBoard, Emulator, EmulatorError, Options, Pico, Stack, image_path,
 };
 use std::error::Error;
 use std::thread::sleep;
@@ -78,12 +79,19 @@ pub fn on_the_lm3s6965(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Er
     run_all(line, jobs("lattice5.obj"), |_| Ok(()), stack, report)
 }
 
-/// Runs all jobs on the Pico, whose USB host queries the status all the time.
+/// A part of the mangled name of the function of the Pico's image by which the main loop takes what
+/// was asked in real time, at whichever port.
+pub const LOOK: &str = "5Ports14take_real_time17h";
+
+/// Runs all jobs on the Pico, whose USB host queries the status all the time. After each, reports
+/// the deepest use of the stack so far, and the longest times between two looks in this job.
 ///
 /// # Errors
 /// The emulator fails.
-pub fn on_the_pico(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>> {
-    let mut line = Line::to(Box::new(Pico::start(&image_path("pico"))?))?;
+pub fn on_the_pico(mut report: impl FnMut(&str, Stack, CallGaps)) -> Result<(), Box<dyn Error>> {
+    let image = image_path("pico");
+    let mut line = Line::to(Box::new(Pico::start(&image)?))?;
+    line.emulator.time_between_calls(&image, LOOK)?;
     line.emulator.plug_usb_in()?;
     let ask_by_usb = |pico: &mut Pico| {
         pico.send_by_usb(b"?")?;
@@ -91,15 +99,16 @@ pub fn on_the_pico(report: impl FnMut(&str, Stack)) -> Result<(), Box<dyn Error>
         Ok(())
     };
     let jobs = jobs("lattice2.obj").into_iter().chain([in_flash()]);
-    run_all(line, jobs, ask_by_usb, Pico::stack, report)
+    let measure = |pico: &mut Pico| Ok((pico.stack()?, pico.take_call_gaps()));
+    run_all(line, jobs, ask_by_usb, measure, |job, (stack, gaps)| report(job, stack, gaps))
 }
 
-fn run_all<E: EmulatedBoard>(
+fn run_all<E: EmulatedBoard, M>(
     mut line: Line<E>,
     jobs: impl IntoIterator<Item = Job>,
     mut meanwhile: impl FnMut(&mut E) -> std::io::Result<()>,
-    mut stack: impl FnMut(&mut E) -> Result<Stack, EmulatorError>,
-    mut report: impl FnMut(&str, Stack),
+    mut measure: impl FnMut(&mut E) -> Result<M, EmulatorError>,
+    mut report: impl FnMut(&str, M),
 ) -> Result<(), Box<dyn Error>> {
     for (name, lines) in jobs {
         let mut is_in_parts = false;
@@ -140,7 +149,7 @@ fn run_all<E: EmulatedBoard>(
         line.hear_greeting()?;
         while !line.status()?.contains("<Idle") {}
         line.emulator.pin_changes()?;
-        report(name, stack(&mut line.emulator)?);
+        report(name, measure(&mut line.emulator)?);
     }
     Ok(())
 }

@@ -40,6 +40,7 @@ pub mod convex_solids;
 pub mod grbl_lines;
 pub mod half_circles;
 pub mod heaviest_jobs;
+pub mod looks;
 pub mod ink;
 pub mod streamed_drawing;
 pub mod transcript;

@@ -1,8 +1,10 @@
-//! Tests that the heaviest jobs leave a margin of the stack.
+//! Tests that the heaviest jobs leave a margin of the stack, and that the main loop of the Pico
+//! looks often enough at what is asked in real time meanwhile. Other input is in `pico_looks`.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::Stack;
 use penup_host_tests::heaviest_jobs::{on_the_lm3s6965, on_the_pico};
+use penup_host_tests::looks::{COMPUTED, assert_bounded};
 use std::error::Error;
 
 /// The number of bytes that no job may use, because an interrupt may occur when the stack is deeper
@@ -22,5 +24,8 @@ fn of_the_lm3s6965() -> Result<(), Box<dyn Error>> {
 
 #[test]
 fn of_the_pico() -> Result<(), Box<dyn Error>> {
-    on_the_pico(leaves_a_margin)
+    on_the_pico(|job, stack, gaps| {
+        leaves_a_margin(job, stack);
+        assert_bounded(COMPUTED, job, gaps);
+    })
 }

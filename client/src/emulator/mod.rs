@@ -31,7 +31,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitStatus;
 use std::time::Duration;
 
-pub use pico::{FlashOperation, InterruptTimes, Pico, PicoByUsb, UartError};
+pub use pico::{CallGaps, FlashOperation, InterruptTimes, Pico, PicoByUsb, UartError};
 pub use stack::Stack;
 
 use crate::table::{self, BoardRow};

@@ -28,7 +28,9 @@
 // it is (0), 37 the host opens the USB port (1) or closes it (0) at a rate (the cycle), 38 the host
 // resets the bus so many times (the value) at random (a seed in the cycle's place), 48 the next
 // setting of the clock's alarm is late by so many milliseconds, 49 from now on the longest handlers
-// and masks of interrupts are measured (1), or told (0). Out: 0 a byte of the serial line, 1 a
+// and masks of interrupts are measured (1), or told (0), 50 the times from each call of a function
+// (its address in the cycle's place) to the next one are measured from now on, and told if they
+// are at least so many hundredths of a millisecond. Out: 0 a byte of the serial line, 1 a
 // pin's new level, 2 the time, 3 a byte of the log, 4 the chip was reset (0 by the loss of power, 1
 // by the watchdog, 2 by the pin RUN), 5 a byte of USB, 6 a timed function has returned (its number,
 // the cycles in the cycle's place), 7 so many bytes of the stack have not been used since the chip
@@ -40,7 +42,8 @@
 // goes on (the upper 32 bits) and how many bytes it changes (the lower 16), 39 so many operations
 // were recorded, 40 the longest cycles of an exception's handler (its number), 41 and for which an
 // interrupt was masked (its number, 255 for all by PRIMASK, or 254 for all while the flash was
-// changed), 42 all of these have been told.
+// changed), 42 all of these have been told, 43 for so many cycles in which the core was awake the
+// function was not called, while the flash was changed (1) or not (0).
 //
 // rp2040js has no boot ROM: here is one, of the functions that the image asks for. Each is a
 // breakpoint that this program serves. Flash takes as long as a Pico's.
@@ -51,6 +54,7 @@
 
 import { readFileSync, writeSync } from 'node:fs';
 import { pathToFileURL } from 'node:url';
+import { CallGaps } from './pico/call_gaps.mjs';
 import { CALL_CYCLES, countMissingCycles } from './pico/core_cycles.mjs';
 import { FlashPort } from './pico/flash_chip.mjs';
 import { FlashRecord } from './pico/flash_record.mjs';
@@ -116,9 +120,11 @@ const OPERATIONS = 39;
 const ASK_IN_CHANGES = 18;
 const GO_ON = -1;
 const TIME_INTERRUPTS = 49;
+const TIME_GAPS = 50;
 const HANDLER_TOOK = 40;
 const MASK_TOOK = 41;
 const INTERRUPTS_END = 42;
+const GAP = 43;
 const DELAY_ALARM = 48;
 /** Nanoseconds by which the next settings of the clock's alarm are late. */
 const alarmDelays = [];
@@ -375,6 +381,7 @@ function start(flash, kind) {
   flashPort = new FlashPort(chip);
   holdInReset(chip);
   interruptTimes?.attach(core);
+  callGaps?.begin();
   const watchdog = chip.peripherals[WATCHDOG];
   watchdog.onWatchdogTrigger = () => {
     // Or its alarm would come again at once, for ever.
@@ -647,7 +654,8 @@ process.stdin.on('data', (data) => {
     else if (rest[at] === TIME_INTERRUPTS) {
       if (entry.value) timeInterrupts();
       else tellInterruptTimes();
-    } else if (rest[at] === USB_RESETS) {
+    } else if (rest[at] === TIME_GAPS) timeGaps(entry.cycle, entry.value);
+    else if (rest[at] === USB_RESETS) {
       resetSeeds.push(entry.cycle);
       events.push({ what: USB_RESETS, value: entry.value, cycle: 0 });
     } else if (rest[at] === JUMP) {
@@ -695,6 +703,23 @@ function tellInterruptTimes() {
   for (const [number, cycles] of interruptTimes.handlers) report(HANDLER_TOOK, number, cycles);
   for (const [number, cycles] of interruptTimes.masks) report(MASK_TOOK, number, cycles);
   report(INTERRUPTS_END, 0, 0);
+}
+
+/** The times between the calls of a function, once they are measured. */
+let callGaps = null;
+/** The cycles for which the core has slept. */
+let slept = 0;
+
+function timeGaps(address, hundredths) {
+  if (callGaps) quick.mark(callGaps.address, false);
+  quick.mark(address, true);
+  const least = (hundredths * MILLISECOND) / 100;
+  callGaps = new CallGaps(address, least, () => now() - slept, () => flashWaits);
+}
+
+function tellGap() {
+  const gap = callGaps.call();
+  if (gap) report(GAP, gap.changesFlash ? 1 : 0, gap.cycles);
 }
 
 /** In a handler, or where it has masked them all, nothing is done to the main loop. */
@@ -835,6 +860,7 @@ function executeUntil(due) {
       continue;
     }
     if (timed.size) timeFunctions();
+    if (callGaps?.address === core.PC) tellGap();
     pass(core.executeInstruction() * NANOS);
     if (faultDue) takeFault();
     if (flashNanos) waitForFlash();
@@ -850,6 +876,7 @@ function run(cycles) {
     if (core.waiting || isLockedUp) {
       const alarm = clock.nextAlarm ? cyclesBefore + clock.nextAlarm.nanos / NANOS : Infinity;
       pass(Math.max(Math.min(alarm, due) - cycle, 0) * NANOS);
+      slept += now() - cycle;
     } else executeUntil(due);
     cycle = now();
     if (pioDue <= cycle) catchUp(cycle);

@@ -5,11 +5,13 @@
 //! to a board: each method sends one order of that protocol.
 
 mod flash;
+mod call_gaps;
 mod interrupt_times;
 mod process;
 mod record;
 mod servo;
 
+pub use call_gaps::CallGaps;
 pub use flash::FlashOperation;
 pub use interrupt_times::InterruptTimes;
 use process::{

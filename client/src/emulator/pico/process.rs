@@ -1,10 +1,11 @@
 //! The process of the emulator of the Pico, and the threads that read its output.
 
 use super::BOARD;
+use super::call_gaps::CallGaps;
 use super::flash::FlashOperation;
 use super::interrupt_times::InterruptTimes;
 use super::record::{
-    ANSWERED, BOOTSEL, GARBLED, HANDLER_TOOK, INTERRUPTS_END, LOG, MASK_TOOK, OPERATION_BEGAN,
+    ANSWERED, BOOTSEL, GAP, GARBLED, HANDLER_TOOK, INTERRUPTS_END, LOG, MASK_TOOK, OPERATION_BEGAN,
     OPERATION_CHANGES, OPERATIONS, PIN, RECORD_BYTES, RESET, RETURNED, Record, SERIAL,
     UNUSED_STACK, USB, USB_SERIAL, WERE_READ, at,
 };
@@ -44,6 +45,7 @@ const MODULES: &[(&str, &str)] = &[
     ("./pico/flash_chip.mjs", include_str!("flash_chip.mjs")),
     ("./pico/flash_record.mjs", include_str!("flash_record.mjs")),
     ("./pico/held_in_reset.mjs", include_str!("held_in_reset.mjs")),
+    ("./pico/call_gaps.mjs", include_str!("call_gaps.mjs")),
     ("./pico/interrupt_times.mjs", include_str!("interrupt_times.mjs")),
     ("./pico/joined_queue.mjs", include_str!("joined_queue.mjs")),
     ("./pico/late_alarm.mjs", include_str!("late_alarm.mjs")),
@@ -64,7 +66,7 @@ const CORE: &str = "target/wasm32-unknown-unknown/release/penup_emulated_core.wa
 const SAID_LINES: usize = 20;
 
 /// Messages whose `cycle` is something other than the present cycle.
-const NO_TIMES: [u8; 10] = [
+const NO_TIMES: [u8; 11] = [
     RETURNED,
     UNUSED_STACK,
     ANSWERED,
@@ -75,6 +77,7 @@ const NO_TIMES: [u8; 10] = [
     HANDLER_TOOK,
     MASK_TOOK,
     INTERRUPTS_END,
+    GAP,
 ];
 
 /// The state of the emulator, as the reader threads have learnt it.
@@ -105,6 +108,8 @@ pub(super) struct State {
     pub(super) interrupt_times: InterruptTimes,
     /// Whether all of them have come.
     pub(super) knows_interrupt_times: bool,
+    /// The longest times between the calls of a function.
+    pub(super) call_gaps: CallGaps,
     /// Whether the boot ROM shows its drive and waits for an image.
     pub(super) shows_drive: bool,
     /// The serial number that the USB host has read.
@@ -283,6 +288,11 @@ fn read(mut stdout: ChildStdout, shared: &Shared<State>, mut log: PipeWriter) {
                     state.interrupt_times.masks.insert(record.value, at(record.cycle));
                 }
                 INTERRUPTS_END => state.knows_interrupt_times = true,
+                GAP => {
+                    let CallGaps { longest, longest_for_flash } = &mut state.call_gaps;
+                    let kept = if record.value == 1 { longest_for_flash } else { longest };
+                    *kept = (*kept).max(at(record.cycle));
+                }
                 ANSWERED => state.waits[usize::from(record.value & 1)].push(at(record.cycle)),
                 BOOTSEL => state.shows_drive = true,
                 USB_SERIAL if record.value == 0 => state.usb_serial_number.clear(),
