@@ -1,29 +1,35 @@
 //! A line that damages bytes in both directions between the client and an emulated board, and a
-//! soak that also sends noise, leaves in the middle of things, and measures how long the status is
-//! waited for.
+//! soak that also sends noise, leaves in the middle of things, compares each status with the pins,
+//! and measures how long it is waited for.
 //!
 //! The board draws the same small job again and again. Whatever the line does, a job that the
 //! client reports as drawn must have left exactly its ink, at the very places: not one step may be
 //! lost over the whole soak.
 
 mod disturb;
+mod leave;
+mod watched;
+
+pub use disturb::Disturbance;
 
 use crate::damage::damaged;
 use crate::emulated_jobs::{Line, bench_like};
-use crate::ink::{Ink, inked};
+use crate::ink::inked;
 use crate::random::Random;
+use crate::streamed_drawing::StreamedDrawing;
 use crate::whole_jobs::job_lines;
 use penup::board_table::{BoardRow, PICO};
-use penup_client::emulator::{EmulatedBoard, Emulator, Machine, Options, Pico, image_path};
+use penup_client::emulator::{Emulator, Options, Pico, image_path};
 use penup_client::link::{Answer, Link};
 use penup_client::progress::Quiet;
 use penup_client::sender::{Sender, Timeouts};
-use penup_readers::lines::JobLine;
+use penup_readers::lines::{JobLine, Lines as _};
 use std::collections::BTreeSet;
 use std::error::Error;
 use std::io;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
+use watched::{Board, WatchedBoard, reported};
 
 /// The longest time to an answer while steps run.
 pub const ANSWER_LIMIT: Duration = Duration::from_millis(20);
@@ -37,40 +43,10 @@ const STOP: u8 = 0xFD;
 /// A pen that takes little time. Pulses for the servo come every 20 ms, so with less the pins show
 /// the pen late.
 const QUICK_PEN: [&str; 2] = ["$212=30", "$213=30"];
+/// The client asks for the status this often while it draws, so that many are compared.
+const OFTEN: Duration = Duration::from_millis(20);
 /// Gives a job up.
 const ABORT: u8 = 0x18;
-
-/// A board of either kind, whose waits can be read.
-enum Board {
-    Pico(Box<Pico>),
-    Lm3s6965(Box<Emulator>),
-}
-
-impl Board {
-    fn emulator(&mut self) -> &mut dyn EmulatedBoard {
-        match self {
-            Self::Pico(pico) => pico.as_mut(),
-            Self::Lm3s6965(emulator) => emulator.as_mut(),
-        }
-    }
-
-    /// How long each status since the last call was waited for, on the board's clock.
-    fn take_waits(&mut self) -> Vec<Duration> {
-        match self {
-            Self::Pico(pico) => {
-                let [first_bytes, _] = pico.take_status_waits();
-                first_bytes
-            }
-            Self::Lm3s6965(emulator) => {
-                let wait = |line: &String| {
-                    let (_, rest) = line.split_once("status after ")?;
-                    rest.split(' ').next()?.parse().ok().map(Duration::from_micros)
-                };
-                emulator.log_lines().iter().filter_map(wait).collect()
-            }
-        }
-    }
-}
 
 /// What was done to a board.
 #[derive(Debug, Clone, Copy, Default)]
@@ -83,10 +59,14 @@ pub struct Counts {
     pub damaged: u64,
     /// Bytes of noise.
     pub noise: u64,
-    /// Senders that left in the middle of a line, of an upload, and of a job.
-    pub left: u32,
+    /// Senders that left in the middle of a line, of an upload, of a job, and of a drawing that was
+    /// sent while it was drawn.
+    pub left: [u32; 4],
     /// Statuses that were asked for while steps ran, and compared with the pins.
     pub asked: u32,
+    /// Statuses of a machine that drew or held which came while the line damaged bytes, and were
+    /// compared with the pins.
+    pub asked_in_damage: u32,
     /// The longest time to one of them.
     pub longest: Duration,
     /// The longest time to a status while flash was erased.
@@ -95,16 +75,14 @@ pub struct Counts {
 
 /// A board at the end of a line that may damage bytes.
 pub struct DamagedLine {
-    board: Board,
+    watched: WatchedBoard,
     /// One byte in this many is damaged; `None` for none.
     one_in: Option<u64>,
     random: Random,
-    ink: Ink,
-    machine: Machine,
-    /// Where the machine was since the last status was asked for, in steps.
-    way: BTreeSet<[i32; 2]>,
     /// What the client has not been given yet.
     heard: Vec<u8>,
+    /// The promise that was broken while the client listened. The client may have overheard it.
+    broken: Option<String>,
     /// What has been done so far.
     pub counts: Counts,
 }
@@ -124,15 +102,12 @@ impl DamagedLine {
             let started = Emulator::start(&image, Options::default())?;
             Board::Lm3s6965(Line::to(Box::new(started))?.emulator)
         };
-        let (random, ink) = (Random::new(seed), Ink::default());
         let mut line = Self {
-            board,
+            watched: WatchedBoard::new(board),
             one_in: None,
-            random,
-            ink,
-            machine: Machine::default(),
-            way: BTreeSet::new(),
+            random: Random::new(seed),
             heard: Vec::new(),
+            broken: None,
             counts: Counts::default(),
         };
         line.order(&QUICK_PEN.map(str::to_owned))?;
@@ -163,25 +138,6 @@ impl DamagedLine {
         arrived
     }
 
-    /// Follows the pins up to now.
-    fn follow(&mut self) -> Result<(), Box<dyn Error>> {
-        for change in self.board.emulator().pin_changes()? {
-            self.ink.change(change);
-            self.machine.change(change);
-            let (x, y) = self.machine.position();
-            self.way.insert([x, y]);
-        }
-        Ok(())
-    }
-
-    /// The points of ink since the last call, each once.
-    fn take_ink(&mut self) -> Result<BTreeSet<[i32; 2]>, Box<dyn Error>> {
-        self.follow()?;
-        let points = self.ink.points().iter().copied().collect();
-        self.ink.forget();
-        Ok(points)
-    }
-
     /// Returns the next line of the board, past the damage.
     fn hear(&mut self) -> Result<String, Box<dyn Error>> {
         loop {
@@ -190,7 +146,7 @@ impl DamagedLine {
                 return Ok(String::from_utf8_lossy(&line).trim().to_owned());
             }
             let mut buffer = [0; 256];
-            let count = self.board.emulator().receive(&mut buffer, Duration::from_secs(120))?;
+            let count = self.watched.receive(&mut buffer, Duration::from_secs(120))?;
             if count == 0 {
                 return Err("the board is silent".into());
             }
@@ -200,7 +156,7 @@ impl DamagedLine {
 
     /// Asks for the status, past the damage.
     fn status(&mut self) -> Result<String, Box<dyn Error>> {
-        self.board.emulator().send(b"?")?;
+        self.watched.send(b"?")?;
         loop {
             let line = self.hear()?;
             if line.starts_with('<') {
@@ -211,7 +167,7 @@ impl DamagedLine {
 
     /// Gives up whatever the board does, and waits until it is idle.
     fn recover(&mut self) -> Result<(), Box<dyn Error>> {
-        self.board.emulator().send(&[b'\n', ABORT])?;
+        self.watched.send(&[b'\n', ABORT])?;
         let begun = Instant::now();
         loop {
             let status = self.status()?;
@@ -219,7 +175,7 @@ impl DamagedLine {
                 break;
             }
             if status.starts_with("<Alarm") {
-                self.board.emulator().send(b"$X\n")?;
+                self.watched.send(b"$X\n")?;
             }
             if begun.elapsed() > Duration::from_secs(300) {
                 return Err(format!("the machine does not come to rest: {status}").into());
@@ -231,9 +187,7 @@ impl DamagedLine {
     /// Checks that the idle machine is where it says.
     fn assert_at_rest(&mut self) -> Result<(), Box<dyn Error>> {
         let status = self.status()?;
-        self.follow()?;
-        self.ink.points();
-        let at = self.ink.position();
+        let at = self.watched.position()?;
         if reported(&status) == Some(at) {
             Ok(())
         } else {
@@ -244,16 +198,17 @@ impl DamagedLine {
     /// Draws the job by the client's sender. Returns whether it was drawn; an error of the client
     /// is none here.
     fn draw(&mut self, job: &Job) -> Result<bool, Box<dyn Error>> {
-        self.take_ink()?;
+        self.watched.take_ink()?;
         let interrupt = AtomicBool::new(false);
-        let drawn = Sender::open(self, Timeouts::default(), &interrupt).and_then(|mut sender| {
+        let timeouts = Timeouts { query: OFTEN, ..Timeouts::default() };
+        let drawn = Sender::open(self, timeouts, &interrupt).and_then(|mut sender| {
             let drawn = sender.stream(&job.sent, &mut Quiet).and_then(|()| sender.plot(&mut Quiet));
             sender.end();
             drawn
         });
         match drawn {
             Ok(()) => {
-                let (ink, job) = (self.take_ink()?, &job.ink);
+                let (ink, job) = (self.watched.take_ink()?, &job.ink);
                 if &ink != job {
                     let (ink, job) = (ink.len(), job.len());
                     return Err(format!("another drawing: {ink} points instead of {job}").into());
@@ -272,7 +227,7 @@ impl DamagedLine {
     /// Sends lines one by one, without numbers.
     fn order(&mut self, lines: &[String]) -> Result<(), Box<dyn Error>> {
         for text in lines {
-            self.board.emulator().send(format!("{text}\n").as_bytes())?;
+            self.watched.send(format!("{text}\n").as_bytes())?;
             loop {
                 let answer = self.hear()?;
                 if answer == "ok" {
@@ -286,18 +241,38 @@ impl DamagedLine {
         Ok(())
     }
 
+    /// Passes an error on by way of the client, and notes it.
+    fn note<T>(&mut self, outcome: Result<T, Box<dyn Error>>) -> io::Result<T> {
+        outcome.map_err(|error| {
+            self.broken.get_or_insert_with(|| error.to_string());
+            io::Error::other(error.to_string())
+        })
+    }
+
+    /// Reads what is said until nothing is, because it is none of the next sender's answers.
+    fn hear_out(&mut self) -> Result<(), Box<dyn Error>> {
+        let mut buffer = [0; 256];
+        while self.watched.receive(&mut buffer, Duration::from_millis(300))? > 0 {}
+        self.heard.clear();
+        Ok(())
+    }
+
     /// Begins a conversation, whatever the last sender has left, and clears the model.
     fn begin(&mut self) -> Result<(), Box<dyn Error>> {
-        self.board.emulator().send(&[ABORT])?;
+        self.watched.send(&[ABORT])?;
         while !self.hear()?.starts_with("Grbl") {}
-        self.order(&["$clear".to_owned()])
+        // Before the board reads the second line, it answers all questions before the first one.
+        self.order(&["$clear".to_owned(), "$clear".to_owned()])?;
+        self.watched.forget_questions();
+        Ok(())
     }
 }
 
 impl Link for DamagedLine {
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         let bytes = self.damage(bytes);
-        self.board.emulator().send(&bytes)
+        let sent = self.watched.send(&bytes);
+        self.note(sent)
     }
 
     fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
@@ -305,7 +280,12 @@ impl Link for DamagedLine {
         let most = buffer.len() / 2;
         let heard = if self.heard.is_empty() {
             let mut heard = vec![0; most];
-            let count = self.board.emulator().receive(&mut heard, timeout)?;
+            let judged = self.watched.judged;
+            let received = self.watched.receive(&mut heard, timeout);
+            let count = self.note(received)?;
+            if self.one_in.is_some() {
+                self.counts.asked_in_damage += self.watched.judged - judged;
+            }
             heard.truncate(count);
             heard
         } else {
@@ -326,14 +306,6 @@ impl Link for DamagedLine {
     }
 }
 
-/// The position in steps that a status reports for a machine of 80 steps per millimetre.
-fn reported(status: &str) -> Option<[i32; 2]> {
-    let (_, rest) = status.split_once("MPos:")?;
-    let mut numbers = rest.split([',', '|', '>']).map(str::parse::<f64>);
-    let steps = |millimetres: f64| (millimetres * 80.0).round() as i32;
-    Some([steps(numbers.next()?.ok()?), steps(numbers.next()?.ok()?)])
-}
-
 /// A job that is drawn again and again.
 pub struct Job {
     /// Its lines, the last of which is `$plot`.
@@ -342,6 +314,9 @@ pub struct Job {
     sent: Vec<JobLine>,
     /// The ink of the host.
     ink: BTreeSet<[i32; 2]>,
+    /// A drawing as strokes that are sent while they are drawn, and its ink, if the board takes
+    /// strokes.
+    streamed: Option<(StreamedDrawing, BTreeSet<[i32; 2]>)>,
 }
 
 impl Job {
@@ -351,15 +326,32 @@ impl Job {
     /// Panics if the host refuses a line.
     pub fn for_board(row: &'static BoardRow) -> Self {
         let lines = job_lines("interpen.obj", &["$page=30x30", "$margin=3"]);
-        let mut bench = bench_like(row);
-        for line in QUICK_PEN.iter().copied().chain(lines.iter().map(String::as_str)) {
-            let answer = bench.say(&format!("{line}\n"));
-            assert!(answer.ends_with("ok\n"), "{line}: {answer}");
-        }
-        bench.finish();
-        let (points, _) = inked(&bench);
+        let pen = QUICK_PEN.map(str::to_owned);
         let model = lines.iter().filter(|line| *line != "$plot").cloned();
         let sent = ["$clear".to_owned()].into_iter().chain(model).map(JobLine::command).collect();
-        Self { sent, ink: points.into_iter().collect(), lines }
+        let streamed = (row == &PICO).then(|| {
+            // It must have several lines of strokes.
+            let lines = job_lines("lattice2.obj", &["$page=25x25", "$margin=3"]);
+            let mut drawing = StreamedDrawing::of(&[&pen, &lines[..]].concat());
+            let job: Vec<String> = drawing.from(0).in_order().map(|line| line.sent).collect();
+            let ink = host_ink(row, drawing.settings.iter().chain(&job));
+            (drawing, ink)
+        });
+        Self { sent, ink: host_ink(row, pen.iter().chain(&lines)), streamed, lines }
     }
+}
+
+/// The ink that a board in memory with the memory of `row` leaves.
+fn host_ink<'l>(
+    row: &'static BoardRow,
+    lines: impl IntoIterator<Item = &'l String>,
+) -> BTreeSet<[i32; 2]> {
+    let mut bench = bench_like(row);
+    for line in lines {
+        let answer = bench.say(&format!("{line}\n"));
+        assert!(answer.ends_with("ok\n"), "{line}: {answer}");
+    }
+    bench.finish();
+    let (points, _) = inked(&bench);
+    points.into_iter().collect()
 }
