@@ -20,6 +20,7 @@ pub mod motion_optimum;
 pub mod motion_paths;
 pub mod line_soak;
 pub mod meshes;
+pub mod noise;
 pub mod noisy_line;
 pub mod panic_calls;
 pub mod pico_byte_cuts;

@@ -7,6 +7,7 @@
 //! lost over the whole soak.
 
 mod disturb;
+mod flood;
 mod leave;
 mod watched;
 
@@ -15,6 +16,7 @@ pub use disturb::Disturbance;
 use crate::damage::damaged;
 use crate::emulated_jobs::{Line, bench_like};
 use crate::ink::inked;
+use crate::noise::STOP;
 use crate::random::Random;
 use crate::streamed_drawing::StreamedDrawing;
 use crate::whole_jobs::job_lines;
@@ -38,8 +40,6 @@ pub const ANSWER_LIMIT: Duration = Duration::from_millis(20);
 pub const ERASE_LIMIT: Duration = Duration::from_millis(420);
 /// The maximum time to write a page of the Pico's flash, which happens behind each stroke.
 const SLOWEST_PAGE: Duration = Duration::from_millis(3);
-/// The emergency stop, after which nobody knows the position. The line makes none.
-const STOP: u8 = 0xFD;
 /// A pen that takes little time. Pulses for the servo come every 20 ms, so with less the pins show
 /// the pen late.
 const QUICK_PEN: [&str; 2] = ["$212=30", "$213=30"];
@@ -75,6 +75,7 @@ pub struct Counts {
 
 /// A board at the end of a line that may damage bytes.
 pub struct DamagedLine {
+    row: &'static BoardRow,
     watched: WatchedBoard,
     /// One byte in this many is damaged; `None` for none.
     one_in: Option<u64>,
@@ -103,6 +104,7 @@ impl DamagedLine {
             Board::Lm3s6965(Line::to(Box::new(started))?.emulator)
         };
         let mut line = Self {
+            row,
             watched: WatchedBoard::new(board),
             one_in: None,
             random: Random::new(seed),
@@ -165,14 +167,20 @@ impl DamagedLine {
         }
     }
 
-    /// Gives up whatever the board does, and waits until it is idle.
+    /// Gives up whatever the board does, waits until it is idle, and checks where it is.
     fn recover(&mut self) -> Result<(), Box<dyn Error>> {
+        self.come_to_rest()?;
+        self.assert_at_rest()
+    }
+
+    /// Gives up whatever the board does, and waits until it is idle.
+    fn come_to_rest(&mut self) -> Result<(), Box<dyn Error>> {
         self.watched.send(&[b'\n', ABORT])?;
         let begun = Instant::now();
         loop {
             let status = self.status()?;
             if status.starts_with("<Idle") {
-                break;
+                return Ok(());
             }
             if status.starts_with("<Alarm") {
                 self.watched.send(b"$X\n")?;
@@ -181,7 +189,6 @@ impl DamagedLine {
                 return Err(format!("the machine does not come to rest: {status}").into());
             }
         }
-        self.assert_at_rest()
     }
 
     /// Checks that the idle machine is where it says.

@@ -42,13 +42,39 @@ fn so_does_the_lm3s6965() -> TestResult {
     each(&LM3S6965)
 }
 
-/// Disturbs a board at random, and says how often.
+/// As many bytes of noise as the emulators take in some ten seconds.
+const NOISE: u64 = 100_000;
+
+/// Gives so many bytes of noise to a board, half of it made of what lines are made of.
+fn flood(line: &mut DamagedLine, row: &'static BoardRow, count: u64) -> TestResult {
+    let begun = Instant::now();
+    let flood = line.flood(count)?;
+    eprintln!("{}: {count} bytes of noise in {:?}: {flood:?}", row.name, begun.elapsed());
+    assert!(count == 0 || flood.steps + u64::from(flood.set) > 0, "the machine moves");
+    Ok(())
+}
+
+#[test]
+fn noise_leaves_a_pico_that_answers_and_knows_its_position() -> TestResult {
+    flood(&mut DamagedLine::start(&PICO, 2117)?, &PICO, wish("PENUP_NOISE", NOISE))
+}
+
+#[test]
+fn so_it_does_an_lm3s6965() -> TestResult {
+    flood(&mut DamagedLine::start(&LM3S6965, 2117)?, &LM3S6965, wish("PENUP_NOISE", NOISE))
+}
+
+/// Disturbs a board at random, and says how often. Gives it ten megabytes of noise meanwhile, or
+/// `PENUP_NOISE` bytes.
 fn soak(row: &'static BoardRow) -> TestResult {
     let (minutes, seed) = (wish("PENUP_MINUTES", 10), wish("PENUP_SEED", 1));
     let mut job = Job::for_board(row);
     let begun = Instant::now();
     let mut line = DamagedLine::start(row, seed)?;
+    let mut noise = wish("PENUP_NOISE", 10_000_000);
     while begun.elapsed() < Duration::from_secs(60 * minutes) {
+        flood(&mut line, row, noise.min(NOISE))?;
+        noise -= noise.min(NOISE);
         let done = line.disturb_at_random(&mut job);
         println!("{} s: {}: {:?}", begun.elapsed().as_secs(), row.name, line.counts);
         done.map_err(|error| format!("{}, seed {seed}: {error}", row.name))?;

@@ -5,19 +5,15 @@
 
 use penup::machine::State;
 use penup_host_tests::ink::Ink;
+use penup_host_tests::noise::{FEW, PIECE, some};
 use penup_host_tests::random::Random;
 use penup_host_tests::whole_jobs::Bench;
 use penup_host_tests::wish::wish;
 use penup_job::pins::PinChange;
 
-/// The emergency stop, after which nobody knows the position.
-const STOP: u8 = 0xFD;
-/// After so many bytes the machine is brought to rest.
-const PIECE: usize = 50_000;
-
 /// The number of bytes: `PENUP_NOISE`, or else ten megabytes.
-fn count() -> usize {
-    wish("PENUP_NOISE", 10_000_000) as usize
+fn count() -> u64 {
+    wish("PENUP_NOISE", 10_000_000)
 }
 
 #[test]
@@ -26,17 +22,8 @@ fn noise_leaves_a_plotter_that_answers_and_knows_its_position() {
     let mut moved = 0;
     for _ in 0..count() / PIECE {
         let mut bench = Bench::small();
-        for _ in 0..PIECE / 50 {
-            // Some of it is made of what lines are made of.
-            let letters = random.once_in(2);
-            let bytes: Vec<u8> = (0..50)
-                .map(|_| match random.below(256) as u8 {
-                    STOP => b'\n',
-                    byte if letters => b"G0123X.-YIJRMZFS$=?\n\n"[usize::from(byte) % 21],
-                    byte => byte,
-                })
-                .collect();
-            bench.board.receive(&bytes);
+        for _ in 0..PIECE / FEW {
+            bench.board.receive(&some(&mut random));
             bench.work(2);
         }
         bench.board.receive(b"\n\x18");

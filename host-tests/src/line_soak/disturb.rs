@@ -1,7 +1,8 @@
 //! The kinds of things that the soak does to a board.
 
 use super::leave::Middle;
-use super::{ANSWER_LIMIT, Board, DamagedLine, ERASE_LIMIT, Job, STOP};
+use super::{ANSWER_LIMIT, Board, DamagedLine, ERASE_LIMIT, Job};
+use crate::noise::STOP;
 use penup::board_table::{BoardRow, PICO};
 use std::error::Error;
 use std::time::Duration;
