@@ -11,6 +11,7 @@
 
 use crate::stderr;
 use penup_job::protocol::Reply;
+use std::cell::Cell;
 use std::collections::VecDeque;
 use std::io::{self, Read as _};
 use std::time::{Duration, Instant};
@@ -21,11 +22,19 @@ const SILENCE: Duration = Duration::from_secs(3);
 /// The time between two attempts to reach the plotter.
 const PAUSE: Duration = Duration::from_millis(250);
 
-/// How long the first report is waited for behind an opened port, and the most bytes before it.
+/// How long the first report is waited for behind the first byte of an opened port, and the most
+/// bytes before it.
 const INTRODUCTION: Duration = Duration::from_secs(2);
 const LONGEST_INTRODUCTION: usize = 1 << 12;
 
-/// If a wait takes this much longer than it should, the computer was asleep.
+/// A generous limit: sending a full receive window takes about 25 ms.
+const LONGEST_WRITE: Duration = Duration::from_secs(2);
+
+/// The longest search for the port of the plotter.
+const LONGEST_SEARCH: Duration = Duration::from_secs(30);
+
+/// If a wait takes this much longer than it should, or so much passes between two calls, the
+/// computer was asleep.
 const SLEEP: Duration = Duration::from_secs(2);
 
 /// The stream of bytes of an open port.
@@ -40,6 +49,29 @@ pub trait Wire: io::Read + io::Write {
 impl Wire for Box<dyn serialport::SerialPort> {
     fn set_io_timeout(&mut self, timeout: Duration) -> io::Result<()> {
         Ok(self.set_timeout(timeout)?)
+    }
+}
+
+/// The time outside, which goes on while the computer sleeps.
+pub trait Clock {
+    /// The time now. It may leap, because the computer slept.
+    fn now(&self) -> Instant;
+
+    /// Waits so long.
+    fn sleep(&self, time: Duration);
+}
+
+/// The clock of this computer.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct ComputerClock;
+
+impl Clock for ComputerClock {
+    fn now(&self) -> Instant {
+        Instant::now()
+    }
+
+    fn sleep(&self, time: Duration) {
+        std::thread::sleep(time);
     }
 }
 
@@ -62,7 +94,14 @@ struct LostPlotter {
 }
 
 /// A port, and what is done when the plotter at its other end is gone.
-pub struct Rejoining<W> {
+///
+/// All its times but `seen` are those of a clock that stands still while the computer sleeps.
+pub struct Rejoining<W, C = ComputerClock> {
+    clock: C,
+    /// The time outside when it was last asked for.
+    seen: Cell<Instant>,
+    /// How long the computer slept in all.
+    slept: Cell<Duration>,
     wire: Option<W>,
     open: Open<W>,
     /// The longest time for which the plotter is waited for; none if the caller has not asked for
@@ -74,11 +113,11 @@ pub struct Rejoining<W> {
     lost: Duration,
     /// When the last byte came; `None` before the first.
     heard: Option<Instant>,
-    /// Whether the plotter was asked for something since then.
-    is_asked: bool,
-    /// What came since the port was opened again, and when that was; `None` once the first report
+    /// When the plotter was first asked for something since then.
+    asked: Option<Instant>,
+    /// What came since the port was opened again, and when that began; `None` once the first report
     /// has come.
-    introduction: Option<(Vec<u8>, Instant)>,
+    introduction: Option<(Vec<u8>, Option<Instant>)>,
     /// What was received and is still to be passed on.
     received: VecDeque<u8>,
 }
@@ -87,7 +126,18 @@ impl<W: Wire> Rejoining<W> {
     /// Takes an open port. It does not wait for a plotter that is gone until [`Rejoining::wait`]
     /// says so.
     pub fn new(wire: W, open: Open<W>) -> Self {
+        Self::with_clock(wire, open, ComputerClock)
+    }
+}
+
+impl<W: Wire, C: Clock> Rejoining<W, C> {
+    /// As [`Rejoining::new`], with another clock.
+    pub fn with_clock(wire: W, open: Open<W>, clock: C) -> Self {
+        let seen = Cell::new(clock.now());
         Self {
+            clock,
+            seen,
+            slept: Cell::new(Duration::ZERO),
             wire: Some(wire),
             open,
             limit: None,
@@ -95,7 +145,7 @@ impl<W: Wire> Rejoining<W> {
             gone: None,
             lost: Duration::ZERO,
             heard: None,
-            is_asked: false,
+            asked: None,
             introduction: None,
             received: VecDeque::new(),
         }
@@ -124,8 +174,26 @@ impl<W: Wire> Rejoining<W> {
 
     /// The time as a conversation counts it: it stands still while the plotter is gone.
     pub fn now(&self) -> Instant {
-        let now = self.gone.map_or_else(Instant::now, |gone| gone.since);
+        let awake = self.awake(Duration::ZERO);
+        let now = self.gone.map_or(awake, |gone| gone.since);
         now.checked_sub(self.lost).unwrap_or(now)
+    }
+
+    /// The time without that for which the computer slept. Since the time was last asked for, no
+    /// more may have passed than `expected` and a little.
+    fn awake(&self, expected: Duration) -> Instant {
+        let now = self.clock.now();
+        let passed = now.saturating_duration_since(self.seen.replace(now));
+        let slept = passed.saturating_sub(expected);
+        if slept > SLEEP {
+            self.slept.set(self.slept.get() + slept);
+        }
+        now.checked_sub(self.slept.get()).unwrap_or(now)
+    }
+
+    /// How long the computer was awake since then.
+    fn since(&self, time: Instant) -> Duration {
+        self.awake(Duration::ZERO).saturating_duration_since(time)
     }
 
     /// Sends all of `bytes`. While the plotter is gone they are lost, unless `must_arrive`: then a
@@ -139,7 +207,8 @@ impl<W: Wire> Rejoining<W> {
             return Ok(());
         }
         self.stop_waiting();
-        self.is_asked = true;
+        let now = self.awake(Duration::ZERO);
+        self.asked.get_or_insert(now);
         match self.write(bytes) {
             Err(_) if self.may_wait() && !must_arrive => {
                 self.leave(Why::Port);
@@ -152,16 +221,17 @@ impl<W: Wire> Rejoining<W> {
     /// No longer waits for a plotter that is gone.
     fn stop_waiting(&mut self) {
         if let Some(gone) = self.gone.take() {
-            self.lost += gone.since.elapsed();
+            self.lost += self.since(gone.since);
             self.limit = None;
         }
     }
 
     fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
         let Some(wire) = &mut self.wire else { return Err(gone_for_good()) };
-        // This is a generous limit: sending a full receive window takes about 25 ms.
-        wire.set_io_timeout(Duration::from_secs(2))?;
-        wire.write_all(bytes)
+        wire.set_io_timeout(LONGEST_WRITE)?;
+        let written = wire.write_all(bytes);
+        self.awake(LONGEST_WRITE);
+        written
     }
 
     /// Waits up to `timeout` for bytes, and for a plotter that is gone. Returns 0 if none came.
@@ -172,7 +242,8 @@ impl<W: Wire> Rejoining<W> {
         if !self.received.is_empty() {
             return self.received.read(buffer);
         }
-        let begin = Instant::now();
+        // What passed outside before is no part of the waiting.
+        self.awake(Duration::ZERO);
         if self.gone.is_some() {
             self.look_for(timeout)?;
             if self.wire.is_none() {
@@ -181,12 +252,12 @@ impl<W: Wire> Rejoining<W> {
         }
         match self.read(buffer, timeout) {
             Ok(0) => {
-                self.note_silence(begin, timeout);
+                self.note_silence();
                 self.introduce(buffer, 0)
             }
             Ok(count) => {
                 self.join();
-                (self.heard, self.is_asked) = (Some(Instant::now()), false);
+                (self.heard, self.asked) = (Some(self.awake(Duration::ZERO)), None);
                 self.introduce(buffer, count)
             }
             Err(_) if self.may_wait() => {
@@ -200,9 +271,14 @@ impl<W: Wire> Rejoining<W> {
     /// Passes `count` bytes of the buffer on. Behind an opened port they are kept back until the
     /// first report has come, or too long for it to come.
     fn introduce(&mut self, buffer: &mut [u8], count: usize) -> io::Result<usize> {
-        let Some((kept, since)) = &mut self.introduction else { return Ok(count) };
+        let now = self.awake(Duration::ZERO);
+        let Some((kept, begun)) = &mut self.introduction else { return Ok(count) };
         kept.extend_from_slice(buffer.get(..count).unwrap_or_default());
-        let is_over = since.elapsed() > INTRODUCTION || kept.len() > LONGEST_INTRODUCTION;
+        if kept.is_empty() {
+            return Ok(0);
+        }
+        let passed = now.saturating_duration_since(*begun.get_or_insert(now));
+        let is_over = passed > INTRODUCTION || kept.len() > LONGEST_INTRODUCTION;
         if !is_over && first_report(kept).is_none() {
             return Ok(0);
         }
@@ -214,7 +290,9 @@ impl<W: Wire> Rejoining<W> {
     fn read(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
         let Some(wire) = &mut self.wire else { return Err(gone_for_good()) };
         wire.set_io_timeout(timeout)?;
-        match wire.read(buffer) {
+        let read = wire.read(buffer);
+        self.awake(timeout);
+        match read {
             Err(error) if error.kind() == io::ErrorKind::TimedOut => Ok(0),
             Err(error) if error.kind() == io::ErrorKind::Interrupted => Ok(0),
             // A port that is ready to be read but has no data is disconnected.
@@ -228,22 +306,17 @@ impl<W: Wire> Rejoining<W> {
         self.limit.is_some() && self.heard.is_some()
     }
 
-    /// Notices that the plotter has fallen silent, or that the computer slept.
-    fn note_silence(&mut self, begin: Instant, timeout: Duration) {
-        let slept = begin.elapsed().saturating_sub(timeout);
-        if slept > SLEEP {
-            self.lost += slept;
-            self.heard = self.heard.map(|heard| heard + slept);
-        }
-        let is_silent = self.heard.is_some_and(|heard| heard.elapsed() > SILENCE);
-        if self.gone.is_none() && self.is_asked && is_silent && self.may_wait() {
+    /// Notices that the plotter has fallen silent.
+    fn note_silence(&mut self) {
+        let is_silent = self.asked.is_some_and(|asked| self.since(asked) > SILENCE);
+        if self.gone.is_none() && is_silent && self.may_wait() {
             self.leave(Why::Silence);
         }
     }
 
     /// The plotter is gone from now on.
     fn leave(&mut self, why: Why) {
-        let now = Instant::now();
+        let now = self.awake(Duration::ZERO);
         let since = self.gone.map_or(now, |gone| gone.since);
         let is_new = self.gone.is_none();
         self.gone = Some(LostPlotter { since, why, last_attempt: now });
@@ -264,7 +337,7 @@ impl<W: Wire> Rejoining<W> {
     /// The plotter is back.
     fn join(&mut self) {
         if let Some(gone) = self.gone.take() {
-            self.lost += gone.since.elapsed();
+            self.lost += self.since(gone.since);
             self.say("the plotter is back");
         }
     }
@@ -272,7 +345,7 @@ impl<W: Wire> Rejoining<W> {
     /// Tries to reach the plotter again, after a pause since the last time.
     fn look_for(&mut self, timeout: Duration) -> io::Result<()> {
         let Some(mut gone) = self.gone else { return Ok(()) };
-        if self.limit.is_some_and(|limit| gone.since.elapsed() > limit) {
+        if self.limit.is_some_and(|limit| self.since(gone.since) > limit) {
             return Err(match gone.why {
                 Why::Port => gone_for_good(),
                 Why::Silence => {
@@ -280,19 +353,21 @@ impl<W: Wire> Rejoining<W> {
                 }
             });
         }
-        if gone.last_attempt.elapsed() < PAUSE {
+        if self.since(gone.last_attempt) < PAUSE {
             if self.wire.is_none() {
-                std::thread::sleep(timeout);
+                self.clock.sleep(timeout);
+                self.awake(timeout);
             }
             return Ok(());
         }
-        gone.last_attempt = Instant::now();
+        gone.last_attempt = self.awake(Duration::ZERO);
         self.gone = Some(gone);
         // The line end terminates what is left of a line that was cut.
         let question: &[u8] = if self.wire.is_none() { b"\n?" } else { b"?" };
         if self.wire.is_none() {
             self.wire = (self.open)();
-            self.introduction = self.wire.is_some().then(|| (Vec::new(), Instant::now()));
+            self.awake(LONGEST_SEARCH);
+            self.introduction = self.wire.is_some().then(|| (Vec::new(), None));
         }
         if self.wire.is_some() && self.write(question).is_err() {
             self.leave(Why::Port);
@@ -337,154 +412,6 @@ fn gone_for_good() -> io::Error {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{Rejoining, Why, Wire, without_greeting};
-    use crate::error::Error;
-    use crate::link::{Answer, Link};
-    use crate::sender::{Sender, Timeouts};
-    use penup_job::protocol::ABORT;
-    use std::collections::VecDeque;
-    use std::io;
-    use std::sync::atomic::{AtomicBool, Ordering};
-    use std::sync::{Arc, Mutex, PoisonError};
-    use std::time::{Duration, Instant};
-
-    /// A plotter that draws, and answers each question for its status until it falls silent.
-    #[derive(Clone, Default)]
-    struct Drawing {
-        heard: Arc<Mutex<Vec<u8>>>,
-        said: VecDeque<u8>,
-        is_silent: Arc<AtomicBool>,
-    }
-
-    impl io::Write for Drawing {
-        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-            self.heard.lock().unwrap_or_else(PoisonError::into_inner).extend(bytes);
-            if bytes.contains(&b'?') && !self.is_silent.load(Ordering::Relaxed) {
-                self.said.extend(b"<Run|MPos:1.000,2.000,0.000>\r\n");
-            }
-            Ok(bytes.len())
-        }
-
-        fn flush(&mut self) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    impl io::Read for Drawing {
-        fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
-            if self.said.is_empty() {
-                std::thread::sleep(Duration::from_millis(1));
-                return Err(io::ErrorKind::TimedOut.into());
-            }
-            self.said.read(buffer)
-        }
-    }
-
-    impl Wire for Drawing {
-        fn set_io_timeout(&mut self, _: Duration) -> io::Result<()> {
-            Ok(())
-        }
-    }
-
-    /// A port whose plotter is lost for this reason at the next moment.
-    struct Port {
-        port: Rejoining<Drawing>,
-        lost: Arc<Mutex<Option<Why>>>,
-    }
-
-    impl Link for Port {
-        fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
-            self.port.send(bytes, bytes.contains(&ABORT))
-        }
-
-        fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
-            if let Some(why) = self.lost.lock().unwrap_or_else(PoisonError::into_inner).take() {
-                self.port.leave(why);
-            }
-            self.port.receive(buffer, timeout)
-        }
-
-        fn now(&self) -> Instant {
-            self.port.now()
-        }
-
-        fn change_pen(&mut self, _: u8) -> io::Result<Answer> {
-            Ok(Answer::Yes)
-        }
-    }
-
-    /// Begins to follow a plotter that is lost then, and does something. Returns the outcome, what
-    /// the plotter has heard, and how long it took.
-    fn while_lost<T>(
-        why: Why,
-        interrupt: &AtomicBool,
-        act: impl FnOnce(Sender<'_>) -> T,
-    ) -> (T, Vec<u8>, Duration) {
-        let plotter = Drawing::default();
-        let (heard, is_silent) = (plotter.heard.clone(), plotter.is_silent.clone());
-        let mut port = Rejoining::new(plotter, Box::new(|| None));
-        port.wait(Duration::from_secs(300), true);
-        let lost = Arc::new(Mutex::new(None));
-        let mut port = Port { port, lost: lost.clone() };
-        let begin = Instant::now();
-        let (sender, _) =
-            Sender::join(&mut port, Timeouts::default(), interrupt).expect("a plotter");
-        is_silent.store(true, Ordering::Relaxed);
-        *lost.lock().unwrap_or_else(PoisonError::into_inner) = Some(why);
-        let outcome = act(sender);
-        let heard = heard.lock().unwrap_or_else(PoisonError::into_inner).clone();
-        (outcome, heard, begin.elapsed())
-    }
-
-    /// The limit of the waiting is 300 s, in which the clock of the conversation stands still.
-    const SOON: Duration = Duration::from_secs(20);
-
-    #[test]
-    fn a_plotter_that_is_silent_is_told_to_stop_all_the_same() {
-        let interrupt = AtomicBool::new(false);
-        let (error, heard, time) = while_lost(Why::Silence, &interrupt, |mut sender| {
-            std::thread::scope(|scope| {
-                scope.spawn(|| {
-                    std::thread::sleep(Duration::from_millis(200));
-                    interrupt.store(true, Ordering::Relaxed);
-                });
-                sender.status().expect_err("it is silent")
-            })
-        });
-        assert!(matches!(error, Error::InterruptedUnconfirmed), "{error}");
-        assert!(heard.contains(&ABORT));
-        assert!(time < SOON, "{time:?}");
-    }
-
-    #[test]
-    fn a_conversation_ends_soon_although_the_plotter_is_gone() {
-        for why in [Why::Port, Why::Silence] {
-            let (_, _, time) = while_lost(why, &AtomicBool::new(false), |sender| sender.end());
-            assert!(time < SOON, "{why:?}: {time:?}");
-        }
-    }
-
-    #[test]
-    fn a_greeting_is_left_out_where_a_job_goes_on() {
-        let greeting = "\r\nGrbl 1.1h [penup 0.1.0 '$' for help]\r\n";
-        let passed = |bytes: &str| {
-            String::from_utf8(without_greeting(bytes.as_bytes()).collect()).expect("text")
-        };
-        for (report, goes_on) in [
-            ("<Run|MPos:1,2,3>\r\n", true),
-            ("ok\r\n<Hold:0|MPos:1,2,3>\r\n", true),
-            ("<Idle|MPos:1,2,3>\r\n<Run|MPos:1,2,3>\r\n", false),
-            ("<Run|MPos", false),
-            // The job has ended while the port was away, or was given up.
-            ("<Idle|MPos:1,2,3|Drawn:120/120|Ink:0/0|Left:0>\r\n", true),
-            ("ALARM:10\r\n<Alarm|MPos:1,2,3|Alarm:10|Drawn:0/0>\r\n", true),
-            // It has started again, and its flash knows of a job.
-            ("<Idle|MPos:1,2,3|Stopped:3/9|Drawn:0/0>\r\n", false),
-            ("", false),
-        ] {
-            let expected = format!("{}{report}", if goes_on { "\r\n" } else { greeting });
-            assert_eq!(passed(&format!("{greeting}{report}")), expected, "{report}");
-        }
-    }
-}
+mod job_tests;
+#[cfg(test)]
+mod tests;

@@ -233,8 +233,7 @@ impl<'a> Sender<'a> {
     /// it fails with [`Error::Restarted`].
     fn begin_again(&mut self, lines: &dyn Lines) -> Result<(), Error> {
         let taken = usize::try_from(self.done).unwrap_or(0);
-        self.begin_numbers(None)?;
-        let status = self.find_state()?;
+        let (status, contents) = self.look_again()?;
         if !status.is_idle() || status.position != self.position {
             return Err(Error::Restarted);
         }
@@ -244,10 +243,25 @@ impl<'a> Sender<'a> {
         let is_empty = |contents: Option<[u32; 2]>| {
             contents.zip(empty).is_some_and(|(contents, empty)| contents[0] == empty[0])
         };
-        if !is_empty(was_there) && is_empty(Some(self.contents()?)) {
+        if !is_empty(was_there) && is_empty(Some(contents)) {
             return Err(Error::Restarted);
         }
         Ok(())
+    }
+
+    /// Begins the numbers of lines anew behind a greeting. Returns the status, and the checksums of
+    /// the model and of the options. Further greetings may come meanwhile: each opening of a port
+    /// makes one.
+    fn look_again(&mut self) -> Result<(Status, [u32; 2]), Error> {
+        let mut restarts = 0;
+        loop {
+            self.begin_numbers(None)?;
+            let status = self.find_state()?;
+            match self.contents() {
+                Err(Error::Restarted) if restarts < MOST_RESTARTS => restarts += 1,
+                contents => return Ok((status, contents?)),
+            }
+        }
     }
 
     /// Checks that the plotter's checksums are `expected`.

@@ -391,10 +391,9 @@ impl Sender<'_> {
             match begun {
                 Err(Error::Restarted) if restarts < MOST_RESTARTS => {
                     restarts += 1;
-                    self.begin_numbers(None)?;
-                    let status = self.find_state()?;
+                    let (status, contents) = self.look_again()?;
                     let has_moved = !status.is_idle() || status.position != self.position;
-                    if has_moved || Some(self.contents()?) != self.contents {
+                    if has_moved || Some(contents) != self.contents {
                         return Err(Error::Restarted);
                     }
                 }
