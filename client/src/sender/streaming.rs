@@ -240,13 +240,19 @@ impl<'a> Sender<'a> {
     ) -> Result<(), Error> {
         self.strokes = job.size().strokes.into();
         let mut streaming = Streaming::of(job);
+        let base = self.done;
         let delivered = self.deliver_as(job, Some(&mut streaming), progress, &mut |_| {});
         self.arrival = streaming.arrival;
         delivered?;
         match job.form() {
             Form::Strokes => self.watch_strokes(progress)?,
             // The plotter knows only of what it has not drawn yet, and not of the pens.
-            Form::GCode => self.watch_gcode(&mut streaming, &mut Quiet)?,
+            Form::GCode => {
+                self.watch_gcode(&mut streaming, &mut Quiet)?;
+                // A plotter that has started again unheard is idle, too, and has not drawn the last
+                // moves.
+                return self.confirm(job, base);
+            }
         };
         Ok(())
     }

@@ -391,3 +391,51 @@ fn a_drawing_that_a_plotter_has_forgotten_is_not_taken_for_drawn() {
         assert_eq!((drawn.is_ok(), is_noticed), (is_drawn, !is_drawn), "{reports}: {drawn:?}");
     }
 }
+
+/// A plotter whose power fails, unheard, once it has confirmed the last line.
+struct FailsAtEnd {
+    plotter: InMemory<u32>,
+    /// How it confirms that line.
+    confirms: String,
+    heard: String,
+    has_failed: bool,
+}
+
+impl Link for FailsAtEnd {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.plotter.send(bytes)
+    }
+
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize> {
+        if self.heard.contains(&self.confirms) && !self.has_failed {
+            self.has_failed = true;
+            self.plotter = InMemory::new(Room::usual(), Settings::default());
+            // The greeting is lost.
+            self.plotter.receive(&mut [0; 256], timeout)?;
+        }
+        let count = self.plotter.receive(buffer, timeout)?;
+        self.heard += &String::from_utf8_lossy(&buffer[..count]);
+        Ok(count)
+    }
+
+    fn change_pen(&mut self, pen: u8) -> io::Result<Answer> {
+        self.plotter.change_pen(pen)
+    }
+
+    fn now(&self) -> Instant {
+        self.plotter.now()
+    }
+}
+
+#[test]
+fn gcode_is_not_taken_for_drawn_by_a_plotter_that_has_started_again() {
+    let job = gcode(&["v 10 10 0", "v 14 10 0", "v 14 13 0", "f 1 2 3"]);
+    let plotter = InMemory::new(Room::usual(), Settings::default());
+    let confirms = format!("Line: {}*", job.count());
+    let mut link = FailsAtEnd { plotter, confirms, heard: String::new(), has_failed: false };
+    let interrupt = AtomicBool::new(false);
+    let mut sender = Sender::open(&mut link, Timeouts::simulated(), &interrupt).expect("a plotter");
+    let drawn = sender.draw_streamed(&job, &mut Quiet);
+    assert!(matches!(drawn, Err(Error::Restarted)), "{drawn:?}");
+    assert!(link.has_failed);
+}
