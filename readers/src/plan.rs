@@ -11,6 +11,7 @@ use crate::region::Regions;
 use penup::model::PenBook;
 use penup::protocol::Command;
 use plan_lines::{Elements, PlanLines};
+use std::collections::HashMap;
 
 /// A point of a plan in mm: x to the right, y upward.
 pub(crate) type Point = [f64; 2];
@@ -23,6 +24,10 @@ const PER_MM: f64 = 1000.0;
 /// motor steps apart for one, and leaves out a line of one point. This is three steps where a
 /// millimetre has 40, which are few.
 pub(crate) const DOT: f64 = 0.08;
+
+/// The size in mm along both axes below which a plotter leaves a line out: two steps where a
+/// millimetre has 40.
+const SHORTEST: f64 = 0.05;
 
 /// The coordinate in mm from which on a plan is moved: less than the largest that plotters take.
 const FARTHEST: f64 = 1e9;
@@ -161,6 +166,45 @@ impl Plan {
         if let Some(dot) = self.strokes.get_mut(next) {
             dot.is_dot = true;
         }
+    }
+
+    /// Makes dots of the strokes that a plotter would leave out, because they are too short when the
+    /// plan is scaled by `factor`. A stroke at whose ends others go on is a part of a longer line
+    /// and stays. Up to `right` a dot goes to the right. Returns what the user should know.
+    pub(crate) fn keep_short(&mut self, factor: f64, right: f64) -> Option<String> {
+        let is_short = |stroke: &Stroke| {
+            let size = |axis: usize| {
+                let along = || stroke.points.iter().map(move |point| point[axis]);
+                along().fold(f64::MIN, f64::max) - along().fold(f64::MAX, f64::min)
+            };
+            !stroke.is_dot && size(0).max(size(1)) * factor < SHORTEST
+        };
+        let cell = |point: &Point| point.map(|value| (value * PER_MM).round() as i64);
+        let ends = |stroke: &Stroke| {
+            let first = stroke.points.first().map(cell);
+            let last = stroke.points.last().map(cell).filter(|last| Some(*last) != first);
+            first.into_iter().chain(last)
+        };
+        if !self.strokes.iter().any(is_short) {
+            return None;
+        }
+        let mut met: HashMap<[i64; 2], u32> = HashMap::new();
+        self.strokes.iter().flat_map(ends).for_each(|end| *met.entry(end).or_default() += 1);
+        let mut count = 0;
+        for stroke in &mut self.strokes {
+            if is_short(stroke) && ends(stroke).all(|end| met.get(&end) == Some(&1)) {
+                let length = (DOT / factor).max(0.002);
+                let Some(&[x, y]) = stroke.points.first() else { continue };
+                let beside = if x + length > right { x - length } else { x + length };
+                (stroke.points, stroke.is_dot) = (vec![[x, y], [beside, y]], true);
+                count += 1;
+            }
+        }
+        let counted = super::counted(
+            count,
+            ["line is drawn as a dot: it is", "lines are drawn as dots: they are"],
+        );
+        (count > 0).then(|| format!("{counted} shorter than {SHORTEST} mm"))
     }
 
     /// The name of a layer.

@@ -197,6 +197,10 @@ impl Arrangement {
                 rectangle = rectangle.map(|corners| corners.map(&map));
             }
         }
+        // A line that is cut off later may leave less, which is no dot.
+        if self.fit.is_none() || self.scales_to_page() {
+            notes.extend(plan.keep_short(1.0, sheet.width));
+        }
         if let Some(hatch) = self.hatch {
             notes.extend(hatch::hatch(plan, hatch)?);
         }
@@ -224,6 +228,7 @@ impl Arrangement {
         {
             // The plotter scales the plan, but not its dots. Coordinates are whole thousandths.
             let factor = map([1.0, 0.0])[0] - map([0.0; 2])[0];
+            notes.extend(plan.keep_short(factor, f64::INFINITY));
             let length = (DOT / factor).max(0.002);
             plan.strokes.iter_mut().for_each(|stroke| stroke.keep_dot(length));
         }

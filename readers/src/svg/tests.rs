@@ -514,16 +514,29 @@ fn arranged(svg: &str, options: &[(&str, &str)]) -> Result<SourceFile, String> {
     file.map_err(|error| error.to_string())
 }
 
+/// The dots of icons are such lines: a plotter leaves out what is shorter than two of its steps.
 #[test]
-fn what_becomes_too_short_is_counted() {
-    let svg = in_mm("<path d='M10 10h.01M10 20h.02M10 30h50' stroke='black'/>");
+fn what_is_too_short_for_a_plotter_becomes_a_dot() {
+    let svg = in_mm(
+        "<g stroke='black' fill='none'><path d='M10 10h.01M10 20v.02M10 30h50M99.99 40v.01'/>\
+         <circle cx='50' cy='50' r='.01'/><path d='M70 70h.04'/><path d='M70.04 70h.04'/></g>",
+    );
+    let lengths = |options: &[(&str, &str)]| -> Vec<f64> {
+        let lines = polylines(&arranged(&svg, options).expect("a plan"));
+        let ends = lines.iter().map(|(_, points)| points[points.len() - 1][0] - points[0][0]);
+        ends.map(|length| (length * 1e3).round() / 1e3).collect()
+    };
     let notes =
         |options: &[(&str, &str)]| arranged(&svg, options).expect("a plan").notes().join("; ");
-    assert_eq!(notes(&[]), "");
-    let told = notes(&[("scale", "0.03")]);
-    assert!(told.contains("1 line is not drawn: too short at this scale"), "{told}");
-    let told = notes(&[("scale", "0.02")]);
-    assert!(told.contains("2 lines are not drawn: too short at this scale"), "{told}");
+    // What goes on as another line is a part of a longer one.
+    assert_eq!(lengths(&[]), [0.08, 0.08, 50.0, -0.08, 0.08, 0.04, 0.04]);
+    assert_eq!(notes(&[]), "4 lines are drawn as dots: they are shorter than 0.05 mm");
+    assert_eq!(lengths(&[("scale", "0.02")])[..3], [0.08, 0.08, 1.0]);
+    assert_eq!(lengths(&[("scale", "10")])[..3], [0.1, 0.0, 500.0]);
+    let page = Some(Page { width: 1000.0, height: 1000.0 });
+    let fitted = Arrangement::on(page, Default::default(), None).fitted(" ", 5.0);
+    let file = SourceFile::arranged("a.svg".to_owned(), svg.clone().into(), &fitted);
+    assert_eq!(polylines(&file.expect("a plan"))[0].1[1][0], 10.01, "the plotter scales it up");
 }
 
 #[test]
