@@ -92,6 +92,7 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         document.descendants().filter_map(|node| node.attribute("id")).collect();
     let names_root = css::names_root(document);
     let symbols = Symbols::of(document);
+    let styles = Styles::of(document);
     let mut copy = String::with_capacity(text.len() + text.len() / 4);
     let (mut copied, mut number) = (0, 0_u32);
     for node in document.descendants() {
@@ -102,6 +103,7 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         let is_named = is_root && names_root && node.attribute(css::ROOT).is_none();
         let mut edits = edits_of(node, text);
         edits.extend(symbols.edits_of(node));
+        edits.extend(styles.without_hidden_letters(node, text));
         let sizes = symbols.sizes_for(node);
         let is_foreign = is_one_of(node, &["foreignObject"]);
         let is_left_out = is_foreign && node.attribute("requiredExtensions").is_none();

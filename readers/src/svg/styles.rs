@@ -1,12 +1,14 @@
 //! The properties of elements as `usvg` finds them: in an attribute, in the style sheets of the
 //! file, and in `style`. Of two of the same name the later counts, unless the other is important.
 
+use super::css::Edit;
+use super::markup::is_one_of;
 use simplecss::{AttributeOperator, DeclarationTokenizer, Element, PseudoClass, StyleSheet};
 use usvg::roxmltree::{Document, Node};
 
 /// The properties that are asked for.
-const PROPERTIES: [&str; 5] =
-    ["stroke", "vector-effect", "color-interpolation", "display", "visibility"];
+const PROPERTIES: [&str; 6] =
+    ["stroke", "vector-effect", "color-interpolation", "display", "visibility", "font-size"];
 
 /// The rules of the style sheets of a file that may set one of the [`PROPERTIES`].
 #[derive(Debug)]
@@ -43,6 +45,31 @@ impl<'a> Styles<'a> {
             }
         }
         value.map(str::trim)
+    }
+
+    /// The correction that takes the letters out of a part of a text which is not shown. `usvg`
+    /// gives them the places in `x` and `y`, which are for the letters that are shown.
+    pub(super) fn without_hidden_letters(&self, node: Node<'a, '_>, text: &str) -> Option<Edit> {
+        if !is_one_of(node, &["tspan"]) {
+            return None;
+        }
+        let is_empty = |size: &str| {
+            let number = size.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
+            number.parse() == Ok(0.0) && !node.children().any(|child| child.is_element())
+        };
+        let is_english = |language: &str| language == "en" || language.starts_with("en-");
+        let languages = node.attribute("systemLanguage");
+        let is_hidden = self.property(node, "display") == Some("none")
+            || self.property(node, "font-size").is_some_and(is_empty)
+            || languages.is_some_and(|all| !all.split(',').any(|it| is_english(it.trim())));
+        let own = node.range();
+        let start = node.first_child().filter(|_| is_hidden)?.range().start.checked_sub(1)?;
+        let letters =
+            text.get(start..own.end).filter(|it| it.starts_with('>') && start > own.start)?;
+        let end = start + letters.rfind("</")?;
+        // The lines of the text keep their numbers.
+        let lines = "\n".repeat(text.get(start..end)?.matches('\n').count());
+        Some((start..end, lines + ">"))
     }
 }
 

@@ -202,3 +202,33 @@ fn the_size_of_letters_is_read_beside_the_height_of_lines() {
     let notes = read_in(squares, &svg).expect("an SVG").notes().join("; ");
     assert!(notes.contains("the property font of CSS, which is not obeyed"), "{notes}");
 }
+
+/// Browsers give the places in `x` to the letters that are shown, and so does this reader.
+#[test]
+fn letters_that_are_not_shown_take_no_place() {
+    let first = |x: &str, hidden: &str| {
+        let svg = in_mm(&format!(
+            "<style>.h{{display:none}}</style><g transform='translate(30 30)'><text x='{x}' y='40' \
+             font-family='Squares' font-size='5'>{hidden}<tspan>a</tspan></text></g>"
+        ));
+        let read = read_in(squares, &svg).expect("an SVG");
+        let lines = polylines(&read);
+        (lines.len(), lines[0].1[0], read.notes().to_vec())
+    };
+    let shown = (1, [70.0, 30.0], Vec::new());
+    for hidden in [
+        "",
+        "<tspan display='none'>a</tspan>",
+        "<tspan style='display: none'>a\n<tspan fill='red'>a</tspan></tspan>",
+        "<tspan class='h'>a</tspan>",
+        "<tspan systemLanguage='de, fr-CH'>a</tspan>",
+        "<tspan font-size='0'>a</tspan>",
+    ] {
+        assert_eq!(first("40", hidden), shown, "{hidden}");
+        assert_eq!(first("40 45", hidden), shown, "{hidden}");
+    }
+    for seen in ["<tspan systemLanguage='de, en-GB'>a</tspan>", "<tspan display='inline'>a</tspan>"]
+    {
+        assert_eq!(first("40", seen).0, 2, "{seen}");
+    }
+}
