@@ -9,7 +9,7 @@ use super::flatten::Arcs;
 use super::pens::Layer;
 use super::styles::Styles;
 use super::uses::Symbols;
-use super::{css, lengths, runs, unread};
+use super::{css, lengths, pens, runs, unread};
 use crate::page::Page;
 use std::borrow::Cow;
 use std::collections::{HashMap, HashSet};
@@ -45,7 +45,7 @@ const FEATURE: &str = "http://www.w3.org/TR/SVG11/feature#Shape";
 /// The most prefixes that are declared for a file.
 const MOST_PREFIXES: usize = 20;
 
-const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
+pub(super) const INKSCAPE: &str = "http://www.inkscape.org/namespaces/inkscape";
 
 /// Parses the text of an SVG.
 ///
@@ -232,8 +232,8 @@ impl<'a, 'input> Markup<'a, 'input> {
     pub(super) fn layer(&self, element: NodeId) -> Option<Layer> {
         let groups = self.node(element)?.ancestors().filter(|node| is_one_of(*node, &["g"]));
         let layer = groups.filter(|node| is_layer(*node)).last()?;
-        let name = layer.attribute((INKSCAPE, "label")).or(layer.attribute("id"));
-        Some(Layer { element: layer.id(), name: name.unwrap_or_default().to_owned() })
+        let name = pens::name(layer);
+        Some(Layer { element: layer.id(), number: pens::pen_of(layer), name })
     }
 
     /// Whether a layer that contains this element is not plotted, because its name begins with `%`.
@@ -445,10 +445,7 @@ fn is_within(node: Node<'_, '_>, names: &[&str]) -> bool {
 /// Whether a layer that contains `node` is not plotted, because its name begins with `%`.
 fn is_in_documentation(node: Node<'_, '_>) -> bool {
     let mut groups = node.ancestors().filter(|node| is_one_of(*node, &["g"]));
-    groups.any(|group| {
-        let name = group.attribute((INKSCAPE, "label")).or(group.attribute("id"));
-        is_layer(group) && name.is_some_and(|name| Control::of(name).is_documentation)
-    })
+    groups.any(|group| is_layer(group) && Control::of(&pens::name(group)).is_documentation)
 }
 
 /// Whether the data of a path, or the points of a polyline or polygon, have an error, at which what
@@ -479,7 +476,6 @@ fn is_hidden(node: Node<'_, '_>) -> bool {
 fn is_layer(group: Node<'_, '_>) -> bool {
     let is_on_top = group.parent_element().is_some_and(|parent| parent.parent_element().is_none());
     let has_label = group.attribute((INKSCAPE, "label")).is_some();
-    let numbered = |id: &str| crate::plan::number_in(id).is_some() && !id.starts_with("penup-");
     group.attribute((INKSCAPE, "groupmode")) == Some("layer")
-        || is_on_top && (has_label || group.attribute("id").is_some_and(numbered))
+        || is_on_top && (has_label || pens::pen_of(group).is_some())
 }

@@ -1,10 +1,11 @@
 //! Chooses the pen of each stroke: by layers, or else by colours.
 
 use super::axidraw::Control;
+use super::markup::{INKSCAPE, SHAPES};
 use crate::plan::number_in;
 use std::collections::{HashMap, HashSet};
 use std::hash::Hash;
-use usvg::roxmltree::NodeId;
+use usvg::roxmltree::{Node, NodeId};
 
 /// A layer of the drawing.
 #[derive(Debug, Clone, PartialEq, Eq, Hash)]
@@ -13,6 +14,8 @@ pub(super) struct Layer {
     pub(super) element: NodeId,
     /// The label of the layer, or else its `id`.
     pub(super) name: String,
+    /// The pen in that name, unless a program has made the name up.
+    pub(super) number: Option<u32>,
 }
 
 /// The properties of a path that may choose its pen.
@@ -22,6 +25,39 @@ pub(super) struct Marks {
     pub(super) layer: Option<Layer>,
     /// The colour of the path: red, green and blue; `None` if it has several, as a gradient has.
     pub(super) colour: Option<[u8; 3]>,
+}
+
+/// The label of a layer, or else its `id`, in which Illustrator writes a letter as `_x31_` where an
+/// `id` may not have it.
+pub(super) fn name(layer: Node<'_, '_>) -> String {
+    if let Some(label) = layer.attribute((INKSCAPE, "label")) {
+        return label.to_owned();
+    }
+    let mut parts = layer.attribute("id").unwrap_or_default().split("_x");
+    let mut name = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        let coded = part.split_once('_').and_then(|(code, rest)| {
+            Some((char::from_u32(u32::from_str_radix(code, 16).ok()?)?, rest))
+        });
+        match coded {
+            Some((letter, rest)) => name.extend([&*letter.to_string(), rest]),
+            None => name.extend(["_x", part]),
+        }
+    }
+    name
+}
+
+/// The number in the name of a layer; `None` in a name that a program makes up of that of an
+/// element and a number.
+pub(super) fn pen_of(layer: Node<'_, '_>) -> Option<u32> {
+    let name = name(layer);
+    let digits = name.find(|letter: char| letter.is_ascii_digit()).unwrap_or(name.len());
+    let (element, rest) = name.split_at(digits);
+    let is_made_up = !layer.has_attribute((INKSCAPE, "label"))
+        && rest.chars().all(|letter| letter.is_ascii_digit() || letter == '-')
+        && (SHAPES.contains(&element)
+            || ["g", "text", "tspan", "use", "svg", "penup-"].contains(&element));
+    if is_made_up { None } else { number_in(&name) }
 }
 
 /// Says which codes of AxiDraw in the names of layers are not obeyed.
@@ -81,7 +117,7 @@ pub(super) fn pens(marks: &[Marks]) -> Chosen {
         };
     }
     let mut numbered: Vec<Option<u32>> =
-        layers.iter().map(|layer| layer.map_or(Some(1), |layer| number_in(&layer.name))).collect();
+        layers.iter().map(|layer| layer.map_or(Some(1), |layer| layer.number)).collect();
     // A layer before which the machine pauses has a pen that no other layer has.
     let mut used = HashSet::new();
     let pauses = |layer: &Layer| Control::of(&layer.name).pauses;

@@ -475,6 +475,18 @@ fn layers_choose_pens_or_else_colours_do() {
     assert_eq!(used_pens(&in_mm(&styled)), ["pen1", "pen2"]);
     let groups = format!("<g id='layer3'>{red}</g><g id='pen_4'>{red}</g>");
     assert_eq!(used_pens(&in_mm(&groups)), ["pen3", "pen4"]);
+    // What a program calls a group that has no name is none, and Illustrator writes digits so.
+    let group = |id: &str, contents: &str| format!("<g id='{id}'>{contents}</g>");
+    let invented = group("g10", red) + &group("g12-3", red) + &group("g14", blue);
+    assert_eq!(used_pens(&in_mm(&invented)), ["pen1", "pen1", "pen2"]);
+    for id in ["g12", "path7-5", "rect12", "svg3"] {
+        assert_eq!(used_pens(&in_mm(&group(id, red))), ["pen1"], "{id}");
+    }
+    let coded = group("_x32_", red) + &group("_x31__red", red) + &group("_x25_ 4", red);
+    assert_eq!(used_pens(&in_mm(&coded)), ["pen2", "pen1"]);
+    assert_eq!(used_pens(&in_mm(&group("line-2", red))), ["pen2"]);
+    let unnamed = "<g inkscape:groupmode='layer' id='g7'>".to_owned() + red + "</g>";
+    assert_eq!(used_pens(&in_mm(&(unnamed + &layer("g7", red)))), ["pen1", "pen7"]);
 }
 
 #[test]
