@@ -69,11 +69,14 @@ impl Stroke {
     }
 }
 
-/// An area that may be hatched: what an odd number of its outlines surround.
+/// An area that may be hatched: what its outlines surround.
 #[derive(Debug, Clone)]
 pub(crate) struct Area {
     /// The outlines. The side from the last point to the first belongs to each.
     pub(crate) outlines: Vec<Vec<Point>>,
+    /// Whether an odd number of outlines surround it. Else they turn around it more often in one
+    /// direction than in the other.
+    pub(crate) is_even_odd: bool,
     /// The regions to which the hatching is limited.
     pub(crate) within: Regions,
     /// The pen that hatches it, counted from 1.

@@ -155,7 +155,8 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         }
         if !shape.outlines.is_empty() {
             let (outlines, within) = (shape.outlines.clone(), shape.within.clone());
-            areas.push(Area { outlines, within, pen, layer, element: plan.element() });
+            let (is_even_odd, element) = (shape.is_even_odd, plan.element());
+            areas.push(Area { outlines, is_even_odd, within, pen, layer, element });
         }
     }
     plan.layers = chosen.layers;
@@ -216,6 +217,11 @@ fn not_as_it_is(drawing: &Drawing<'_, '_, '_>) -> impl Iterator<Item = String> {
             ["shape is", "shapes are"],
             "not drawn: filled with white alone, on white paper; a stroke or another colour shows \
              it",
+        ),
+        (
+            drawing.covering,
+            ["white shape lies", "white shapes lie"],
+            "on a filled one, and the lines of --hatch go through it",
         ),
         (
             drawing.patterns,

@@ -34,9 +34,10 @@ pub(super) fn hatch(plan: &mut Plan, hatch: Hatch) -> Result<Option<String>, Str
     }
     let (mut lines, mut budget, mut without_line) = (0, MOST_WORK, 0);
     for area in areas {
-        let Area { outlines, within, pen, layer, element } = area;
+        let Area { outlines, is_even_odd, within, pen, layer, element } = area;
         let too_many = || format!("--hatch {} makes more than a million lines", hatch.spacing);
-        let hatched = lines_within(&outlines, hatch, MOST_LINES - lines).ok_or_else(too_many)?;
+        let hatched =
+            lines_within(&outlines, is_even_odd, hatch, MOST_LINES - lines).ok_or_else(too_many)?;
         lines += hatched.len();
         without_line += match are_filled {
             true => usize::from(hatched.is_empty() && outlines.iter().any(|it| is_seen(it))),
@@ -87,27 +88,32 @@ fn closed(plan: &Plan) -> Vec<Area> {
     for stroke in plan.strokes.iter().filter(|stroke| stroke.is_closed()) {
         let Stroke { pen, layer, element, .. } = *stroke;
         let within = Regions::default();
-        let area = || Area { outlines: Vec::new(), within, pen, layer, element };
+        let area = || Area { outlines: Vec::new(), is_even_odd: true, within, pen, layer, element };
         areas.entry(pen).or_insert_with(area).outlines.push(stroke.points.clone());
     }
     areas.into_values().collect()
 }
 
-/// The lines that hatch what an odd number of `outlines` surround; `None` if they are more than
+/// The lines that hatch what `outlines` surround by a rule of filling; `None` if they are more than
 /// `most`. The lines of all areas of a drawing lie on the same grid.
-fn lines_within(outlines: &[Vec<Point>], hatch: Hatch, most: usize) -> Option<Vec<[Point; 2]>> {
+fn lines_within(
+    outlines: &[Vec<Point>],
+    is_even_odd: bool,
+    hatch: Hatch,
+    most: usize,
+) -> Option<Vec<[Point; 2]>> {
     let Hatch { spacing, angle } = hatch;
     let (sine, cosine) = sine_cosine(angle);
     // Converts a point to coordinates along the lines and across them, in units of the distance
     // between lines.
     let turned = |[x, y]: Point| [x * cosine + y * sine, (y * cosine - x * sine) / spacing];
-    let mut crossings: BTreeMap<i64, Vec<f64>> = BTreeMap::new();
+    let mut crossings: BTreeMap<i64, Vec<(f64, i32)>> = BTreeMap::new();
     let mut count = 0usize;
     for outline in outlines {
         let mut from = turned(*outline.last()?);
         for point in outline {
             let to = turned(*point);
-            let (low, high) = if from[1] <= to[1] { (from, to) } else { (to, from) };
+            let (low, high, turn) = if from[1] <= to[1] { (from, to, 1) } else { (to, from, -1) };
             // A line through a corner belongs to the side above it, so that it counts once.
             let (first, end) = (low[1].ceil(), high[1].ceil());
             count = count.saturating_add((end - first) as usize);
@@ -117,7 +123,7 @@ fn lines_within(outlines: &[Vec<Point>], hatch: Hatch, most: usize) -> Option<Ve
             for line in first as i64..end as i64 {
                 let part = (line as f64 - low[1]) / (high[1] - low[1]);
                 let along = low[0] + part * (high[0] - low[0]);
-                crossings.entry(line).or_default().push(along);
+                crossings.entry(line).or_default().push((along, turn));
             }
             from = to;
         }
@@ -128,10 +134,16 @@ fn lines_within(outlines: &[Vec<Point>], hatch: Hatch, most: usize) -> Option<Ve
     };
     let mut lines = Vec::new();
     for (line, mut along) in crossings {
-        along.sort_by(f64::total_cmp);
-        for pair in along.chunks_exact(2) {
-            if pair[1] - pair[0] >= SHORTEST {
-                lines.push([back(pair[0], line), back(pair[1], line)]);
+        along.sort_by(|one, other| one.0.total_cmp(&other.0));
+        let (mut turns, mut begin) = (0, 0.0);
+        let is_inside = |turns: i32| if is_even_odd { turns % 2 != 0 } else { turns != 0 };
+        for (along, turn) in along {
+            let before = is_inside(turns);
+            turns += turn;
+            if !before {
+                begin = along;
+            } else if !is_inside(turns) && along - begin >= SHORTEST {
+                lines.push([back(begin, line), back(along, line)]);
             }
         }
     }

@@ -77,8 +77,8 @@ pub const PLAN_OPTIONS: &[PlanOption] = &[
     PlanOption {
         name: "hatch",
         value: "MM",
-        help: "Hatch filled shapes by lines so far apart, which lie inside by the even-odd rule; \
-               MM,DEGREES turns the lines, which else run at 45 degrees",
+        help: "Hatch filled shapes by lines so far apart, by the fill rule of an SVG and else \
+               even-odd; MM,DEGREES turns the lines, which else run at 45 degrees",
         changes_size: false,
         set: |arrangement, text| {
             let (spacing, angle) = match *numbers(text)?.as_slice() {

@@ -6,13 +6,14 @@
 //! neither dark nor light all over lets all light through, and the user is told. A mask with a
 //! filter, or a group that is see-through, is not applied.
 
-use super::drawing::{Drawing, affine, is_even_odd};
+use super::drawing::{Drawing, affine};
 use super::flatten::{Arcs, Polyline, TooManyPoints, flatten};
 use crate::region::{Region, Regions, Shade};
-use kurbo::{Affine, Point};
+use kurbo::{Affine, Point, Rect};
 use std::sync::Arc;
 use usvg::{
-    BlendMode, ClipPath, Color, Group, Mask, MaskType, Node, Paint, PaintOrder, Path, Stop,
+    BlendMode, ClipPath, Color, FillRule, Group, Mask, MaskType, Node, Paint, PaintOrder, Path,
+    Stop,
 };
 
 /// The conversion of the colours of a mask to light.
@@ -252,6 +253,19 @@ fn of_stops(stops: &[Stop], opacity: f64, of_colour: impl Fn(Color) -> f64) -> O
     let first = lights.next()?;
     let is_plain = is_opaque && lights.all(|other| other == first);
     is_plain.then(|| Shade { light: f64::from(u8::from(first)), alpha: 1.0 })
+}
+
+/// The bounds of a path on the page.
+pub(super) fn bounds(path: &Path, to_page: Affine) -> Rect {
+    let bounds = path.bounding_box();
+    let [left, top, right, bottom] =
+        [bounds.left(), bounds.top(), bounds.right(), bounds.bottom()].map(f64::from);
+    to_page.transform_rect_bbox(Rect::new(left, top, right, bottom))
+}
+
+/// Whether what a path fills is decided by the number of outlines around it.
+pub(super) fn is_even_odd(path: &Path) -> bool {
+    path.fill().is_some_and(|fill| fill.rule() == FillRule::EvenOdd)
 }
 
 /// The corners of a rectangle on the page.

@@ -1,6 +1,6 @@
 //! Collects what the tree of `usvg` draws, as polylines on the page.
 
-use super::areas::rectangle;
+use super::areas::{bounds, is_even_odd, rectangle};
 use super::clip::ConvexArea;
 use super::flatten::{Arcs, Polyline, TooManyPoints, flatten, is_coarse, path_length};
 use super::markup::Markup;
@@ -13,7 +13,7 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use usvg::roxmltree::NodeId;
 use usvg::tiny_skia_path::StrokeDash;
-use usvg::{FillRule, Group, Image, ImageKind, LineCap, Node, Paint, Path, Text, Transform, Tree};
+use usvg::{Group, Image, ImageKind, LineCap, Node, Paint, Path, Text, Transform, Tree};
 
 /// The length of a pixel of CSS in mm: there are 96 in an inch.
 pub(super) const PIXEL: f64 = 25.4 / 96.0;
@@ -50,6 +50,8 @@ pub(super) struct Shape {
     /// The outlines of what is filled within the page, in the same way; empty if nothing is, or if
     /// nobody asks.
     pub(super) outlines: Vec<Vec<[f64; 2]>>,
+    /// Whether an odd number of these outlines surround what is filled.
+    pub(super) is_even_odd: bool,
     /// The clip paths, which cut off what fills these outlines.
     pub(super) within: Regions,
 }
@@ -84,6 +86,8 @@ pub(super) struct Drawing<'a, 'input, 'tree> {
     pub(super) flat: usize,
     /// The number of shapes that are only filled, with white, where nothing else is filled.
     pub(super) white: usize,
+    /// The number of white shapes that do not hide the hatching of what lies below them.
+    pub(super) covering: usize,
     /// The bounds of what is filled with another colour than white.
     coloured: Vec<Rect>,
     /// The number of paths with a pattern, which is not drawn.
@@ -143,6 +147,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             backgrounds: 0,
             flat: 0,
             white: 0,
+            covering: 0,
             coloured: Vec::new(),
             patterns: 0,
             nested_images: 0,
@@ -277,7 +282,17 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
             self.documentation += count;
             return Ok(());
         }
+        let is_white_fill = fill.is_some_and(|fill| is_white(fill.paint()));
         let is_unseen = fill.is_some() && self.is_white_on_paper(path, paint, context.to_page);
+        let is_sought = self.coloured.len() <= MOST_COLOURED;
+        if self.with_areas
+            && is_white_fill
+            && !is_unseen
+            && is_sought
+            && self.covers(path, context.to_page)
+        {
+            self.covering += count;
+        }
         let dashes = stroke.and_then(|stroke| Some((stroke.dasharray()?, stroke.dashoffset())));
         // Dashes of a fixed length are measured on the page, and others in the file.
         let is_fixed = dashes.is_some()
@@ -374,6 +389,7 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
                 polylines: parts,
                 has_dots,
                 outlines,
+                is_even_odd: is_even_odd(path),
                 within,
             });
         }
@@ -384,17 +400,20 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
     /// white alone, and no other colour below it. The bounds decide, so a shape is drawn where it
     /// may be seen, and all are drawn if there are too many to look at.
     fn is_white_on_paper(&mut self, path: &Path, paint: &Paint, to_page: Affine) -> bool {
-        let bounds = path.bounding_box();
-        let [left, top, right, bottom] =
-            [bounds.left(), bounds.top(), bounds.right(), bounds.bottom()].map(f64::from);
-        let bounds = to_page.transform_rect_bbox(Rect::new(left, top, right, bottom));
+        let bounds = bounds(path, to_page);
         if path.fill().is_some_and(|fill| !is_white(fill.paint())) {
             self.coloured.push(bounds);
         }
         is_white(paint)
             && path.stroke().is_none_or(|stroke| stroke.opacity().get() == 0.0)
             && self.coloured.len() <= MOST_COLOURED
-            && !self.coloured.iter().any(|it| it.overlaps(bounds))
+            && !self.covers(path, to_page)
+    }
+
+    /// Whether a path lies on what another colour than white fills, by their bounds.
+    fn covers(&self, path: &Path, to_page: Affine) -> bool {
+        let bounds = bounds(path, to_page);
+        self.coloured.iter().any(|it| it.overlaps(bounds))
     }
 
     /// Returns what clip paths leave of the lines of a path. If the path is only filled, the
@@ -446,11 +465,6 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let middle = self.page.middle();
         shape.contains(middle) && areas.contain(middle)
     }
-}
-
-/// Whether what a path fills is decided by the number of outlines around it.
-pub(super) fn is_even_odd(path: &Path) -> bool {
-    path.fill().is_some_and(|fill| fill.rule() == FillRule::EvenOdd)
 }
 
 /// Whether these points do not all lie on one straight line.

@@ -578,7 +578,7 @@ fn layers_are_chosen_by_label_number_or_colour() {
 #[test]
 fn filled_shapes_are_hatched_within_the_page_and_holes_stay_free() {
     let svg = in_mm(
-        "<path d='M10 10H30V30H10ZM15 15H25V25H15Z'/>\
+        "<path d='M10 10H30V30H10ZM15 15V25H25V15Z'/>\
          <rect x='50' y='50' width='10' height='10' fill='none' stroke='red'/>\
          <rect x='70' y='70' width='10' height='10' fill='#fff' stroke='red'/>\
          <rect x='90' y='10' width='50' height='10'/>",
@@ -599,6 +599,23 @@ fn filled_shapes_are_hatched_within_the_page_and_holes_stay_free() {
         assert!(is_ring || is_between([90.0, 10.0], [100.0, 20.0]), "{points:?}");
         assert!(points.iter().all(|point| point[0] <= 100.0), "{points:?}");
     }
+    // Outlines of one direction leave a hole by the rule that says so.
+    let ink = |rule: &str| -> f64 {
+        let svg = in_mm(&format!("<path d='M10 10H30V30H10ZM15 15H25V25H15Z' {rule}/>"));
+        let file = arranged(&svg, &[("hatch", "2,0")]).expect("a plan");
+        polylines(&file).split_off(2).iter().map(|line| length(line).abs()).sum()
+    };
+    assert_eq!([ink(""), ink("fill-rule='evenodd'")], [200.0, 150.0]);
+    // A white shape does not hide the lines of what lies below it.
+    let white = "<path d='M10 10H30V30H10Z'/><circle cx='20' cy='20' r='5' fill='white'/>";
+    let told = |options: &[(&str, &str)]| {
+        arranged(&in_mm(white), options).expect("a plan").notes().join("; ")
+    };
+    assert_eq!(told(&[]), "");
+    assert_eq!(
+        told(&[("hatch", "2")]),
+        "1 white shape lies on a filled one, and the lines of --hatch go through it"
+    );
     let outline = in_mm("<rect width='10' height='10' fill='none' stroke='red'/>");
     let error = arranged(&outline, &[("hatch", "2")]).map(drop).expect_err("nothing filled");
     assert!(error.contains("no closed, filled shape"), "{error}");

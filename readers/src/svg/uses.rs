@@ -65,7 +65,10 @@ fn length_of_part(node: Node<'_, '_>, name: &str, part: &str) -> Option<String> 
             let mut numbers = sides.split(is_separator).filter(|number| !number.is_empty());
             numbers.nth(axis)?.to_owned()
         }
-        None => plain_length(viewport.attribute(side)?)?,
+        None => {
+            let whole = viewport.attribute(side).unwrap_or("100%");
+            plain_length(whole).or_else(|| length_of_part(viewport, side, whole))?
+        }
     };
     let number = whole.trim_end_matches(|letter: char| letter.is_ascii_alphabetic());
     let unit = whole.strip_prefix(number)?;

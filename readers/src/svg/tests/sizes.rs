@@ -168,6 +168,13 @@ fn a_percentage_of_a_use_of_a_symbol_is_that_of_the_picture() {
         };
         assert_eq!(positions(&nested(parts)), positions(&nested(lengths)), "{parts}");
     }
+    // The picture within another has a part of that one as its size.
+    let nested =
+        |size: &str, own: &str| positions(&in_mm(&format!("<svg {size}>{}</svg>", used(own))));
+    let expected = nested("width='50' height='50'", "width='25' height='25'");
+    let half = "width='50%' height='50%'";
+    assert_eq!(nested(half, half), expected);
+    assert_eq!(nested("", half), positions(&in_mm(&used("width='50' height='50'"))));
     // The symbol has a part of the picture as its size.
     let part = format!(
         "<symbol id='s' viewBox='0 0 10 10' width='50%' height='50%'>{path}</symbol>\
