@@ -255,6 +255,16 @@ fn of_stops(stops: &[Stop], opacity: f64, of_colour: impl Fn(Color) -> f64) -> O
     is_plain.then(|| Shade { light: f64::from(u8::from(first)), alpha: 1.0 })
 }
 
+/// Whether a paint is transparent all over.
+pub(super) fn is_clear(paint: &Paint) -> bool {
+    let stops = match paint {
+        Paint::LinearGradient(gradient) => gradient.stops(),
+        Paint::RadialGradient(gradient) => gradient.stops(),
+        _ => return false,
+    };
+    stops.iter().all(|stop| stop.opacity().get() == 0.0)
+}
+
 /// The bounds of a path on the page.
 pub(super) fn bounds(path: &Path, to_page: Affine) -> Rect {
     let bounds = path.bounding_box();

@@ -30,6 +30,9 @@ pub(super) const VARIABLE: &str = "var";
 /// The properties whose values are paints or colours.
 const PAINTS: [&str; 4] = ["fill", "stroke", "color", "stop-color"];
 
+/// The properties that may hide an element.
+const HIDING: [&str; 2] = ["display", "visibility"];
+
 const ROOT_CLASS: &str = ":root";
 
 /// Whether a style sheet of the file may have a selector for the root.
@@ -50,6 +53,10 @@ pub(super) fn edits_of(node: Node<'_, '_>, text: &str) -> Vec<Edit> {
             let paint = plain_paint(attribute.value()).filter(|it| *it != attribute.value());
             let paint = paint.filter(|paint| !paint.contains(['"', '\'', '&', '<']));
             found.extend(paint.map(|paint| (attribute.range_value(), paint.to_owned())));
+        } else if HIDING.contains(&attribute.name()) {
+            let plain = attribute.value().trim().to_ascii_lowercase();
+            let is_edited = plain != attribute.value() && !plain.contains(['"', '\'', '&', '<']);
+            found.extend(is_edited.then(|| (attribute.range_value(), plain)));
         }
     }
     if is_sheet(node) {
@@ -235,6 +242,13 @@ fn edit_of_declaration(
     let value = unread::without_important(value);
     let plain = without_comments(value);
     let name = name.trim_end();
+    let hiding = name.to_ascii_lowercase();
+    if HIDING.contains(&hiding.as_str()) {
+        let plain = plain.trim().to_ascii_lowercase();
+        let is_edited = hiding != name || plain != value;
+        return is_edited
+            .then(|| (end - own.len()..start + value.len(), format!("{hiding}:{plain}")));
+    }
     let instead = match name {
         "transform" => unread::plain_transform(&plain),
         "font" => without_line_height(&plain),
@@ -270,7 +284,10 @@ pub(super) fn plain_paint(paint: &str) -> Option<&str> {
     let pair = paint.strip_prefix("light-dark(");
     let light = pair.and_then(|pair| pair.get(..find_outside_brackets(pair, |it| it == ',')?));
     let paint = light.unwrap_or(paint).trim();
-    let keywords = ["none", "currentColor", "initial", "unset", "revert"];
+    if ["unset", "revert"].iter().any(|it| it.eq_ignore_ascii_case(paint)) {
+        return Some("inherit");
+    }
+    let keywords = ["none", "currentColor", "initial"];
     let keyword = keywords.into_iter().find(|it| it.eq_ignore_ascii_case(paint));
     keyword.or_else(|| Paint::from_str(paint).is_ok().then_some(paint))
 }

@@ -1,6 +1,6 @@
 //! Collects what the tree of `usvg` draws, as polylines on the page.
 
-use super::areas::{bounds, is_even_odd, rectangle};
+use super::areas::{bounds, is_clear, is_even_odd, rectangle};
 use super::clip::ConvexArea;
 use super::flatten::{Arcs, Polyline, TooManyPoints, flatten, is_coarse, path_length};
 use super::markup::Markup;
@@ -261,8 +261,8 @@ impl<'a, 'input, 'tree> Drawing<'a, 'input, 'tree> {
         let own = self.element(path.id(), context);
         self.seen.extend(own);
         let count = self.markup.count(own);
-        let stroke = path.stroke().filter(|stroke| stroke.opacity().get() > 0.0);
-        let fill = path.fill().filter(|fill| fill.opacity().get() > 0.0);
+        let stroke = path.stroke().filter(|it| it.opacity().get() > 0.0 && !is_clear(it.paint()));
+        let fill = path.fill().filter(|it| it.opacity().get() > 0.0 && !is_clear(it.paint()));
         let paint = match (stroke, fill) {
             _ if !path.is_visible() => None,
             (Some(stroke), _) => Some(stroke.paint()),

@@ -2,6 +2,7 @@
 //! the size that an SVG says it has.
 
 use super::css::Edit;
+use super::markup::is_one_of;
 use usvg::roxmltree::Node;
 
 /// A length of CSS as `usvg` reads it: with a unit in small letters; `None` if it is no length, or
@@ -19,6 +20,19 @@ pub(super) fn plain_length(length: &str) -> Option<String> {
         }
         _ => None,
     }
+}
+
+/// Whether an element is an `svg` with a side of the length 0, which is not drawn.
+pub(super) fn is_empty(node: Node<'_, '_>) -> bool {
+    let is_zero = |length: &str| {
+        let number = length.trim().trim_end_matches(|it: char| it.is_ascii_alphabetic());
+        number.parse() == Ok(0.0)
+    };
+    let is_separator = |letter: char| letter == ',' || letter.is_whitespace();
+    let sides = node.attribute("viewBox").unwrap_or_default().split(is_separator);
+    let mut sides = sides.filter(|number| !number.is_empty()).skip(2);
+    let mut own = ["width", "height"].into_iter().filter_map(|side| node.attribute(side));
+    is_one_of(node, &["svg"]) && (own.any(is_zero) || sides.any(is_zero))
 }
 
 /// The attributes and properties whose values are lengths, or lists of them.

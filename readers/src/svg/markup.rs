@@ -107,7 +107,14 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         let sizes = symbols.sizes_for(node);
         let is_foreign = is_one_of(node, &["foreignObject"]);
         let is_left_out = is_foreign && node.attribute("requiredExtensions").is_none();
-        if !is_traced && !is_left_out && !is_named && sizes.is_empty() && edits.is_empty() {
+        let is_empty = !is_root && lengths::is_empty(node) && !node.has_attribute("display");
+        if !is_traced
+            && !is_left_out
+            && !is_empty
+            && !is_named
+            && sizes.is_empty()
+            && edits.is_empty()
+        {
             continue;
         }
         // The name of an element ends at a space, a slash or an angle bracket. The contents of an
@@ -121,6 +128,9 @@ pub(super) fn with_ids(text: &str, document: &Document<'_>) -> String {
         copied = end;
         if is_left_out {
             copy.push_str(" requiredExtensions=\"penup\"");
+        }
+        if is_empty {
+            copy.push_str(" display=\"none\"");
         }
         if is_named {
             copy.push_str(&format!(" {}=\"\"", css::ROOT));

@@ -11,8 +11,18 @@ use svgtypes::FontShorthand;
 use usvg::roxmltree::{Document, Node};
 
 /// The properties of CSS that move or form a shape, and are read as attributes only or not at all.
-const NOT_READ: [&str; 7] =
-    ["d", "offset-path", "rotate", "scale", "shape-inside", "transform-box", "translate"];
+const NOT_READ: [&str; 10] = [
+    "-webkit-mask",
+    "-webkit-mask-image",
+    "d",
+    "mask-image",
+    "offset-path",
+    "rotate",
+    "scale",
+    "shape-inside",
+    "transform-box",
+    "translate",
+];
 
 /// The attributes of shapes that CSS may set, which are read as attributes only.
 const SIZES: [&str; 9] = ["cx", "cy", "height", "r", "rx", "ry", "width", "x", "y"];
@@ -25,6 +35,9 @@ const CLASSES: [&str; 6] = ["active", "first-child", "focus", "hover", "link", "
 
 /// What is said of a style sheet by which a stroke is not seen.
 const WITHOUT_WIDTH: &str = "a stroke of the width 0";
+
+/// What is said of letters that few fonts have.
+const SMALL_CAPITALS: &str = "small capitals";
 
 /// Counts what is not read, in sentences.
 pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
@@ -41,6 +54,11 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
         } else if is_one_of(node, &["meshgradient", "meshGradient", "mesh", "hatch"]) {
             paints.add(document, node);
         } else if is_one_of(node, &["style"]) {
+            let is_for = |medium: &str| matches!(medium.trim(), "" | "all" | "screen");
+            if node.attribute("media").is_some_and(|media| !media.split(',').any(is_for)) {
+                let what = "a medium as a condition".to_owned();
+                unread.entry(what).or_default().add(document, node);
+            }
             let sheet: String = node.children().filter_map(|it| it.text()).collect();
             for what in of_sheet(&sheet, &sized(document)) {
                 unread.entry(what).or_default().add(document, node);
@@ -57,7 +75,9 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
         for (name, value, is_style) in
             own.map(|(name, value)| (name, value, true)).chain(as_attribute)
         {
-            if let Some(what) = unread_property(name, value, is_style, is_shape) {
+            let is_obeyed = name == "white-space" && !loses_spaces(node);
+            let what = unread_property(name, value, is_style, is_shape);
+            if let Some(what) = what.filter(|_| !is_obeyed) {
                 unread.entry(what).or_default().add(document, node);
             }
         }
@@ -77,10 +97,32 @@ pub(super) fn sentences(document: &Document<'_>) -> Vec<String> {
     paints.say(&mut said, ["mesh or hatch is", "meshes or hatches are"], what);
     for (what, count) in &unread {
         let nouns = ["element or style sheet has", "elements or style sheets have"];
-        let end = if what == WITHOUT_WIDTH { "drawn: give it a width" } else { "obeyed" };
+        let end = match what.as_str() {
+            WITHOUT_WIDTH => "drawn: give it a width",
+            SMALL_CAPITALS => "obeyed by fonts that have none",
+            _ => "obeyed",
+        };
         count.say(&mut said, nouns, &format!("{what}, which is not {end}"));
     }
     said
+}
+
+/// Whether a text has spaces in a row, or at a line end, of which one is drawn.
+fn loses_spaces(node: Node<'_, '_>) -> bool {
+    const XML: &str = "http://www.w3.org/XML/1998/namespace";
+    let keeps = |node: Node<'_, '_>| node.attribute((XML, "space")) == Some("preserve");
+    let mut texts = node.descendants().filter_map(|node| node.text());
+    !node.ancestors().any(keeps) && texts.any(|text| text.contains("  ") || text.contains('\n'))
+}
+
+/// Whether a property of texts has a value that is not obeyed.
+fn is_unread_of_text(name: &str, value: &str) -> bool {
+    match name {
+        "direction" => value == "rtl",
+        "inline-size" => value != "0",
+        "white-space" => value.starts_with("pre") || value == "break-spaces",
+        _ => matches!(name, "text-decoration-line" | "text-transform"),
+    }
 }
 
 /// The properties and values of a list of declarations.
@@ -147,7 +189,14 @@ fn unread_property(name: &str, value: &str, is_style: bool, is_shape: bool) -> O
         });
     }
     let is_unread = match name {
-        "clip-path" => !value.starts_with("url(") && !value.contains("var("),
+        "clip-path" | "mask" => {
+            let is_plain = value.starts_with("url(") && value.trim_end().ends_with(')');
+            !is_plain && !value.contains("var(")
+        }
+        "font-variant" | "font-variant-caps" if value.contains("small-caps") => {
+            return Some(SMALL_CAPITALS.to_owned());
+        }
+        name if is_unread_of_text(name, value) => true,
         "font" => is_style && !value.contains("var(") && FontShorthand::from_str(value).is_err(),
         "transform" | "patternTransform" | "gradientTransform" => plain_transform(value).is_none(),
         _ => is_style && (NOT_READ.contains(&name) || is_shape && SIZES.contains(&name)),
@@ -200,6 +249,7 @@ fn of_sheet(sheet: &str, sized: &BTreeSet<String>) -> Vec<String> {
         };
         let list = block.split('}').next().unwrap_or_default();
         unread.extend(of_selectors(prelude, list));
+        unread.extend(list.contains('{').then(|| "a rule within a rule of CSS".to_owned()));
         unread.extend(has_stroke_without_width(list).then(|| WITHOUT_WIDTH.to_owned()));
         // Other sizes are those of the whole picture, or of none.
         let reads_sizes = selects_sized(prelude, sized);

@@ -41,6 +41,19 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
           <path d='M0 0H1V1'/></pattern><rect width='9' height='9' fill='url(#p)'/>",
             "1 path has a pattern",
         ),
+        ("<style>g{fill:none; .a{stroke:black}}</style>", "a rule within a rule of CSS"),
+        ("<style media='print'>.a{fill:none}</style>", "a medium as a condition"),
+        ("<g direction='rtl'/>", "the property direction of CSS"),
+        ("<g style='direction:rtl'/>", "the property direction of CSS"),
+        ("<g style='text-transform:uppercase'/>", "the property text-transform of CSS"),
+        ("<style>.a{text-decoration-line:underline}</style>", "the property text-decoration-line"),
+        ("<g style='inline-size:20px'/>", "the property inline-size of CSS"),
+        ("<g style='white-space:pre'>a  b</g>", "the property white-space of CSS"),
+        ("<g font-variant='small-caps'/>", "small capitals, which is not obeyed by fonts"),
+        ("<g style='mask:url(#c) alpha'/>", "the property mask of CSS"),
+        ("<g style='mask:url(#c) no-repeat'/>", "the property mask of CSS"),
+        ("<g style='mask-image:url(#c)'/>", "the property mask-image of CSS"),
+        ("<style>.a{clip-path:url(#c) view-box}</style>", "the property clip-path of CSS"),
         (
             "<symbol id='s' transform='scale(2)'><path d='M1 1H9V9'/></symbol><use href='#s'/>",
             "the transform of a symbol",
@@ -58,9 +71,21 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
         "<path d='M1 1H9' fill='none'/>",
         "<g visibility='hidden'><path d='M1 1H9' fill='none' stroke='red' stroke-width='0'/></g>",
         "<style>.a:hover{fill:red} svg{width:50px}</style>",
+        "<style media='screen, print'>.a{fill:red}</style><g direction='ltr'/>",
+        "<g style='text-transform:none;white-space:normal;font-variant:normal;mask:none'/>",
+        "<g style='white-space:pre' xml:space='preserve'>a  b</g><g style='white-space:pre'>a b</g>",
+        "<g style='text-decoration-line:none;inline-size:0;mask-image:none;clip-path:url(#a )'/>",
+        // What is hidden is so in capitals and between spaces, too.
+        "<g style='DISPLAY:NONE'><path d='M1 1H9'/></g>",
+        "<g visibility='HIDDEN'><path d='M1 1H9'/></g><path d='M1 1H9' display=' none '/>",
+        "<linearGradient id='g'><stop stop-opacity='0'/><stop offset='1' stop-opacity='0'/>\
+         </linearGradient><path d='M1 1H9V9' fill='none' stroke='url(#g)'/>",
     ] {
         assert!(notes(more).is_empty(), "{more}: {:?}", notes(more));
+        assert_eq!(positions(&in_mm(&format!("{line}{more}"))).len(), 1, "{more}");
     }
+    let hidden = "<style>.a{Display : None}</style><path class='a' d='M1 1H9' stroke='red'/>";
+    assert_eq!(positions(&in_mm(&format!("{line}{hidden}"))).len(), 1);
     let turned =
         "<path d='M10 0H20' stroke='red' style='fill:none;transform:rotate(90deg) scale(2)'/>";
     assert_eq!(positions(&in_mm(turned)), [[[0.0, 80.0], [0.0, 60.0]]]);
@@ -107,6 +132,13 @@ fn a_paint_that_is_not_read_leaves_the_one_before_it() {
     for paint in ["context-fill", "transparent", " red ", "hwb(9 9% 9%)"] {
         let shape = format!("<g fill='{paint}'/><path fill='none' stroke='red'");
         assert_eq!(read(&shape), (1, String::new()), "{paint}");
+    }
+    // What is not set is that of the element around it.
+    for keyword in ["unset", "REVERT"] {
+        for own in [format!("stroke='{keyword}'"), format!("style='stroke:{keyword}'")] {
+            let group = format!("<g stroke='red'><path d='M1 1H9' fill='none' {own}/></g>");
+            assert_eq!(read(&format!("{group}{path}")), (2, String::new()), "{own}");
+        }
     }
     let animated = "<animate fill='freeze'/><path fill='none' stroke='red'";
     assert!(!read(animated).1.contains("colour"));

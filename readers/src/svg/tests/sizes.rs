@@ -126,6 +126,16 @@ fn programs_whose_pixels_have_another_size_are_told() {
 }
 
 #[test]
+fn a_picture_without_a_size_is_not_drawn() {
+    let path = "<path d='M1 1H9' stroke='red'/>";
+    for size in ["width='0' height='0'", "height='0mm'", "viewBox='0 0 0 9'"] {
+        let svg = in_mm(&format!("{path}<svg {size}>{path}</svg>"));
+        assert_eq!(positions(&svg).len(), 1, "{size}");
+    }
+    assert_eq!(positions(&in_mm(&format!("{path}<svg width='9'>{path}</svg>"))).len(), 2);
+}
+
+#[test]
 fn a_symbol_with_a_size_has_it_where_it_is_used() {
     let used = |size: &str, own: &str| {
         let path = "<path d='M1 1H9' stroke='red'/>";
