@@ -171,9 +171,9 @@ impl Plan {
         }
     }
 
-    /// Makes dots of the strokes that a plotter would leave out, because they are too short when the
-    /// plan is scaled by `factor`. A stroke at whose ends others go on is a part of a longer line
-    /// and stays. Up to `right` a dot goes to the right. Returns what the user should know.
+    /// Makes dots of the strokes that a plotter would leave out, because they are too short when
+    /// the plan is scaled by `factor`. A stroke at whose ends others go on is a part of a longer
+    /// line and stays. Up to `right` a dot goes to the right. Returns what the user should know.
     pub(crate) fn keep_short(&mut self, factor: f64, right: f64) -> Option<String> {
         let is_short = |stroke: &Stroke| {
             let size = |axis: usize| {

@@ -73,7 +73,8 @@ fn what_css_and_other_programs_add_is_obeyed_or_named() {
         "<style>.a:hover{fill:red} svg{width:50px}</style>",
         "<style media='screen, print'>.a{fill:red}</style><g direction='ltr'/>",
         "<g style='text-transform:none;white-space:normal;font-variant:normal;mask:none'/>",
-        "<g style='white-space:pre' xml:space='preserve'>a  b</g><g style='white-space:pre'>a b</g>",
+        "<g style='white-space:pre' xml:space='preserve'>a  b</g>",
+        "<g style='white-space:pre'>a b</g>",
         "<g style='text-decoration-line:none;inline-size:0;mask-image:none;clip-path:url(#a )'/>",
         // What is hidden is so in capitals and between spaces, too.
         "<g style='DISPLAY:NONE'><path d='M1 1H9'/></g>",
