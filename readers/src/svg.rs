@@ -100,6 +100,9 @@ impl Format for Svg {
     }
 }
 
+/// What is said of a file that draws nothing, because it has no size.
+const NO_SIZE: &str = "the SVG has no size: width and height must be above 0";
+
 /// What is said of a file that is no XML.
 fn not_well_formed(error: impl Display) -> String {
     format!("this is not a well-formed SVG ({error}): save it again, for example with Inkscape")
@@ -113,6 +116,9 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
     let text = markup::with_prefixes(text);
     let text = markup::with_ids(&text, &markup::parsed(&text).map_err(not_well_formed)?);
     let document = markup::parsed(&text).map_err(not_well_formed)?;
+    if lengths::is_empty(document.root_element()) {
+        return Err(NO_SIZE.to_owned());
+    }
     let mut options = Options::default();
     let embedded = Arc::new(Embedded::default());
     embedded.serve(&mut options, arrangement.files.clone());
@@ -121,7 +127,7 @@ fn contents(file: &str, text: &str, arrangement: &Arrangement) -> Result<Content
         fonts.serve(&mut options);
     }
     let tree = Tree::from_xmltree(&document, &options).map_err(|error| match error {
-        Error::InvalidSize => "the SVG has no size: width and height must be above 0".to_owned(),
+        Error::InvalidSize => NO_SIZE.to_owned(),
         Error::ElementsLimitReached | Error::ParsingFailed(XmlError::NodesLimitReached) => {
             "the SVG has too many elements, or they are nested too deeply".to_owned()
         }

@@ -272,7 +272,7 @@ impl<'a, 'input> Markup<'a, 'input> {
         }
         let mut said = Vec::new();
         let what = match reads_text {
-            true => "not drawn, because no font for it is found: convert text to paths",
+            true => "not drawn: no font for it is found, or it has no size: convert text to paths",
             false => "not drawn, because a page has no fonts: open the file with penup page",
         };
         texts.say(&mut said, ["text is", "texts are"], what);

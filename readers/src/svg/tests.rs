@@ -716,6 +716,7 @@ fn a_file_that_cannot_be_drawn_is_refused_with_a_sentence() {
         (in_mm("<text>a</text>"), "nothing to draw in this SVG; 1 text is not drawn"),
         (in_mm("<path fill='none' d='M0 0H9'/>"), "1 path has neither a stroke nor a fill"),
         (in_mm("").replace("100mm", "0"), "the SVG has no size"),
+        (in_mm("<path d='M0 0H9' stroke='red'/>").replace("100 100'", "0 0'"), "has no size"),
         (in_mm("").replace("100mm", "NaN"), "nothing to draw"),
         (deep(5000), "nested too deeply"),
         (in_mm("<circle r='1e30'/>"), "a curve of kilometres"),

@@ -154,10 +154,11 @@ fn a_computer_without_fonts_draws_no_text_and_says_so() {
     let svg = in_mm(
         "<path d='M0 0H9' stroke='black'/><text>a</text><text> </text><defs><text>b</text></defs>",
     );
-    assert_eq!(
-        read_in(Database::new, &svg).expect("an SVG").notes(),
-        ["1 text is not drawn, because no font for it is found: convert text to paths (line 1)"]
-    );
+    let said = "1 text is not drawn: no font for it is found, or it has no size: convert text to \
+                paths (line 1)";
+    assert_eq!(read_in(Database::new, &svg).expect("an SVG").notes(), [said]);
+    let without_size = in_mm("<path d='M0 0H9' stroke='black'/><text font-size='0'>a</text>");
+    assert_eq!(read_in(squares, &without_size).expect("an SVG").notes(), [said]);
 }
 
 #[test]
