@@ -3,7 +3,7 @@
 //! In this order: the angle of a servo (`M280`, `M300`, `M340`, `SET_SERVO`); the height Z; the
 //! power S, where the spindle is on from the first move that draws to the last; the spindle or
 //! laser (`M3`, `M4`, `M5`), which with the power 0 does not draw, nor before the first power if
-//! the program says one; the fan (`M106`, `M107`) or the coolant (`M7` to `M9`), on whose pin some
+//! the program says one, unless the program shows that the pen is up while it is on; the fan (`M106`, `M107`) or the coolant (`M7` to `M9`), on whose pin some
 //! have a laser or a pen, if nothing moves by G0 while it is on; or, if none of these changes
 //! between moves, G1 to G3 draw and G0 does not.
 //! A height that only sets the focus of a laser is down also while the laser is off: then the laser
@@ -76,7 +76,7 @@ pub(super) fn inked(moves: &Moves, end: &Signals, has_absolute_heights: bool) ->
     let mut inked = by_level(moves, |signals| signals.servo, end.servo, SERVO)
         .or_else(|| by_height().map(|inked| while_on(moves, inked)))
         .or_else(|| by_power(moves, end))
-        .or_else(|| by_spindle(moves).map(Inked::from))
+        .or_else(|| by_spindle(moves, end))
         .unwrap_or_else(|| by_outputs(moves));
     for (draws, it) in inked.draws.iter_mut().zip(moves.iter()) {
         *draws &= !it.signals.is_parked;
@@ -122,15 +122,58 @@ fn while_on(moves: &Moves, mut inked: Inked) -> Inked {
 }
 
 /// Of a program with G1 to G3 while the spindle is on, G0 does not draw: it is a laser, or a pen
-/// that is up then anyway.
-fn by_spindle(moves: &Moves) -> Option<Vec<bool>> {
+/// that is up then anyway. Some plotters lift the pen while it is on, which is told.
+fn by_spindle(moves: &Moves, end: &Signals) -> Option<Inked> {
     let has_powers = moves.iter().any(|it| it.signals.power.is_some());
-    let is_on = |it: &Move| is_on(it.signals) && (it.signals.power.is_some() || !has_powers);
-    let feeds = moves.iter().any(|it| is_on(&it) && !it.is_rapid);
-    let draws = moves.iter().map(|it| is_on(&it) && !(feeds && it.is_rapid));
-    let draws: Vec<bool> = draws.collect();
+    let is_on = |signals: &Signals| is_on(signals) && (signals.power.is_some() || !has_powers);
+    let draws: Vec<bool> = if lifts(moves, end, is_on) {
+        let is_off = |it: Move<'_>| it.signals.spindle.is_some() && !is_on(it.signals);
+        moves.iter().map(|it| is_off(it) && !it.is_rapid).collect()
+    } else {
+        let feeds = moves.iter().any(|it| is_on(it.signals) && !it.is_rapid);
+        moves.iter().map(|it| is_on(it.signals) && !(feeds && it.is_rapid)).collect()
+    };
     // A spindle that only runs before the first move lifts no pen.
-    (draws.contains(&true) && draws.contains(&false)).then_some(draws)
+    if !(draws.contains(&true) && draws.contains(&false)) {
+        return None;
+    }
+    let mut long = moves.iter().zip(&draws).filter(|(it, _)| it.length() > SAME);
+    let is_inverted = long.clone().any(|(it, draws)| *draws && !is_on(it.signals));
+    let by_rapids = long.clone().all(|(it, draws)| !draws || it.is_rapid);
+    let note = if is_inverted {
+        Some(
+            "the pen is taken to be down while the spindle is off (M5 or S0), because the program \
+             travels while it is on: if it is down while it is on, let the program draw by G1 and \
+             travel by G0, or begin and end with M5",
+        )
+    } else if by_rapids && long.any(|(it, draws)| !draws && !it.is_rapid) {
+        Some(
+            "the pen is taken to be down while the spindle is on, although the program moves by G0 \
+             then, and by G1 to G3 while it is off",
+        )
+    } else {
+        None
+    };
+    Some(Inked { draws, note: note.map(str::to_owned) })
+}
+
+/// Whether the pen is up while the spindle is on. Then G0 moves while it is on, and G1 to G3 while
+/// it is off, without what follows the last of these, which may be the way home. Without G0, it is
+/// on at the beginning and at the end, always with the same power.
+fn lifts(moves: &Moves, end: &Signals, is_on: impl Fn(&Signals) -> bool) -> bool {
+    let told = moves.iter().filter(|it| it.signals.spindle.is_some() && it.length() > SAME);
+    let told: Vec<Move<'_>> = told.collect();
+    let is_drawn = |it: &Move<'_>| !is_on(it.signals) && !it.is_rapid;
+    let Some(last) = told.iter().rposition(is_drawn) else { return false };
+    let (ways, drawn): (Vec<&Move<'_>>, Vec<&Move<'_>>) =
+        told.iter().take(last + 1).partition(|it| is_on(it.signals));
+    if told.iter().all(|it| !it.is_rapid) {
+        let has_own_power = |it: &Move<'_>| is_on(it.signals) && it.signals.power != end.power;
+        let begins = told.first().is_some_and(|it| is_on(it.signals));
+        begins && is_on(end) && !told.iter().any(has_own_power)
+    } else {
+        !ways.is_empty() && ways.iter().all(|it| it.is_rapid) && drawn.into_iter().all(is_drawn)
+    }
 }
 
 /// Whether a fan or the coolant is on, if the program has said.

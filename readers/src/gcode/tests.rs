@@ -805,3 +805,48 @@ fn a_line_may_end_with_a_carriage_return_alone() {
     let error = sent("a.nc", b"G21\rG1 X5\r\nG1 Xabc\r").expect_err("refused");
     assert!(error.starts_with("a.nc:3: \"X\" has no number"), "{error}");
 }
+
+/// Some plotters lift their pen while the spindle is on. The module's own note says so.
+#[test]
+fn a_spindle_may_lift_the_pen_and_that_is_told() {
+    let line = [[[10.0, 10.0], [20.0, 10.0]], [[30.0, 10.0], [40.0, 10.0]]];
+    let note = "the pen is taken to be down while the spindle is off (M5 or S0), because the \
+                program travels while it is on: if it is down while it is on, let the program \
+                draw by G1 and travel by G0, or begin and end with M5";
+    let program = |up: &str, down: &str, travel: &str, end: &str| {
+        format!(
+            "{up}\nG21\nG90\n{travel} X10 Y10\n{down}\nG1 X20 Y10 F1000\n{up}\n{travel} X30 \
+             Y10\n{down}\nG1 X40\n{up}\n{travel} X0 Y0\n{end}"
+        )
+    };
+    for (up, down) in
+        [("M03 S80", "M05 S0"), ("M3", "M5"), ("M3 S1000", "M3 S0"), ("M3 S90", "S0"), ("M4", "M5")]
+    {
+        for (travel, end) in [("G0", ""), ("G0", "M5\n"), ("G0", "M5\nG0 X9 Y9\n"), ("G1", "")] {
+            let program = program(up, down, travel, end);
+            assert_eq!(strokes(&program), line, "{program}");
+            assert_eq!(notes("a.nc", program.as_bytes()), [note], "{program}");
+        }
+        // By G1, the way home is no sign.
+        let home = program(up, down, "G0", "").replace("G0 X0", "G1 X0");
+        assert_eq!(strokes(&home), line, "{home}");
+        // The other way round, as a laser.
+        for (travel, end) in [("G0", ""), ("G1", ""), ("G1", "M5\n"), ("G0", "M5\nG0 X9 Y9\n")] {
+            let laser = program(down, up, travel, end);
+            assert_eq!(strokes(&laser), line, "{laser}");
+            assert_eq!(notes("a.nc", laser.as_bytes()), [""; 0], "{laser}");
+        }
+    }
+    // A laser that is not switched off at the end, or that burns with several powers.
+    let raster = "M4\nG1 X10 S100 F900\nX20 S0\nX30 S200\n";
+    assert_eq!(strokes(raster).len(), 2);
+    assert_eq!(strokes(raster)[0][0], [0.0, 0.0]);
+    // A program that draws by G0, and travels by both.
+    let rapids = "M5\nG0 X10 Y10\nM3\nG0 X20\nM5\nG1 X0 Y0\n";
+    assert_eq!(strokes(rapids), [[[10.0, 10.0], [20.0, 10.0]]]);
+    assert_eq!(
+        notes("a.nc", rapids.as_bytes()),
+        ["the pen is taken to be down while the spindle is on, although the program moves by G0 \
+          then, and by G1 to G3 while it is off"]
+    );
+}
