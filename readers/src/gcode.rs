@@ -3,6 +3,8 @@
 //! [`Interpreter`] follows the modes of the program and gives its moves, each with the signals that
 //! may lift a pen. [`signals`] decides on the whole program which of them does.
 //!
+//! Where the pen is put down and lifted without a move between is a dot, as `PD;PU;` of HP-GL draws.
+//!
 //! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
 //! reader refuses arcs that do not exist, numbers that it cannot read, a word that is twice in a
 //! line, and what would change where the pen goes in a way that it does not follow: subprograms,
@@ -49,13 +51,19 @@ const DRILLING: u8 = 80;
 
 /// The most points of a program. They take 160 MB.
 const MOST_POINTS: usize = 10_000_000;
+const TOO_MANY: &str = "the program has too many points: leave a part of it out";
 
 fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (a[0] - b[0]).hypot(a[1] - b[1])
 }
 
-/// A text whose lines all end with a line feed, also those that ended with a carriage return alone.
+/// A text whose lines all end with a line feed, also those that ended with a carriage return alone,
+/// without a mark of its encoding.
 fn with_line_ends(text: Cow<'_, str>) -> Cow<'_, str> {
+    let text = match text.strip_prefix('\u{FEFF}') {
+        Some(rest) => Cow::Owned(rest.to_owned()),
+        None => text,
+    };
     let mut ends = text.match_indices('\r').map(|(at, _)| text.as_bytes().get(at + 1));
     match ends.any(|next| next.is_some_and(|next| *next != b'\n')) {
         true => Cow::Owned(text.replace("\r\n", "\n").replace('\r', "\n")),
@@ -80,6 +88,8 @@ struct Interpreter {
     kept_lift: f64,
     height: f64,
     signals: Signals,
+    /// The signals after the line before, the line that set them, and whether a move followed it.
+    held: (Signals, usize, bool),
     moves: Moves,
     /// Whether a height was given as such, and not as a distance.
     has_absolute_heights: bool,
@@ -143,6 +153,7 @@ impl Interpreter {
             kept_lift: 0.0,
             height: 0.0,
             signals: Signals::default(),
+            held: (Signals::default(), 0, true),
             moves: Moves::from([0.0; 2]),
             has_absolute_heights: false,
             extruder: Extruder::default(),
@@ -190,8 +201,29 @@ impl Interpreter {
         machine_moves.into_iter().chain(optional).chain(unknown)
     }
 
-    /// Carries out a line. Returns whether the program continues after it.
+    /// Carries out a line, and notes where the pen may have been put down and lifted without a
+    /// move. Returns whether the program continues after it.
     fn line(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
+        let (before, is_placed) = (self.moves.len(), self.unplaced == [None; 2]);
+        let goes_on = self.obey(text, number)?;
+        let (held, line, has_moved) = self.held;
+        let moves = self.moves.len() > before;
+        self.held = if held.lifts_as(&self.signals) {
+            (self.signals, line, has_moved || moves)
+        } else {
+            if !has_moved && is_placed {
+                if self.moves.touches().len() >= MOST_POINTS {
+                    return Err(TOO_MANY.to_owned());
+                }
+                self.moves.touch(line, held, before);
+            }
+            (self.signals, number, moves)
+        };
+        Ok(goes_on)
+    }
+
+    /// Carries out a line. Returns whether the program continues after it.
+    fn obey(&mut self, text: &str, number: usize) -> Result<bool, RefusalText> {
         self.signals.choice.follow(text);
         let words = match parse(text)? {
             Line::Words(words) => words,
@@ -201,7 +233,7 @@ impl Interpreter {
                 if self.optional.0 == 1 {
                     self.optional.1 = number;
                 }
-                return self.line(&rest, number);
+                return self.obey(&rest, number);
             }
             Line::Pause => {
                 self.changes.pause(number);
@@ -444,7 +476,7 @@ impl Interpreter {
         }
         points.push(to);
         if self.moves.point_count() + points.len() > MOST_POINTS {
-            return Err("the program has too many points: leave a part of it out".to_owned());
+            return Err(TOO_MANY.to_owned());
         }
         let is_rapid = self.motion == 0 || drills;
         self.moves.push(number, is_rapid, self.signals, &points);
@@ -493,6 +525,12 @@ impl Interpreter {
             turn if turn < 1e-9 || distance(from, to) < 1e-9 => TAU,
             turn => turn,
         };
+        // P is the number of turns, in each of which the arc comes to its end. Marlin counts from 0.
+        let turns = value('P').map_or(1.0, |turns| turns.max(1.0));
+        if turns.fract() != 0.0 || value('P').is_some_and(|turns| turns < 0.0) {
+            return Err("P of an arc is a number of turns, so it is whole and not below 0".into());
+        }
+        let turn = turn + (turns - 1.0) * TAU;
         let most = 2.0 * (1.0 - CHORD_ERROR / radius.max(2.0 * CHORD_ERROR)).acos();
         let chords = (turn / most).ceil().max(1.0);
         if self.moves.point_count() as f64 + chords > MOST_POINTS as f64 {
@@ -548,15 +586,21 @@ impl Format for GCode {
             text: line.chars().take(Origin::MOST_SHOWN + 1).collect(),
         };
         let mut lines = text.lines().enumerate();
-        let mut end = None;
+        let (mut end, mut marks) = (None, 0);
         for (index, line) in lines.by_ref() {
             if line.contains('\0') {
                 return Err(ReadError::NotText { origin: origin(index, line), kind: "G-code" });
             }
+            // The first % begins a program, and the second ends it.
+            marks += usize::from(line.trim_start().starts_with('%'));
+            if marks > 1 {
+                end = Some(("the second %", index + 1));
+                break;
+            }
             match interpreter.line(line, index + 1) {
                 Ok(true) => {}
                 Ok(false) => {
-                    end = Some(index + 1);
+                    end = Some(("M2 or M30", index + 1));
                     break;
                 }
                 Err(reason) => return Err(ReadError::Line { origin: origin(index, line), reason }),
@@ -566,7 +610,7 @@ impl Format for GCode {
         let behind = lines.filter(|(_, line)| is_code(line)).count();
         let mut plan = Plan::new(file.clone());
         let Interpreter { moves, signals, has_absolute_heights, .. } = &interpreter;
-        let inked = signals::inked(moves, signals, *has_absolute_heights);
+        let mut inked = signals::inked(moves, signals, *has_absolute_heights);
         let drawn = moves.iter().zip(&inked.draws).filter(|(_, draws)| **draws);
         let place = |(it, _): (Move<'_>, _)| Some((it.line as usize, it.signals.unplaced?));
         let unplaced = drawn.filter_map(place).next();
@@ -592,13 +636,13 @@ impl Format for GCode {
             // Temperatures, fans and the like.
             interpreter.unknown.retain(|word, _| word.starts_with('G'));
         }
-        notes.extend(inked.note);
-        notes.extend(interpreter.changes.draw(&interpreter.moves, inked.draws, &text, &mut plan));
+        notes.extend(inked.note.take());
+        notes.extend(interpreter.changes.draw(&interpreter.moves, inked, &text, &mut plan));
         notes.extend(interpreter.notes());
-        if let Some(end) = end.filter(|_| behind > 0) {
+        if let Some((by, end)) = end.filter(|_| behind > 0) {
             let lines = counted(behind, ["line is", "lines are"]);
             notes.push(format!(
-                "{lines} not drawn, behind the end of the program (M2 or M30 in line {end})"
+                "{lines} not drawn, behind the end of the program ({by} in line {end})"
             ));
         }
         if plan.is_empty() {

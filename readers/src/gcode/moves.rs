@@ -42,8 +42,16 @@ pub(super) struct Move<'m> {
     pub line: u32,
     pub is_rapid: bool,
     pub signals: &'m Signals,
-    /// Where it begins, and the points to which it goes, two at least.
+    /// Where it begins, and the points to which it goes, two at least. A touch has one.
     pub points: &'m [[f64; 2]],
+}
+
+impl Signals {
+    /// Whether what may lift the pen is as with `other`.
+    pub fn lifts_as(&self, other: &Self) -> bool {
+        let of = |it: &Self| (it.servo, it.height, it.spindle, it.power, it.fan, it.coolant);
+        of(self) == of(other) && self.is_parked == other.is_parked
+    }
 }
 
 impl Move<'_> {
@@ -69,14 +77,22 @@ pub(super) struct Moves {
     /// Where the first move begins, and the points to which the moves go.
     points: Vec<[f64; 2]>,
     each: Vec<Kept>,
-    /// The signals that the moves have.
+    /// The places at which the signals changed twice without a move between: there the pen may have
+    /// been put down and lifted. For each its line, the number of the signals between the two
+    /// changes, and that of the moves before.
+    touches: Vec<[u32; 3]>,
+    /// The signals that the moves and touches have.
     signals: Vec<Signals>,
+}
+
+fn short(number: usize) -> u32 {
+    u32::try_from(number).unwrap_or(u32::MAX)
 }
 
 impl Moves {
     /// No moves, from this point.
     pub fn from(point: [f64; 2]) -> Self {
-        Self { points: vec![point], each: Vec::new(), signals: Vec::new() }
+        Self { points: vec![point], each: Vec::new(), touches: Vec::new(), signals: Vec::new() }
     }
 
     /// Where the last move has ended.
@@ -89,18 +105,37 @@ impl Moves {
         self.points.len() - 1
     }
 
-    /// Adds a move to these points, one at least.
-    pub fn push(&mut self, line: usize, is_rapid: bool, signals: Signals, to: &[[f64; 2]]) {
-        let short = |number: usize| u32::try_from(number).unwrap_or(u32::MAX);
-        self.points.extend_from_slice(to);
+    /// The number of these signals.
+    fn number_of(&mut self, signals: Signals) -> u32 {
         let last = self.signals.len().saturating_sub(COMPARED);
         let same = self.signals.iter().skip(last).position(|it| *it == signals);
         let number = same.map_or(self.signals.len(), |position| last + position);
         if same.is_none() {
             self.signals.push(signals);
         }
-        let (signals, end) = (short(number), short(self.point_count()));
+        short(number)
+    }
+
+    /// Adds a move to these points, one at least.
+    pub fn push(&mut self, line: usize, is_rapid: bool, signals: Signals, to: &[[f64; 2]]) {
+        self.points.extend_from_slice(to);
+        let (signals, end) = (self.number_of(signals), short(self.point_count()));
         self.each.push(Kept { line: short(line), is_rapid, signals, end });
+    }
+
+    /// Adds a touch behind so many moves.
+    pub fn touch(&mut self, line: usize, signals: Signals, after: usize) {
+        let touch = [short(line), self.number_of(signals), short(after)];
+        self.touches.push(touch);
+    }
+
+    /// The touches in order, as moves of one point, each with the number of the moves before it.
+    pub fn touches(&self) -> impl ExactSizeIterator<Item = (usize, Move<'_>)> + Clone {
+        self.touches.iter().map(|&[line, signals, after]| {
+            let end = self.each[..after as usize].last().map_or(0, |before| before.end as usize);
+            let (signals, points) = (&self.signals[signals as usize], &self.points[end..=end]);
+            (after as usize, Move { line, is_rapid: false, signals, points })
+        })
     }
 
     /// The number of moves.

@@ -4,7 +4,8 @@
 //! order in which they first draw: that which `M6` has put in, or else, in a program without `M6`,
 //! that of the last `T`. A pause alone, as for a pen that is changed by hand, is told.
 
-use super::Moves;
+use super::moves::Moves;
+use super::signals::Inked;
 use crate::counted;
 use crate::plan::{MOST_PENS, Plan};
 use std::collections::HashMap;
@@ -43,15 +44,9 @@ impl Changes {
         }
     }
 
-    /// Draws the moves that draw, those of one pen that follow each other as one stroke. Says what
-    /// the user should know of the pens.
-    pub fn draw(
-        &self,
-        moves: &Moves,
-        drawn: Vec<bool>,
-        text: &str,
-        plan: &mut Plan,
-    ) -> Vec<String> {
+    /// Draws the moves that draw, those of one pen that follow each other as one stroke, and dots
+    /// where the pen is put down without a move. Says what the user should know of the pens.
+    pub fn draw(&self, moves: &Moves, inked: Inked, text: &str, plan: &mut Plan) -> Vec<String> {
         let is_named = moves.iter().any(|it| it.signals.choice.named.is_some());
         let mut tools: HashMap<Option<i32>, u32> = HashMap::new();
         let mut pen = |choice: Choice| {
@@ -62,7 +57,22 @@ impl Changes {
             let tool = if self.has_m6 { choice.held } else { choice.called };
             *tools.entry(tool).or_insert(next)
         };
-        let drawn = moves.iter().zip(drawn).filter(|(_, draws)| *draws);
+        let mut touches = moves.touches().zip(inked.dots).peekable();
+        let mut moved = (0..).zip(moves.iter().zip(inked.draws)).peekable();
+        let mut is_down = false;
+        let drawn = std::iter::from_fn(|| {
+            let next = moved.peek().map_or(usize::MAX, |(number, _)| *number);
+            let touch = touches.next_if(|((after, _), _)| *after <= next);
+            let (it, draws) = match touch {
+                Some(((_, touch), draws)) => (touch, draws),
+                None => moved.next()?.1,
+            };
+            // At the end of a stroke a touch adds nothing.
+            let is_new = draws && !(is_down && touch.is_some());
+            is_down = draws;
+            Some((it, is_new))
+        });
+        let drawn = drawn.filter(|(_, draws)| *draws);
         let mut pairs = drawn.map(|(it, _)| (it, pen(it.signals.choice))).peekable();
         let mut lines = (1..).zip(text.lines());
         // The lines of the first stroke and of the last.
@@ -76,7 +86,11 @@ impl Changes {
             }
             let line = lines.find(|(number, _)| *number == first.line);
             plan.begin(first.line as usize, line.map_or("", |(_, text)| text));
-            plan.draw(points, None, pen.min(MOST_PENS));
+            let pen = pen.min(MOST_PENS);
+            match points[..] {
+                [dot] => plan.draw_dot(dot, None, pen, pen),
+                _ => plan.draw(points, None, pen),
+            }
             inked = Some([inked.map_or(first.line, |[begin, _]| begin), first.line]);
         }
         drop(pairs);

@@ -10,6 +10,10 @@
 //! must be on, too, for a move to draw. A laser that stays on over G0 does not burn there. But if
 //! any move extrudes, as on a 3D printer, those that do draw, and no others.
 //!
+//! The pen may also go down and up between two moves. It draws a dot there if the signal is at a
+//! level that draws, at least as deep as that of some line. A program without lines draws dots
+//! wherever its signal leaves the level of all moves.
+//!
 //! A signal has levels at which the pen is up and others at which it is down. They are divided
 //! such that G0 moves at the ones and G1 to G3 at the others, as far as possible: a program may
 //! travel at several heights. Without moves by G0, they are divided where the signal goes to and
@@ -52,13 +56,15 @@ const POWER: Signal = Signal { name: "S", high_is_up: None };
 pub(super) struct Inked {
     /// For each move whether it draws.
     pub draws: Vec<bool>,
+    /// For each touch whether the pen is put down there.
+    pub dots: Vec<bool>,
     /// What was taken, if the program does not show when the pen is up.
     pub note: Option<String>,
 }
 
 impl From<Vec<bool>> for Inked {
     fn from(draws: Vec<bool>) -> Self {
-        Self { draws, note: None }
+        Self { draws, ..Self::default() }
     }
 }
 
@@ -76,12 +82,64 @@ pub(super) fn inked(moves: &Moves, end: &Signals, has_absolute_heights: bool) ->
     let mut inked = by_level(moves, |signals| signals.servo, end.servo, SERVO)
         .or_else(|| by_height().map(|inked| while_on(moves, inked)))
         .or_else(|| by_power(moves, end))
+        .or_else(|| dots_alone(moves, end))
         .or_else(|| by_spindle(moves, end))
         .unwrap_or_else(|| by_outputs(moves));
     for (draws, it) in inked.draws.iter_mut().zip(moves.iter()) {
         *draws &= !it.signals.is_parked;
     }
+    for (draws, (_, it)) in inked.dots.iter_mut().zip(moves.touches()) {
+        *draws &= !it.signals.is_parked;
+    }
     inked
+}
+
+/// Whether the pen is put down at the touches: at the levels for which `is_down` holds. The level
+/// that a program sets first, before any move, puts no pen down, because it may be there already.
+fn dots(
+    moves: &Moves,
+    level: impl Fn(&Signals) -> Option<f64>,
+    is_down: impl Fn(f64) -> bool,
+) -> Vec<bool> {
+    let mut before = None;
+    let touches = moves.touches().map(|(after, it)| {
+        let level = level(it.signals);
+        let is_set = after > 0 || before.is_some();
+        before = level.or(before);
+        is_set && level.is_some_and(&is_down)
+    });
+    touches.collect()
+}
+
+/// The level of a signal, if the program has said one.
+type Level = fn(&Signals) -> Option<f64>;
+
+/// A program that draws dots alone. It travels by G0 alone or by G1 alone, and at one level of a
+/// signal, which has another one only between two moves.
+fn dots_alone(moves: &Moves, end: &Signals) -> Option<Inked> {
+    let mut long = moves.iter().filter(|it| it.length() > SAME);
+    let is_rapid = long.clone().next()?.is_rapid;
+    if long.any(|it| it.is_rapid != is_rapid) {
+        return None;
+    }
+    // Whether the pen may be down below the level of the moves, and whether above it.
+    let signals: [(Level, [bool; 2]); 4] = [
+        (|it| it.servo, [true, true]),
+        (|it| it.height, [true, false]),
+        (|it| it.power.filter(|_| is_on(it)), [true, true]),
+        (|it| it.spindle.map(|_| f64::from(u8::from(is_on(it)))), [false, true]),
+    ];
+    signals.into_iter().find_map(|(level, [below, above])| {
+        let up = level(end)?;
+        if moves.iter().any(|it| level(it.signals).is_some_and(|it| (it - up).abs() > SAME)) {
+            return None;
+        }
+        let is_down = |it: f64| below && it < up - SAME || above && it > up + SAME;
+        let dots = dots(moves, level, is_down);
+        let is_after_a_move = moves.touches().zip(&dots).any(|((after, _), it)| *it && after > 0);
+        let draws = vec![false; moves.len()];
+        is_after_a_move.then_some(Inked { draws, dots, note: None })
+    })
 }
 
 /// The line of the first move by G1 to G3 of which it is not known whether the pen is down, and the
@@ -117,6 +175,9 @@ fn while_on(moves: &Moves, mut inked: Inked) -> Inked {
         for (draws, it) in inked.draws.iter_mut().zip(moves.iter()) {
             *draws &= is_on(it.signals);
         }
+        for (draws, (_, it)) in inked.dots.iter_mut().zip(moves.touches()) {
+            *draws &= is_on(it.signals);
+        }
     }
     inked
 }
@@ -146,7 +207,7 @@ fn by_spindle(moves: &Moves, end: &Signals) -> Option<Inked> {
              travels while it is on: if it is down while it is on, let the program draw by G1 and \
              travel by G0, or begin and end with M5",
         )
-    } else if by_rapids && long.any(|(it, draws)| !draws && !it.is_rapid) {
+    } else if by_rapids && long.clone().any(|(it, draws)| !draws && !it.is_rapid) {
         Some(
             "the pen is taken to be down while the spindle is on, although the program moves by G0 \
              then, and by G1 to G3 while it is off",
@@ -154,7 +215,11 @@ fn by_spindle(moves: &Moves, end: &Signals) -> Option<Inked> {
     } else {
         None
     };
-    Some(Inked { draws, note: note.map(str::to_owned) })
+    // Where the spindle is on during travels, too, a laser does not burn.
+    let is_obeyed = is_inverted || long.all(|(it, draws)| *draws || !is_on(it.signals));
+    let level = |it: &Signals| it.spindle.map(|_| f64::from(u8::from(is_on(it) != is_inverted)));
+    let dots = dots(moves, level, |level| is_obeyed && level > 0.0);
+    Some(Inked { draws, dots, note: note.map(str::to_owned) })
 }
 
 /// Whether the pen is up while the spindle is on. Then G0 moves while it is on, and G1 to G3 while
@@ -194,13 +259,15 @@ fn by_outputs(moves: &Moves) -> Inked {
             continue;
         }
         let draws: Vec<bool> = moves.iter().map(|it| is_on(&it)).collect();
+        let level = |it: &Signals| output(it).map(|is_on| f64::from(u8::from(is_on)));
+        let dots = dots(moves, level, |level| level > 0.0);
         let differs = long.clone().any(|it| is_on(&it) == it.is_rapid);
         if !differs {
-            return draws.into();
+            return Inked { draws, dots, note: None };
         }
         if !long.clone().any(|it| is_on(&it) && it.is_rapid) || long.all(|it| it.is_rapid) {
             let note = format!("{name} are taken to lift the pen, because nothing else does");
-            return Inked { draws, note: Some(note) };
+            return Inked { draws, dots, note: Some(note) };
         }
         if moves.iter().any(|it| !is_on(&it) && !it.is_rapid && it.length() > SAME) {
             note.get_or_insert(format!(
@@ -209,7 +276,7 @@ fn by_outputs(moves: &Moves) -> Inked {
             ));
         }
     }
-    Inked { draws: by_motion, note }
+    Inked { draws: by_motion, dots: Vec::new(), note }
 }
 
 /// By the power of a spindle that is not switched off between moves, as servos are set.
@@ -249,8 +316,14 @@ fn by_level(
         false => by_ends(moves, &levels, end, signal)?,
     };
     // Before the first level the pen is up.
-    let draws = levels.iter().map(|level| level.is_some_and(|level| !division.is_up(level)));
-    Some(Inked { draws: draws.collect(), note })
+    let is_down = |level: &Option<f64>| level.is_some_and(|level| !division.is_up(level));
+    let draws: Vec<bool> = levels.iter().map(is_down).collect();
+    // A dot is as deep as something that is drawn: on its way, the pen may stop above the paper.
+    let sign = if division.high_is_up { 1.0 } else { -1.0 };
+    let drawn = levels.iter().zip(&draws).filter(|(_, draws)| **draws);
+    let depth = drawn.filter_map(|(level, _)| *level).map(|it| it * sign).reduce(f64::max);
+    let dots = dots(moves, level, |it| depth.is_some_and(|depth| it * sign <= depth + SAME));
+    Some(Inked { draws, dots, note })
 }
 
 /// The division where the signal goes to and fro most often. The pen is up on the side of the level

@@ -607,6 +607,9 @@ fn what_is_left_out_or_drawn_by_choice_is_told() {
     }
     let behind = "5 lines are not drawn, behind the end of the program (M2 or M30 in line 5)";
     assert_eq!(said(&format!("{line}M2\n%\n{line}M30\n")), behind);
+    let behind = "4 lines are not drawn, behind the end of the program (the second % in line 6)";
+    assert_eq!(said(&format!("%\n{line}%\n{line}%\n")), behind);
+    assert_eq!(strokes(&format!("%\n{line}%\nG1 X50\n")), [[[0.0, 0.0], [9.0, 0.0]]]);
     // As the plotter itself reads them.
     let choice = "G0 X10 Y10\nM3\nG1 X20\n/G1 Y20\n/ / G1 X10\nG1 Y10\nM5\n";
     assert_eq!(strokes(choice), [[[10., 10.], [20., 10.], [20., 20.], [10., 20.], [10., 10.]]]);
@@ -849,4 +852,95 @@ fn a_spindle_may_lift_the_pen_and_that_is_told() {
         ["the pen is taken to be down while the spindle is on, although the program moves by G0 \
           then, and by G1 to G3 while it is off"]
     );
+}
+
+/// As `PD;PU;` of HP-GL does.
+#[test]
+fn where_the_pen_is_put_down_without_a_move_is_a_dot() {
+    let dot = |x: f64, y: f64| vec![[x, y], [x + 0.08, y]];
+    let line = vec![[10.0, 10.0], [20.0, 10.0]];
+    for (up, down) in [
+        ("G0 Z5", "G1 Z-1"),
+        ("G0 Z5", "G0 Z1\nG1 Z-1\nG4 P1\nG0 Z1"),
+        ("M5", "M3 S1000"),
+        ("M5", "M3"),
+        ("M5", "M4\nG4 P0.1\nM8"),
+        ("M280 P0 S10", "M280 P0 S60\nG4 P100"),
+        ("M280 P0 S60", "M280 P0 S10"),
+        ("M3 S30", "M3 S90"),
+        ("M3 S0", "M3 S90"),
+        ("PEN_UP", "PEN_DOWN"),
+    ] {
+        for travel in ["G0", "G1"] {
+            // Dots alone, with the pen up at first or not.
+            let dots = format!(
+                "{travel} X30 Y30\n{down}\n{up}\n{travel} X9 Y5\n{down}\n{up}\n{travel} X0 Y0\n"
+            );
+            let expected = [dot(30.0, 30.0), dot(9.0, 5.0)];
+            for program in [format!("{up}\n{dots}"), dots] {
+                assert_eq!(strokes(&program), expected, "{program}");
+                assert_eq!(notes("a.nc", program.as_bytes()), [""; 0], "{program}");
+            }
+        }
+        // Between lines, of which the first does not begin with a dot, nor ends with one.
+        let lines = format!(
+            "{up}\nG0 X30 Y30\n{down}\n{up}\nG0 X10 Y10\n{down}\nG1 X20\n{up}\nG0 X9 Y5\n\
+             {down}\n{up}\nG0 X0 Y0\n"
+        );
+        assert_eq!(strokes(&lines), [dot(30.0, 30.0), line.clone(), dot(9.0, 5.0)], "{lines}");
+    }
+    assert_eq!(strokes("G0 Z5\nG0 X30 Y30\nG1 Z-1\nG0 Z5\n"), [dot(30.0, 30.0)]);
+    // Pens.
+    let program = "M5\nT1\nG0 X1\nM3\nM5\nT2\nG0 X5\nM3\nM5\nG0 X0\n";
+    assert_eq!(pens(program), [1, 2]);
+}
+
+#[test]
+fn a_level_that_a_program_only_begins_or_ends_with_is_no_dot() {
+    let line = [vec![[10.0, 10.0], [20.0, 10.0]]];
+    let drawn = "G0 X10 Y10\nDOWN\nG1 X20\nUP\nG0 X0 Y0\n";
+    for (up, down) in [("G0 Z5", "G1 Z-1"), ("M5", "M3"), ("M280 P0 S9", "M280 P0 S60")] {
+        for program in [
+            format!("DOWN\nUP\n{drawn}"),
+            format!("UP\n{drawn}DOWN\n"),
+            format!("UP\n{drawn}DOWN\nG28\nM30\n"),
+        ] {
+            let program = program.replace("UP", up).replace("DOWN", down);
+            assert_eq!(strokes(&program), line, "{program}");
+        }
+        // Another change at the end of a line is no dot of another pen.
+        let program = format!("UP\n{}", drawn.replace("X20\n", "X20\nT2\nM8\n"));
+        let program = program.replace("UP", up).replace("DOWN", down);
+        assert_eq!(strokes(&program), line, "{program}");
+    }
+    // A lens that is focused, a laser that is lit over its travels, and an extruder.
+    for program in [
+        "G0 Z2\nG0 Z5\nM4 S0\nG0 X10 Y10\nM3\nG1 X20 S200\nS0\nM5\nG0 Z2\nG0 Z5\nM30\n",
+        "M4\nM8\nM9\nG0 X10 Y10\nG1 X20\nM5\n",
+        "M83\nG0 Z5\nG1 Z1\nG1 Z5\nG0 X10 Y10\nG1 Z1\nG1 X20 E1\nG1 Z5\nG1 Z1\nG1 E1\nG1 Z5\n",
+    ] {
+        assert_eq!(strokes(program), line, "{program}");
+    }
+}
+
+/// The P of LinuxCNC.
+#[test]
+fn an_arc_may_turn_several_times() {
+    for (p, turns) in [("", 0.5), ("P0", 0.5), ("P1", 0.5), ("P2", 1.5), ("P4", 3.5)] {
+        let drawn = strokes(&format!("G0 X10\nG3 X-10 Y0 I-10 J0 {p}\n"));
+        let sides = drawn.concat();
+        let sides = sides.windows(2).map(|it| (it[1][0] - it[0][0]).hypot(it[1][1] - it[0][1]));
+        let length: f64 = sides.sum();
+        assert!((length / (20.0 * std::f64::consts::PI) - turns).abs() < 0.01, "{p}: {length}");
+    }
+    for p in ["P1.5", "P-1", "P1000000000"] {
+        assert!(sent("a.nc", format!("G0 X10\nG3 X-10 Y0 I-10 {p}\n").as_bytes()).is_err(), "{p}");
+    }
+}
+
+#[test]
+fn a_mark_of_the_encoding_is_passed_over() {
+    let program = "\u{FEFF}G21\nG0 X1\nG1 X5\n";
+    assert_eq!(strokes(program), [[[1.0, 0.0], [5.0, 0.0]]]);
+    assert!(sent("known by its beginning", program.as_bytes()).is_ok());
 }
