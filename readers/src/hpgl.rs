@@ -6,6 +6,7 @@
 //! and one that would draw something else than it says is refused, with its line.
 
 use super::arrange::Arrangement;
+use super::counted;
 use super::error::ReadError;
 use super::format::{Contents, Format};
 use super::plan::Plan;
@@ -47,6 +48,39 @@ const STYLES: [&str; 22] = [
 /// once more. Each has parameters, but for the label.
 const WITHOUT_A_WORD: [&str; 6] = ["PB", "RF", "RP", "SG", "SV", "UL"];
 
+/// Instructions that draw whether the pen is up or down, and those that draw while it is down.
+const INKS: [&str; 14] =
+    ["LB", "CI", "EA", "ER", "EW", "RA", "RR", "WG", "FP", "EP", "XT", "YT", "UC", "PE"];
+const MOVES: [&str; 7] = ["PD", "PA", "PR", "AA", "AR", "AT", "RT"];
+
+/// What a file says of its size.
+#[derive(Debug, Default)]
+struct Sizes {
+    /// Whether it sets P1 and P2 (`IP`).
+    has_corners: bool,
+    /// Whether lengths and letters are parts of the distance between them (`SC`, `SR`).
+    is_scaled: bool,
+    has_relative_letters: bool,
+    /// Whether something is drawn so without P1 and P2.
+    is_guessed: bool,
+}
+
+impl Sizes {
+    /// Follows the name of an instruction, and once more its first parameter.
+    fn follow(&mut self, name: &str, has_parameters: bool) {
+        match name {
+            "IN" => *self = Self { is_guessed: self.is_guessed, ..Self::default() },
+            "DF" => (self.is_scaled, self.has_relative_letters) = (false, false),
+            "IP" => self.has_corners = has_parameters,
+            "SC" => self.is_scaled = has_parameters,
+            "SR" => self.has_relative_letters = true,
+            "SI" => self.has_relative_letters = false,
+            "LB" => self.is_guessed |= self.has_relative_letters && !self.has_corners,
+            _ => {}
+        }
+    }
+}
+
 /// The state of reading a file: the interpreter, and the strokes drawn so far.
 #[derive(Debug)]
 struct Reader {
@@ -73,6 +107,14 @@ struct Reader {
     endless_name: Option<usize>,
     /// The byte where the polygon begins that is not complete.
     polygon: Option<usize>,
+    sizes: Sizes,
+    /// Whether the pen is put away (`SP0`), whether it is down, and whether it went somewhere.
+    is_penless: bool,
+    is_down: bool,
+    has_gone: bool,
+    /// The number of instructions that draw nothing, because there is no pen, and the byte at which
+    /// the last of them begins.
+    penless: (usize, usize),
 }
 
 impl Reader {
@@ -93,6 +135,11 @@ impl Reader {
             endless_comment: None,
             endless_name: None,
             polygon: None,
+            sizes: Sizes::default(),
+            is_penless: false,
+            is_down: false,
+            has_gone: false,
+            penless: (0, usize::MAX),
         }
     }
 
@@ -120,9 +167,13 @@ impl Reader {
     fn push(&mut self, byte: u8, begin: usize) -> Result<(), String> {
         self.interpreter.push(byte);
         while let Some(action) = self.interpreter.next_action() {
+            if matches!(action, Action::Line(_) | Action::Dot(_)) {
+                self.sizes.is_guessed |= self.sizes.is_scaled && !self.sizes.has_corners;
+            }
             match action {
                 Action::Initialize => {
                     self.end_stroke();
+                    (self.is_penless, self.is_down) = (false, false);
                     self.interpreter.initialize(self.at, LIMITS);
                 }
                 Action::Line([_, at]) | Action::Dot(at) if self.sheets > 1 => self.at = at,
@@ -134,11 +185,13 @@ impl Reader {
                 Action::Dot(at) => self.begin_at(at, begin),
                 Action::Go(at) => {
                     self.end_stroke();
+                    self.has_gone = true;
                     self.at = at;
                 }
                 Action::Pen(pen) => {
                     self.end_stroke();
                     // Pen 0 puts the pen away, and the interpreter draws nothing then.
+                    self.is_penless = pen == 0;
                     self.pen = if pen > 0 { pen.into() } else { self.pen };
                 }
                 Action::Sheet => {
@@ -272,13 +325,27 @@ fn read(bytes: &[u8]) -> Result<Reader, (usize, String)> {
         }
         if token == Token::Code {
             // The first letter of the next instruction ends this one; the second begins it.
-            if instruction.follow(at, byte) && instruction.is_without_a_word() {
-                *reader.unknown.entry(instruction.name.clone()).or_default() += 1;
+            if instruction.follow(at, byte) {
+                reader.sizes.follow(&instruction.name, instruction.has_parameters);
+                reader.is_down = match instruction.name.as_str() {
+                    "PD" => true,
+                    "PU" => false,
+                    _ => reader.is_down,
+                };
+                if instruction.is_without_a_word() {
+                    *reader.unknown.entry(instruction.name.clone()).or_default() += 1;
+                }
             }
         }
         let begin = instruction.begin;
         let refused = |reason| (begin, reason);
         reader.push(byte, begin).map_err(refused)?;
+        let name = instruction.name.as_str();
+        let draws = INKS.contains(&name) || reader.is_down && MOVES.contains(&name);
+        if std::mem::take(&mut reader.has_gone) && reader.is_penless && draws {
+            let (count, last) = reader.penless;
+            reader.penless = (count + usize::from(last != begin), begin);
+        }
         let is_in_polygon = reader.interpreter.is_in_polygon();
         reader.polygon = is_in_polygon.then(|| reader.polygon.unwrap_or(begin));
         if let Some(error) = reader.interpreter.take_error() {
@@ -341,6 +408,17 @@ impl Format for HpGl {
                 1 => format!("1 instruction {name} is not obeyed"),
                 count => format!("{count} instructions {name} are not obeyed"),
             });
+        }
+        if reader.sizes.is_guessed {
+            notes.push(
+                "the size depends on P1 and P2, which the file does not set (IP): they are taken \
+                 to be those of an HP 7475A with A4 paper"
+                    .to_owned(),
+            );
+        }
+        if reader.penless.0 > 0 {
+            let count = counted(reader.penless.0, ["instruction draws", "instructions draw"]);
+            notes.push(format!("{count} nothing, because SP0 has put the pen away"));
         }
         if reader.sheets > 1 {
             notes.push(format!(

@@ -100,7 +100,10 @@ fn labels_and_fills_are_drawn_as_a_plotter_draws_them() {
     assert_eq!(triangle[1..], ["v 1 1 0", "v 3 1 0", "v 3 3 0", "l 1 2 3 1"]);
     assert!(lines("PU0,0;LBI\x03").len() > 3);
     assert_eq!(lines("PU0,0;LBI;")[..3], lines("PU0,0;LBI;\x03")[..3]);
-    assert_eq!(notes("a.plt", b"PD40,0;SP0;PD80,0;PD;"), Vec::<String>::new());
+    assert_eq!(
+        notes("a.plt", b"PD40,0;SP0;PD80,0;PD;"),
+        ["1 instruction draws nothing, because SP0 has put the pen away"]
+    );
 }
 
 #[test]
@@ -342,4 +345,46 @@ fn patterns_in_mm_and_chords_by_their_distance_are_drawn() {
     let count = |text: &str| lines(text).iter().filter(|line| line.starts_with("v ")).count();
     assert!(count("PU400,400;CT1;CI200,100;") < 6);
     assert_eq!(count("PU400,400;CI200,10;"), 36);
+}
+
+#[test]
+fn a_size_that_depends_on_the_plotter_is_told_once() {
+    let told =
+        ["the size depends on P1 and P2, which the file does not set (IP): they are taken to \
+                 be those of an HP 7475A with A4 paper"];
+    for text in [
+        "IN;SP1;SC0,100,0,100;PU10,10;PD20,20;PU;PD30,30;",
+        "IN;IP0,0,4000,4000;IP;SC0,10,0,10;PU1,1;PD2,1;",
+        "IP0,0,400,400;IN;SC0,10,0,10;PU1,1;PD2,1;",
+        "SR1,2;PU40,40;LBa\x03;PU;LBb\x03",
+    ] {
+        assert_eq!(notes("a.plt", text.as_bytes()), told, "{text}");
+    }
+    for text in [
+        "IN;IP0,0,4000,4000;SC0,10,0,10;PU1,1;PD2,1;",
+        "IN;SC0,10,0,10;IP0,0,4000,4000;PU1,1;PD2,1;",
+        "IN;SC0,10,0,10;PU1,1;SC;PD200,100;",
+        "SR1,2;PU40,40;PD80,40;",
+        "SR1,2;SI;PU40,40;LBa\x03",
+    ] {
+        assert_eq!(notes("a.plt", text.as_bytes()), [""; 0], "{text}");
+    }
+}
+
+#[test]
+fn what_is_drawn_without_a_pen_is_told() {
+    let line = "IN;SP1;PU40,40;PD80,40;PU;SP0;";
+    for end in ["", "PU0,0;", "PA0,0;PU;", "SP2;PD40,80;", "IN;PD9,9;"] {
+        assert_eq!(notes("a.plt", format!("{line}{end}").as_bytes()), [""; 0], "{end}");
+    }
+    for (end, count) in [
+        ("PD400,400;", "1 instruction draws"),
+        ("PD;PA9,9,80,80;", "2 instructions draw"),
+        ("PU400,400;CI40;PU;LBabc\x03PU0,0", "2 instructions draw"),
+    ] {
+        let told = format!("{count} nothing, because SP0 has put the pen away");
+        assert_eq!(notes("a.plt", format!("{line}{end}").as_bytes()), [told.as_str()], "{end}");
+        let error = sent("a.plt", format!("IN;SP0;{end}").as_bytes()).expect_err("nothing");
+        assert!(error.ends_with(&format!("nothing to draw in this HP-GL; {told}")), "{error}");
+    }
 }
