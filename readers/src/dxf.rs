@@ -98,6 +98,10 @@ struct Drawing<'d, 'a> {
     unit: f64,
     /// The number of lines with too many dashes.
     undashed: usize,
+    /// The number of lines whose line type has letters or figures.
+    figured: usize,
+    /// The number of points whose figure has no size in the file.
+    unsized_points: usize,
     /// The number of texts, and of their letters that are not in the plotter's font.
     texts: usize,
     unknown_letters: usize,
@@ -240,7 +244,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 };
                 curve
             }
-            "POINT" => Curve::polyline(&[entity.point(10)?]),
+            "POINT" => return self.point(entity, placement),
             "3DFACE" | "SOLID" | "TRACE" => match outline(entity)? {
                 Some(sides) => {
                     for side in sides {
@@ -264,14 +268,17 @@ impl<'d, 'a> Drawing<'d, 'a> {
                 let [cosine, sine] =
                     if length > 0.0 { [right / length, up / length] } else { [1.0, 0.0] };
                 let turned = Affine([cosine, sine, -sine, cosine, x, y]);
-                let moved = Affine([1.0, 0.0, 0.0, 1.0, -base[0], -base[1]]);
+                let moved = shift([-base[0], -base[1]]);
                 let to_page = placement.to_page.after(turned).after(moved);
                 return self.nested(entity, entities, Placement { to_page, ..placement });
             }
-            // What shows a dimension is a block of its own, where it is.
+            // What shows a dimension is a block.
+            // A copy of a dimension may share the block, moved by a distance in its own plane.
             "DIMENSION" if self.block(entity).is_some() => {
                 let Some((_, entities)) = self.block(entity) else { return Ok(()) };
-                return self.nested(entity, entities, placement);
+                let moved = plane.seen(entity.number(32, 0.0)?).apply(entity.point(12)?);
+                let to_page = placement.to_page.after(shift(moved));
+                return self.nested(entity, entities, Placement { to_page, ..placement });
             }
             "VERTEX" | "SEQEND" => return Ok(()),
             kind => {
@@ -280,6 +287,40 @@ impl<'d, 'a> Drawing<'d, 'a> {
             }
         };
         self.draw(entity, placement, &curve)
+    }
+
+    /// Draws a point with the figure that the file has for all of them: a dot, a cross, or a stroke
+    /// upward, within a circle or a square or both. A cross reaches twice as far as these.
+    fn point(&mut self, entity: &'d Entity<'a>, placement: Placement<'a>) -> Result<(), LineError> {
+        let centre = entity.point(10)?;
+        let (mode, size) = (self.document.point_mode, self.document.point_size);
+        let (kind, frames) = (mode & 7, mode & (32 | 64));
+        if (kind, frames) == (1, 0) {
+            self.skip("POINT, which the file shows as nothing ($PDMODE)", entity.line);
+            return Ok(());
+        }
+        let has_figure = frames != 0 || matches!(kind, 2..=4);
+        self.unsized_points += usize::from(has_figure && size <= 0.0);
+        let has_figure = has_figure && size > 0.0;
+        // In sizes of the figure.
+        let lines: &[&[Point]] = match kind {
+            2 if has_figure => &[&[[-1.0, 0.0], [1.0, 0.0]], &[[0.0, -1.0], [0.0, 1.0]]],
+            3 if has_figure => &[&[[-1.0, -1.0], [1.0, 1.0]], &[[-1.0, 1.0], [1.0, -1.0]]],
+            4 if has_figure => &[&[[0.0, 0.0], [0.0, 0.5]]],
+            1 if has_figure => &[],
+            _ => &[&[[0.0, 0.0]]],
+        };
+        let square: &[Point] = &[[-0.5, -0.5], [0.5, -0.5], [0.5, 0.5], [-0.5, 0.5], [-0.5, -0.5]];
+        let square = (has_figure && frames & 64 != 0).then_some(&square);
+        for line in lines.iter().chain(square) {
+            let at = |[x, y]: &Point| [centre[0] + x * size, centre[1] + y * size];
+            let line: Vec<Point> = line.iter().map(at).collect();
+            self.draw(entity, placement, &Curve::polyline(&line))?;
+        }
+        if has_figure && frames & 32 != 0 {
+            self.draw(entity, placement, &Curve::arc(centre, size / 2.0, 0.0, 360.0))?;
+        }
+        Ok(())
     }
 
     /// Draws a curve of an entity, with its line type.
@@ -294,6 +335,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let line_type = self.document.line_type(entity, placement.layer, placement.line_type);
         let lengths = self.document.dashes(entity, line_type)?;
         let lengths: Vec<f64> = lengths.into_iter().map(|length| length * self.unit).collect();
+        self.figured += usize::from(!lengths.is_empty() && self.document.is_figured(line_type));
         let pieces = match lengths.is_empty() {
             true => vec![points],
             false => match dashed(points.clone(), &lengths) {
@@ -384,8 +426,7 @@ impl<'d, 'a> Drawing<'d, 'a> {
         for row in 0..counts[1].max(1.0) as u32 {
             for column in 0..counts[0].max(1.0) as u32 {
                 let moved = [f64::from(column) * gaps[0], f64::from(row) * gaps[1]];
-                let moved = Affine([1.0, 0.0, 0.0, 1.0, moved[0], moved[1]]);
-                let to_page = placement.to_page.after(turned).after(moved).after(scaled);
+                let to_page = placement.to_page.after(turned).after(shift(moved)).after(scaled);
                 let outline = self.document.clip(entity);
                 if let Some(outline) = outline {
                     let outline = outline.iter().map(|point| to_page.apply(*point)).collect();
@@ -424,6 +465,11 @@ impl<'d, 'a> Drawing<'d, 'a> {
         let line_type = self.document.line_type(entity, placement.layer, placement.line_type);
         self.all(entities, Placement { line_type, depth: placement.depth + 1, ..placement })
     }
+}
+
+/// The map that moves a drawing so far.
+fn shift([x, y]: Point) -> Affine {
+    Affine([1.0, 0.0, 0.0, 1.0, x, y])
 }
 
 /// What is said of a single one of the things that are not drawn. The paths of other drawings stay
@@ -569,6 +615,8 @@ impl Format for Dxf {
             is_of_paper: false,
             unit,
             undashed: 0,
+            figured: 0,
+            unsized_points: 0,
             texts: 0,
             unknown_letters: 0,
             within: Regions::default(),
@@ -611,6 +659,16 @@ impl Format for Dxf {
                 "clipped in the file (XCLIP) in a way that is not obeyed: the whole is drawn",
             ),
             (drawing.undashed, ["line has", "lines have"], "too many dashes: drawn as a full line"),
+            (
+                drawing.figured,
+                ["line has", "lines have"],
+                "letters or figures in the line type, which are not drawn: there are gaps",
+            ),
+            (
+                drawing.unsized_points,
+                ["point is", "points are"],
+                "drawn as a dot: the size of its figure depends on the screen ($PDSIZE)",
+            ),
             (
                 drawing.texts,
                 ["text is", "texts are"],

@@ -94,6 +94,9 @@ pub(super) fn number(pair: Pair<'_>) -> Result<f64, LineError> {
 #[derive(Debug, Default)]
 pub(super) struct Document<'a> {
     pub(super) unit: Option<i64>,
+    /// What a point looks like, and how large its figure is (`$PDMODE`, `$PDSIZE`).
+    pub(super) point_mode: i64,
+    pub(super) point_size: f64,
     /// The layers that are not drawn, in capitals: names do not depend on them.
     hidden: HashSet<String>,
     /// The layers that are shown but not plotted, in capitals.
@@ -104,6 +107,8 @@ pub(super) struct Document<'a> {
     externals: HashMap<String, &'a str>,
     /// The line types that are not continuous: the lengths of dashes, above 0, and gaps, below 0.
     line_types: HashMap<String, Vec<f64>>,
+    /// The line types that have letters or figures in their gaps, in capitals.
+    figured: HashSet<String>,
     /// The line types of layers.
     types_of_layers: HashMap<String, &'a str>,
     /// By what the lengths of line types are multiplied.
@@ -167,6 +172,13 @@ impl<'a> Document<'a> {
     }
 }
 
+impl Document<'_> {
+    /// Whether a line type has letters or figures in its gaps.
+    pub(super) fn is_figured(&self, name: &str) -> bool {
+        self.figured.contains(&name.to_uppercase())
+    }
+}
+
 /// The pairs of a file.
 pub(super) fn pairs(text: &str) -> Result<Vec<Pair<'_>>, LineError> {
     let mut lines = text.lines().enumerate();
@@ -217,14 +229,16 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
         let section = &pairs[start..end];
         match section.get(1).map(Pair::value) {
             Some("HEADER") => {
-                let mut after = section.iter().skip_while(|pair| pair.value() != "$INSUNITS");
-                let unit = after.nth(1).filter(|pair| pair.code == 70);
-                let unit = unit.map(|pair| number_of(*pair)).transpose()?;
+                let variable = |name: &str, code: i32| {
+                    let mut after = section.iter().skip_while(|pair| pair.value() != name);
+                    let value = after.nth(1).filter(|pair| pair.code == code);
+                    value.map(|pair| number(*pair)).transpose()
+                };
+                let unit = variable("$INSUNITS", 70)?.map(|unit| unit as i64);
                 document.unit = unit.or(document.unit);
-                let mut after = section.iter().skip_while(|pair| pair.value() != "$LTSCALE");
-                if let Some(scale) = after.nth(1).filter(|pair| pair.code == 40) {
-                    document.type_scale = number(*scale)?;
-                }
+                document.type_scale = variable("$LTSCALE", 40)?.unwrap_or(document.type_scale);
+                document.point_mode = variable("$PDMODE", 70)?.unwrap_or_default() as i64;
+                document.point_size = variable("$PDSIZE", 40)?.unwrap_or_default();
             }
             Some("TABLES") => {
                 for entry in entities(section) {
@@ -240,6 +254,8 @@ pub(super) fn document<'a>(pairs: &'a [Pair<'a>]) -> Result<Document<'a>, LineEr
                         }
                         "LTYPE" => {
                             let lengths = entry.numbers(49)?;
+                            let is_figured = entry.numbers(74)?.iter().any(|kind| *kind != 0.0);
+                            document.figured.extend(is_figured.then(|| name.clone()));
                             document.line_types.insert(name, lengths);
                         }
                         _ => {}
@@ -339,8 +355,4 @@ fn clip<'a>(
         _ => outline,
     };
     Ok(Some((insertion, corners.into_iter().map(|point| map.apply(point)).collect())))
-}
-
-fn number_of(pair: Pair<'_>) -> Result<i64, LineError> {
-    Ok(number(pair)? as i64)
 }

@@ -674,3 +674,73 @@ fn a_drawing_is_moved_where_its_coordinates_would_be_coarse() {
     let [said] = file.notes() else { panic!("{:?}", file.notes()) };
     assert!(said.ends_with("is moved by -264735000 and -89910500.5 mm"), "{said}");
 }
+
+/// AutoCAD shares the block of dimensions that were copied.
+#[test]
+fn a_dimension_lies_where_it_was_copied_to() {
+    let block = "0 SECTION 2 BLOCKS 0 BLOCK 2 *D1 10 0 20 0 0 LINE 8 0 10 0 20 0 11 10 21 0 0 \
+                 ENDBLK 0 ENDSEC";
+    for (codes, expected) in [
+        ("12 40 22 30", [[40.0, 30.0], [50.0, 30.0]]),
+        ("12 -40 22 30 210 0 220 0 230 -1", [[40.0, 30.0], [50.0, 30.0]]),
+        ("210 0 220 0 230 -1", [[0.0, 0.0], [10.0, 0.0]]),
+        ("10 7 20 7", [[0.0, 0.0], [10.0, 0.0]]),
+    ] {
+        let text = dxf("4", block, &format!("0 DIMENSION 8 0 2 *D1 {codes}"));
+        assert_eq!(strokes(&text), [("pen1".to_owned(), expected.to_vec())], "{codes}");
+    }
+}
+
+#[test]
+fn points_have_the_figure_and_the_size_that_the_file_says() {
+    let of = |mode: i32, size: f64| {
+        let text = dxf("4", "", "0 POINT 8 0 10 30 20 40 0 LINE 8 0 11 5");
+        let header = format!("9\r\n$PDMODE\r\n70\r\n{mode}\r\n9\r\n$PDSIZE\r\n40\r\n{size}\r\n");
+        text.replacen("9\r\n$INSUNITS", &format!("{header}9\r\n$INSUNITS"), 1)
+    };
+    let drawn = |mode, size| {
+        let mut all: Vec<Vec<[f64; 2]>> =
+            strokes(&of(mode, size)).into_iter().map(|(_, points)| points).collect();
+        assert_eq!(all.pop(), Some(vec![[0.0, 0.0], [5.0, 0.0]]));
+        assert_eq!(notes("a.dxf", of(mode, size).as_bytes()), [""; 0], "{mode}");
+        all
+    };
+    let dot = vec![[30.0, 40.0], [30.08, 40.0]];
+    let plus = [vec![[28.0, 40.0], [32.0, 40.0]], vec![[30.0, 38.0], [30.0, 42.0]]];
+    let cross = [vec![[28.0, 38.0], [32.0, 42.0]], vec![[28.0, 42.0], [32.0, 38.0]]];
+    let square = vec![[29.0, 39.0], [31.0, 39.0], [31.0, 41.0], [29.0, 41.0], [29.0, 39.0]];
+    for size in [0.0, 2.0] {
+        assert_eq!(drawn(0, size)[0], dot);
+        assert_eq!(drawn(0, size).len(), 1);
+    }
+    assert_eq!(drawn(2, 2.0), plus);
+    assert_eq!(drawn(3, 2.0), cross);
+    assert_eq!(drawn(4, 2.0), [[[30.0, 40.0], [30.0, 41.0]]]);
+    assert_eq!((drawn(65, 2.0).len(), &drawn(65, 2.0)[0]), (1, &square));
+    assert_eq!(drawn(64, 2.0), [dot, square.clone()]);
+    let all = drawn(98, 2.0);
+    assert_eq!((&all[..2], &all[2]), (&plus[..], &square));
+    let is_on_circle = |[x, y]: &[f64; 2]| ((x - 30.0).hypot(y - 40.0) - 1.0).abs() < 0.006;
+    assert!(all.len() == 4 && all[3].len() > 10 && all[3].iter().all(is_on_circle), "{all:?}");
+    assert_eq!(
+        notes("a.dxf", of(1, 2.0).as_bytes()),
+        ["1 POINT, which the file shows as nothing ($PDMODE) is not drawn (line 24)"]
+    );
+    for size in [0.0, -5.0] {
+        assert_eq!(
+            notes("a.dxf", of(35, size).as_bytes()),
+            ["1 point is drawn as a dot: the size of its figure depends on the screen ($PDSIZE)"]
+        );
+    }
+}
+
+#[test]
+fn letters_and_figures_of_line_types_are_told() {
+    let tables = "0 SECTION 2 TABLES 0 LTYPE 2 GAS 49 5 74 0 49 -3 74 2 75 0 46 1 9 GAS 49 -3 74 0 \
+                  0 LTYPE 2 DASHED 49 2 74 0 49 -1 74 0 0 ENDSEC";
+    let lines = "0 LINE 6 Gas 8 0 11 50 0 LINE 6 DASHED 8 0 11 50 21 9";
+    assert_eq!(
+        notes("a.dxf", dxf("4", tables, lines).as_bytes()),
+        ["1 line has letters or figures in the line type, which are not drawn: there are gaps"]
+    );
+}
