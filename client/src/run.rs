@@ -407,15 +407,16 @@ pub fn read(file: &Path, view: &ViewArgs, quiet: bool) -> Result<(FileJob, Sourc
         note(file, &notes::idle_options(&settings, source.bounds().is_some()));
     }
     let (mut extent, is_plan) = (source.extent(), source.bounds().is_some());
+    let is_flat = is_plan && settings.shows_plans_flat();
     if let Some(by) = source.bounds().and_then(|bounds| settings.moves_plan_by(bounds)) {
         for corner in extent.iter_mut().flatten() {
             corner.iter_mut().zip(by).for_each(|(part, by)| *part += by);
         }
     }
     let is_scaled_by_plotter =
-        is_plan && settings.value("fit") == Some("on") && !view.arrangement().scales_to_page();
+        is_flat && settings.value("fit") == Some("on") && !view.arrangement().scales_to_page();
     let job = Job::new(source, &settings);
-    Ok((job, Source { settings, extent, is_plan, is_scaled_by_plotter }))
+    Ok((job, Source { settings, extent, is_plan, is_flat, is_scaled_by_plotter }))
 }
 
 /// What is known of a file that was read beside its lines.
@@ -425,6 +426,8 @@ pub struct Source {
     /// The least and the greatest coordinates; of a plan at true size, those on the page.
     extent: Option<[[f64; 3]; 2]>,
     is_plan: bool,
+    /// Whether it is a plan that is laid on the page as it is, and not seen in space as a model.
+    is_flat: bool,
     /// Whether the coordinates are those of a plan before the plotter scales it to the page.
     is_scaled_by_plotter: bool,
 }
@@ -436,12 +439,12 @@ impl Source {
             fields.insert("page_mm".to_owned(), page_mm(self.settings.page));
         }
         let Some(corners) = self.extent else { return outcome };
-        let axes = if self.is_plan { 2 } else { 3 };
+        let axes = if self.is_flat { 2 } else { 3 };
         let [low, high] = corners.map(|corner| {
             let part = |part: &f64| ((part * 1e6).round() / 1e6 + 0.0).to_string();
             corner.iter().take(axes).map(part).collect::<Vec<_>>().join(", ")
         });
-        let (what, unit) = if self.is_plan { ("drawing", " mm") } else { ("model", "") };
+        let (what, unit) = if self.is_flat { ("drawing", " mm") } else { ("model", "") };
         // What is drawn of a solid lies elsewhere, of course.
         let before =
             if self.is_scaled_by_plotter { "before it is fitted to the page, " } else { "" };

@@ -33,6 +33,11 @@ impl Settings {
         options
     }
 
+    /// Whether a plan is laid on the page as it is, and not drawn as a model that is seen in space.
+    pub fn shows_plans_flat(&self) -> bool {
+        self.options().shows_plans_flat()
+    }
+
     /// The margin, and the height that the title takes below the drawing, in mm.
     fn margin_and_foot(&self) -> Option<[f64; 2]> {
         let foot = self.options().sheet().foot;

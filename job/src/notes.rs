@@ -13,8 +13,15 @@ use penup_readers::words::{MOSTLY_FLAT, PROBABLY_Y_UP};
 /// The length in mm below which nothing is drawn: about a step of the usual motors.
 const SMALLEST: f64 = 0.0125;
 
+/// What is told of a plan that is not laid on the page as it is.
+const SEEN_IN_SPACE: &str = "the drawing lies flat, but a view of it is chosen, so it is drawn as a \
+                             model in space, not at true size";
+
 /// What is told of a plan with these `bounds`, its least and greatest coordinates in mm.
 pub fn of_plan(settings: &Settings, bounds: [[f64; 2]; 2]) -> Vec<String> {
+    if !settings.shows_plans_flat() {
+        return vec![SEEN_IN_SPACE.to_owned()];
+    }
     let told =
         [settings.moves_plan(bounds), settings.fits_turned(bounds), too_small(settings, bounds)];
     told.into_iter().flatten().collect()
@@ -159,7 +166,7 @@ pub fn idle_options(settings: &Settings, is_plan: bool) -> Vec<String> {
 
 #[cfg(test)]
 mod tests {
-    use super::idle_options;
+    use super::{SEEN_IN_SPACE, idle_options, of_plan};
     use crate::Settings;
     use penup_readers::page::A4;
 
@@ -203,5 +210,20 @@ mod tests {
         let angles = "--angles alone says where the camera looks, so nothing is changed by --at";
         assert_eq!(told(&with("angles", "10,20,30"), true), [scaled, angles, no_title]);
         assert!(told(&[], false).is_empty() && told(&[], true).is_empty());
+    }
+    #[test]
+    fn a_plan_that_is_seen_in_space_is_told_to_be_no_longer_at_true_size() {
+        let told = |name, value: &str| {
+            let values = vec![("fit", "off".to_owned()), (name, value.to_owned())];
+            of_plan(&Settings { page: A4, values }, [[20.0, 20.0], [60.0, 50.0]])
+        };
+        for (name, value) in
+            [("eye", "0,0,9"), ("projection", "isometric"), ("see", "edges"), ("angles", "1,2,3")]
+        {
+            assert_eq!(told(name, value), [SEEN_IN_SPACE], "{name}");
+        }
+        for (name, value) in [("at", "1,2,3"), ("projection", "cabinet"), ("see", "wire")] {
+            assert_eq!(told(name, value), [""; 0], "{name}");
+        }
     }
 }
