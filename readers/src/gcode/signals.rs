@@ -71,7 +71,7 @@ impl From<Vec<bool>> for Inked {
 /// Decides for each move whether it draws. `end` has the signals at the end of the program, and
 /// `has_absolute_heights` says whether a Z was given as a height.
 pub(super) fn inked(moves: &Moves, end: &Signals, has_absolute_heights: bool) -> Inked {
-    let height = |signals: &Signals| signals.height.filter(|_| !signals.is_parked);
+    let height: Level = |signals| signals.height.filter(|_| !signals.is_parked);
     let by_height = || match !has_absolute_heights && drift(moves) {
         true => by_level(moves, |signals| signals.growth, end.growth, HEIGHT),
         false => by_level(moves, height, height(end), HEIGHT),
@@ -98,15 +98,15 @@ pub(super) fn inked(moves: &Moves, end: &Signals, has_absolute_heights: bool) ->
 /// that a program sets first, before any move, puts no pen down, because it may be there already.
 fn dots(
     moves: &Moves,
-    level: impl Fn(&Signals) -> Option<f64>,
-    is_down: impl Fn(f64) -> bool,
+    level: &dyn Fn(&Signals) -> Option<f64>,
+    is_down: &dyn Fn(f64) -> bool,
 ) -> Vec<bool> {
     let mut before = None;
     let touches = moves.touches().map(|(after, it)| {
         let level = level(it.signals);
         let is_set = after > 0 || before.is_some();
         before = level.or(before);
-        is_set && level.is_some_and(&is_down)
+        is_set && level.is_some_and(is_down)
     });
     touches.collect()
 }
@@ -135,7 +135,7 @@ fn dots_alone(moves: &Moves, end: &Signals) -> Option<Inked> {
             return None;
         }
         let is_down = |it: f64| below && it < up - SAME || above && it > up + SAME;
-        let dots = dots(moves, level, is_down);
+        let dots = dots(moves, &level, &is_down);
         let is_after_a_move = moves.touches().zip(&dots).any(|((after, _), it)| *it && after > 0);
         let draws = vec![false; moves.len()];
         is_after_a_move.then_some(Inked { draws, dots, note: None })
@@ -218,7 +218,7 @@ fn by_spindle(moves: &Moves, end: &Signals) -> Option<Inked> {
     // Where the spindle is on during travels, too, a laser does not burn.
     let is_obeyed = is_inverted || long.all(|(it, draws)| *draws || !is_on(it.signals));
     let level = |it: &Signals| it.spindle.map(|_| f64::from(u8::from(is_on(it) != is_inverted)));
-    let dots = dots(moves, level, |level| is_obeyed && level > 0.0);
+    let dots = dots(moves, &level, &|level| is_obeyed && level > 0.0);
     Some(Inked { draws, dots, note: note.map(str::to_owned) })
 }
 
@@ -260,7 +260,7 @@ fn by_outputs(moves: &Moves) -> Inked {
         }
         let draws: Vec<bool> = moves.iter().map(|it| is_on(&it)).collect();
         let level = |it: &Signals| output(it).map(|is_on| f64::from(u8::from(is_on)));
-        let dots = dots(moves, level, |level| level > 0.0);
+        let dots = dots(moves, &level, &|level| level > 0.0);
         let differs = long.clone().any(|it| is_on(&it) == it.is_rapid);
         if !differs {
             return Inked { draws, dots, note: None };
@@ -287,7 +287,7 @@ fn by_power(moves: &Moves, end: &Signals) -> Option<Inked> {
     if !between.clone().all(|it| is_on(it.signals)) {
         return None;
     }
-    let power = |signals: &Signals| signals.power.filter(|_| is_on(signals));
+    let power: Level = |signals| signals.power.filter(|_| is_on(signals));
     let inked = by_level(moves, power, end.power, POWER)?;
     // During G0 a laser does not burn, and during G1 to G3 it does, whatever its power. A pen is up
     // during the one and down during the others, unless it travels by G1 alone.
@@ -300,12 +300,7 @@ fn by_power(moves: &Moves, end: &Signals) -> Option<Inked> {
 
 /// Decides by the levels of a signal, of which `end` is that at the end of the program; `None` if
 /// it does not change.
-fn by_level(
-    moves: &Moves,
-    level: impl Fn(&Signals) -> Option<f64>,
-    end: Option<f64>,
-    signal: Signal,
-) -> Option<Inked> {
+fn by_level(moves: &Moves, level: Level, end: Option<f64>, signal: Signal) -> Option<Inked> {
     let levels: Vec<Option<f64>> = moves.iter().map(|it| level(it.signals)).collect();
     let has = |is_rapid: bool| {
         moves.iter().zip(&levels).any(|(it, level)| it.is_rapid == is_rapid && level.is_some())
@@ -322,7 +317,7 @@ fn by_level(
     let sign = if division.high_is_up { 1.0 } else { -1.0 };
     let drawn = levels.iter().zip(&draws).filter(|(_, draws)| **draws);
     let depth = drawn.filter_map(|(level, _)| *level).map(|it| it * sign).reduce(f64::max);
-    let dots = dots(moves, level, |it| depth.is_some_and(|depth| it * sign <= depth + SAME));
+    let dots = dots(moves, &level, &|it| depth.is_some_and(|depth| it * sign <= depth + SAME));
     Some(Inked { draws, dots, note })
 }
 
