@@ -3,7 +3,8 @@
 //! [`Interpreter`] follows the modes of the program and gives its moves, each with the signals that
 //! may lift a pen. [`signals`] decides on the whole program which of them does.
 //!
-//! Where the pen is put down and lifted without a move between is a dot, as `PD;PU;` of HP-GL draws.
+//! Where the pen is put down and lifted without a move between, it draws a dot, as by `PD;PU;` of
+//! HP-GL.
 //!
 //! Arcs become chords within [`CHORD_ERROR`]. Words without a meaning for a plan are counted. The
 //! reader refuses arcs that do not exist, numbers that it cannot read, a word that is twice in a
