@@ -14,8 +14,8 @@ use penup_readers::words::{MOSTLY_FLAT, PROBABLY_Y_UP};
 const SMALLEST: f64 = 0.0125;
 
 /// What is told of a plan that is not laid on the page as it is.
-const SEEN_IN_SPACE: &str = "the drawing lies flat, but a view of it is chosen, so it is drawn as a \
-                             model in space, not at true size";
+const SEEN_IN_SPACE: &str = "the drawing lies flat, but a view of it is chosen, so it is drawn as \
+                             a model in space, not at true size";
 
 /// What is told of a plan with these `bounds`, its least and greatest coordinates in mm.
 pub fn of_plan(settings: &Settings, bounds: [[f64; 2]; 2]) -> Vec<String> {

@@ -526,7 +526,7 @@ impl Interpreter {
             turn if turn < 1e-9 || distance(from, to) < 1e-9 => TAU,
             turn => turn,
         };
-        // P is the number of turns, in each of which the arc comes to its end. Marlin counts from 0.
+        // P is the number of turns, each of which comes to the end of the arc. 0 counts as 1.
         let turns = value('P').map_or(1.0, |turns| turns.max(1.0));
         if turns.fract() != 0.0 || value('P').is_some_and(|turns| turns < 0.0) {
             return Err("P of an arc is a number of turns, so it is whole and not below 0".into());

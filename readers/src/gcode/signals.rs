@@ -5,8 +5,8 @@
 //! laser (`M3`, `M4`, `M5`), which with the power 0 does not draw, nor before the first power if
 //! the program says one, unless the program shows that the pen is up while it is on; the fan
 //! (`M106`, `M107`) or the coolant (`M7` to `M9`), on whose pin some have a laser or a pen, if
-//! nothing moves by G0 while it is on; or, if none of these changes between moves, G1 to G3 draw and
-//! G0 does not.
+//! nothing moves by G0 while it is on; or, if none of these changes between moves, G1 to G3 draw
+//! and G0 does not.
 //! A height that only sets the focus of a laser is down also while the laser is off: then the laser
 //! must be on, too, for a move to draw. A laser that stays on over G0 does not burn there. But if
 //! any move extrudes, as on a 3D printer, those that do draw, and no others.
