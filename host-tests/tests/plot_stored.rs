@@ -309,3 +309,37 @@ fn what_is_too_dense_for_the_memory_is_said() {
     assert!(heard.contains(" are needed in one place where there is room for "), "{heard}");
     assert_eq!(bench.plotter.machine().state(), State::Idle);
 }
+
+/// The button ends the move of a model to flash, which takes many sectors. The model stays in
+/// memory, and goes to flash once more when the line that did not fit comes again.
+#[test]
+fn a_move_to_flash_that_is_given_up_leaves_the_model_in_memory() {
+    let lines = scene("lattice3.obj", &[]);
+    let mut whole = small(20, 60, 1500);
+    order(&mut whole, &lines);
+    finish(&mut whole);
+    let (mut given_up, mut moved) = (0, 0);
+    for from in 0..40 {
+        let mut bench = small(20, 60, 1500);
+        let fitting = lines.iter().take_while(|line| line.starts_with('v')).take(20);
+        let count = order(&mut bench, &fitting.cloned().collect::<Vec<_>>()).lines().count();
+        // The contacts are read once in each turn, and before each change of flash.
+        bench.board.press_stop_during(from..from + 1);
+        let answer = bench.say(&format!("{}\n", lines[count]));
+        bench.board.press_stop_during(0..0);
+        bench.finish();
+        bench.say("$X\n");
+        bench.finish();
+        if answer.contains("the model goes to flash") {
+            moved += 1;
+            continue;
+        }
+        given_up += 1;
+        assert!(bench.say("$model\n").contains("vertices 20 of 20"), "{from}: {answer}");
+        let heard = order(&mut bench, &lines[count..]);
+        assert!(heard.contains("the model goes to flash"), "{heard}");
+        finish(&mut bench);
+        assert_eq!(only_one(&places(&whole), &places(&bench)).0, 0, "{from}");
+    }
+    assert!(given_up > 0 && moved > 0, "{given_up} {moved}");
+}

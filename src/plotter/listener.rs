@@ -81,6 +81,9 @@ pub(super) struct Listener<'b, B: Board> {
     inverted: u8,
     /// The stage of the computation that status reports tell.
     pub(super) stage: Stage,
+    /// The state that status reports tell if nothing is computed, but flash is written.
+    #[cfg(feature = "tiles")]
+    pub(super) resting: Option<&'static str>,
     /// The hold, the pause or the emergency stop that was requested meanwhile. It is carried out
     /// when the computation ends.
     pub(super) requests: RealTime,
@@ -101,6 +104,8 @@ impl<'b, B: Board> Listener<'b, B> {
             inches,
             inverted,
             stage: Stage::View,
+            #[cfg(feature = "tiles")]
+            resting: None,
             requests: RealTime::default(),
             overrides: OverrideChange::default(),
             #[cfg(feature = "early-ink")]
@@ -129,10 +134,18 @@ impl<B: Board> Cancel for Listener<'_, B> {
                 Stage::Visibility => "visibility",
                 Stage::Order => "order",
             };
+            #[cfg(feature = "tiles")]
+            let resting = self.resting;
+            #[cfg(not(feature = "tiles"))]
+            let resting = None;
             let mut reply = Reply(self.board);
-            reply.part(format_args!("<Run|MPos:"));
+            reply.part(format_args!("<{}|MPos:", resting.unwrap_or("Run")));
             reply.coordinates(self.position, self.inches);
-            reply.line(format_args!("|FS:0,0|Stage:{stage}>"));
+            if resting.is_none() {
+                reply.line(format_args!("|FS:0,0|Stage:{stage}>"));
+            } else {
+                reply.line(format_args!("|FS:0,0>"));
+            }
         }
         // The button stops what is computed, too, also if it is released again before the end.
         if self.board.contacts().pressed(self.inverted).stop {

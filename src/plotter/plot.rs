@@ -151,7 +151,7 @@ impl<I: Index> Inner<'_, I> {
     }
 
     /// Begins to listen while a job is computed.
-    fn listener<'b, B: Board>(&self, board: &'b mut B) -> Listener<'b, B> {
+    pub(super) fn listener<'b, B: Board>(&self, board: &'b mut B) -> Listener<'b, B> {
         let [x, y] = self.machine.position_mm();
         let position = [x, y, self.program.z()];
         Listener::new(board, position, self.in_inches(), self.machine.inverted_contacts())

@@ -14,13 +14,16 @@ mod serve;
 pub(super) use parts::Parts;
 pub(super) use serve::PartsProgress;
 
+use super::listener::Listener;
 use super::reply::Reply;
 use super::{Board, Inner};
 use crate::index::Index;
 use crate::machine::State;
 use crate::model::{StoredModel, Upload, UploadError};
-use crate::protocol::{Command, CommandError, StoredModelError};
-use crate::storage::area::{Area, AreaFlash};
+use crate::protocol::{Command, CommandError, RealTime, StoredModelError};
+use crate::stage::Cancel as _;
+use crate::storage::PAGE_BYTES;
+use crate::storage::area::{Area, AreaFlash, NotWritten};
 
 /// The state of the model in flash.
 #[derive(Debug, Default)]
@@ -150,14 +153,31 @@ impl<I: Index> Inner<'_, I> {
         model.corner_count() + more + RUN <= model.corner_limit()
     }
 
-    /// Moves the model to flash, because its next part does not fit in memory.
+    /// Moves the model to flash, because its next part does not fit in memory. The user is answered
+    /// meanwhile. A model that is given up before all of it is there stays in memory.
     #[inline(never)] // Called seldom: inlined, it would only fill the cache.
     fn move_to_flash<B: Board>(&mut self, board: &mut B) -> Result<(), CommandError> {
         if !is_at_rest(self.machine.state(), self.machine.is_stopped()) {
             return Err(CommandError::Busy);
         }
-        let (area, flash) = flash_of(board)?;
-        self.large = FlashModel::Upload(Upload::begin(&self.model, area, flash)?);
+        let (area, _) = flash_of(board)?;
+        let mut listener = self.listener(board);
+        listener.resting = Some(match self.machine.state() {
+            State::Alarm(_) => "Alarm",
+            State::Check => "Check",
+            State::Sleep => "Sleep",
+            _ => "Idle",
+        });
+        let mut flash = ListeningFlash { listener: &mut listener, is_aborted: false };
+        let begun = Upload::begin(&self.model, area, &mut flash);
+        let is_aborted = flash.is_aborted;
+        let Listener { requests, overrides, .. } = listener;
+        self.change_overrides(overrides);
+        if is_aborted {
+            self.act(requests.only(RealTime::EMERGENCY));
+            return Err(CommandError::Aborted);
+        }
+        self.large = FlashModel::Upload(begun?);
         self.copy_words = 0;
         self.model.clear();
         Reply(board).line(format_args!(
@@ -227,6 +247,36 @@ impl<I: Index> Inner<'_, I> {
             model.corner_count()
         ));
         Some(model.checksum())
+    }
+}
+
+/// The flash for models, which listens to the user before each change: a sector may take 400 ms,
+/// and a model that goes to flash takes many.
+struct ListeningFlash<'l, 'b, B: Board> {
+    /// What answers the user meanwhile.
+    listener: &'l mut Listener<'b, B>,
+    /// Whether the user has given up what is written.
+    is_aborted: bool,
+}
+
+impl<B: Board> ListeningFlash<'_, '_, B> {
+    /// Listens to the user, and returns the flash.
+    fn listen(&mut self) -> Result<&mut dyn AreaFlash, NotWritten> {
+        self.is_aborted = self.is_aborted || self.listener.check().is_err();
+        if self.is_aborted {
+            return Err(NotWritten);
+        }
+        self.listener.board.model_flash().map(|(_, flash)| flash).ok_or(NotWritten)
+    }
+}
+
+impl<B: Board> AreaFlash for ListeningFlash<'_, '_, B> {
+    fn erase_sector(&mut self, at: usize) -> Result<(), NotWritten> {
+        self.listen()?.erase_sector(at)
+    }
+
+    fn write_page(&mut self, at: usize, page: &[u8; PAGE_BYTES]) -> Result<(), NotWritten> {
+        self.listen()?.write_page(at, page)
     }
 }
 
