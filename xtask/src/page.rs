@@ -15,17 +15,23 @@ use crate::table::LM3S6965;
 /// needed.
 const PROGRAMS: [&str; 2] = ["penup-page", "penup-page-files"];
 
+/// The level at which the library is compiled for the other program. Only the first one draws
+/// frames, and must be fast; this level makes the readers the smallest.
+const LEVEL_OF_READERS: &str = r#"profile.browser.package.penup.opt-level="s""#;
+
 /// Builds the page into `target/page`.
 pub fn build() -> Result<()> {
     set_up::target(WEB_ASSEMBLY)?;
     let root = crate::root();
     let built = root.join("target").join(WEB_ASSEMBLY).join("browser");
-    for package in PROGRAMS {
+    let [page, readers] = PROGRAMS;
+    for (package, level) in [(page, &[][..]), (readers, &["--config", LEVEL_OF_READERS])] {
         // Together, the first would have the features of the second.
         run(cargo()
             .current_dir(&root)
             .args(["build", "--quiet", "--profile=browser", "--target", WEB_ASSEMBLY])
-            .args(["--package", package]))?;
+            .args(["--package", package])
+            .args(level))?;
     }
     // What builds the page is a workspace of its own, so that no other build compiles it.
     let builder = root.join("page/builder/Cargo.toml");
