@@ -1,5 +1,5 @@
-//! Tests that the main loop of the Raspberry Pi Pico looks at what is asked in real time as often as
-//! docs/reliability.md says, whatever input it works on. The heaviest jobs are in `stack`.
+//! Tests that the main loop of the Raspberry Pi Pico looks at what is asked in real time as often
+//! as docs/reliability.md says, whatever input it works on. The heaviest jobs are in `stack`.
 #![cfg(feature = "emulator")]
 
 use penup_client::emulator::{CallGaps, EmulatedBoard as _, Pico, image_path};

@@ -21,8 +21,8 @@ const FAULTS: u32 = 3;
 /// What is added to the number of faults when it is kept, because memory holds arbitrary data after
 /// a loss of power.
 const KEPT: u32 = 0x6661_7500;
-/// The bit that is set in the kept word when the start after the fault was told. A reset for another
-/// reason is none after a fault.
+/// The bit that is set in the kept word when the start after the fault was told. A reset for
+/// another reason is none after a fault.
 const TOLD: u32 = 0x80;
 
 // SAFETY: the memory map (`boards/lm3s6965.x`) defines this symbol, as the address of a word of RAM
