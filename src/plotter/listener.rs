@@ -79,11 +79,10 @@ pub(super) struct Listener<'b, B: Board> {
     pub(super) inches: bool,
     /// Which contacts are closed when they are not pressed.
     inverted: u8,
-    /// The stage of the computation that status reports tell.
-    pub(super) stage: Stage,
-    /// The state that status reports tell if nothing is computed, but flash is written.
-    #[cfg(feature = "tiles")]
-    pub(super) resting: Option<&'static str>,
+    /// The state of the machine that status reports tell.
+    pub(super) state: &'static str,
+    /// The stage of the computation that they tell; `None` if flash is written instead.
+    pub(super) stage: Option<Stage>,
     /// The hold, the pause or the emergency stop that was requested meanwhile. It is carried out
     /// when the computation ends.
     pub(super) requests: RealTime,
@@ -103,9 +102,8 @@ impl<'b, B: Board> Listener<'b, B> {
             position,
             inches,
             inverted,
-            stage: Stage::View,
-            #[cfg(feature = "tiles")]
-            resting: None,
+            state: "Run",
+            stage: Some(Stage::View),
             requests: RealTime::default(),
             overrides: OverrideChange::default(),
             #[cfg(feature = "early-ink")]
@@ -130,22 +128,15 @@ impl<B: Board> Cancel for Listener<'_, B> {
                 self.has_answered = true;
             }
             let stage = match self.stage {
-                Stage::View => "view",
-                Stage::Visibility => "visibility",
-                Stage::Order => "order",
+                Some(Stage::View) => "|Stage:view",
+                Some(Stage::Visibility) => "|Stage:visibility",
+                Some(Stage::Order) => "|Stage:order",
+                None => "",
             };
-            #[cfg(feature = "tiles")]
-            let resting = self.resting;
-            #[cfg(not(feature = "tiles"))]
-            let resting = None;
             let mut reply = Reply(self.board);
-            reply.part(format_args!("<{}|MPos:", resting.unwrap_or("Run")));
+            reply.part(format_args!("<{}|MPos:", self.state));
             reply.coordinates(self.position, self.inches);
-            if resting.is_none() {
-                reply.line(format_args!("|FS:0,0|Stage:{stage}>"));
-            } else {
-                reply.line(format_args!("|FS:0,0>"));
-            }
+            reply.line(format_args!("|FS:0,0{stage}>"));
         }
         // The button stops what is computed, too, also if it is released again before the end.
         if self.board.contacts().pressed(self.inverted).stop {
@@ -156,6 +147,6 @@ impl<B: Board> Cancel for Listener<'_, B> {
     }
 
     fn enter(&mut self, stage: Stage) {
-        self.stage = stage;
+        self.stage = Some(stage);
     }
 }

@@ -162,12 +162,13 @@ impl<I: Index> Inner<'_, I> {
         }
         let (area, _) = flash_of(board)?;
         let mut listener = self.listener(board);
-        listener.resting = Some(match self.machine.state() {
+        listener.stage = None;
+        listener.state = match self.machine.state() {
             State::Alarm(_) => "Alarm",
             State::Check => "Check",
             State::Sleep => "Sleep",
             _ => "Idle",
-        });
+        };
         let mut flash = ListeningFlash { listener: &mut listener, is_aborted: false };
         let begun = Upload::begin(&self.model, area, &mut flash);
         let is_aborted = flash.is_aborted;
