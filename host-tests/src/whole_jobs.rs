@@ -63,6 +63,20 @@ impl Bench {
         self.heard()
     }
 
+    /// Sends lines, each of which must be accepted. Returns all that was answered.
+    ///
+    /// # Panics
+    /// A line is refused.
+    pub fn order(&mut self, lines: &[String]) -> String {
+        let mut all = String::new();
+        for line in lines {
+            let answer = self.say(&format!("{line}\n"));
+            assert!(answer.ends_with("ok\n"), "{line}: {answer}");
+            all += &answer;
+        }
+        all
+    }
+
     /// Returns the output since the last call.
     pub fn heard(&mut self) -> String {
         String::from_utf8_lossy(&self.board.take_sent()).replace("\r\n", "\n")

@@ -26,17 +26,6 @@ fn small(vertices: usize, corners: usize, words: usize) -> Bench {
     bench
 }
 
-/// Sends lines, each of which must be accepted. Returns all that was answered.
-fn order(bench: &mut Bench, lines: &[String]) -> String {
-    let mut all = String::new();
-    for line in lines {
-        let answer = bench.say(&format!("{line}\n"));
-        assert!(answer.ends_with("ok\n"), "{line}: {answer}");
-        all += &answer;
-    }
-    all
-}
-
 /// Runs until nothing moves any more, and puts in each pen that the machine asks for. Returns
 /// these.
 fn finish(bench: &mut Bench) -> Vec<u8> {
@@ -58,10 +47,10 @@ fn scene(name: &str, options: &[&str]) -> Vec<String> {
 /// The positions that a board with enough memory inks, and one that has little.
 fn both(lines: &[String], words: usize) -> [Vec<[f64; 2]>; 2] {
     let mut whole = Bench::new();
-    order(&mut whole, lines);
+    whole.order(lines);
     finish(&mut whole);
     let mut parts = small(20, 60, words);
-    let heard = order(&mut parts, lines);
+    let heard = parts.order(lines);
     assert!(heard.contains("the model goes to flash"), "{heard}");
     assert!(heard.contains("part by part"), "{heard}");
     let pens = finish(&mut parts);
@@ -121,7 +110,7 @@ fn dots_and_the_title_may_lie_elsewhere() {
 fn uploaded(words: usize, options: &[&str]) -> Bench {
     let mut bench = small(20, 60, words);
     let lines = scene("lattice3.obj", options);
-    order(&mut bench, &lines[..lines.len() - 1]);
+    bench.order(&lines[..lines.len() - 1]);
     bench
 }
 
@@ -140,7 +129,7 @@ fn the_checksum_is_that_of_the_model_in_memory() {
     };
     let mut whole = Bench::new();
     let lines = scene("lattice3.obj", &[]);
-    order(&mut whole, &lines[..lines.len() - 1]);
+    whole.order(&lines[..lines.len() - 1]);
     let mut stored = uploaded(4000, &[]);
     let answer = stored.say("$model\n");
     assert_eq!(checksum(&answer), checksum(&whole.say("$model\n")));
@@ -160,9 +149,9 @@ fn what_a_model_in_flash_cannot_do_is_refused_by_name() {
     assert_eq!(refused(&mut bench, "f 1 1 2"), 112);
     // It is still coming.
     assert!(bench.say("v 1 2 3\n").ends_with("ok\n"));
-    order(&mut bench, &["$see=wire".to_owned()]);
+    bench.order(&["$see=wire".to_owned()]);
     assert_eq!(refused(&mut bench, "$plot"), 193);
-    order(&mut bench, &["$see=faces".to_owned(), "$model".to_owned()]);
+    bench.order(&["$see=faces".to_owned(), "$model".to_owned()]);
     // Now it is whole.
     for line in ["v 1 2 3", "f 1 2 3", "l 1 2", "usemtl 2", "deg 3", "$undo"] {
         assert_eq!(refused(&mut bench, line), 191, "{line}");
@@ -177,7 +166,7 @@ fn what_a_model_in_flash_cannot_do_is_refused_by_name() {
         ["cstype bspline", "deg 2", "curv 0 1 1 2 3", "parm u 0 0 0 1 1 1", "end"]
             .map(str::to_owned),
     );
-    order(&mut bench, &lines);
+    bench.order(&lines);
     assert_eq!(refused(&mut bench, "v 9 9 9"), 192);
     assert!(bench.say("$model\n").contains("curves 1"));
 }
@@ -211,7 +200,7 @@ fn a_model_stays_through_a_loss_of_power() {
     assert!(!again.heard().contains("flash keeps a model"));
 
     let mut bench = uploaded(4000, &[]);
-    order(&mut bench, &["$plot".to_owned()]);
+    bench.order(&["$plot".to_owned()]);
     finish(&mut bench);
     let drawn = places(&bench);
     let flash = bench.board.set_model_flash(None);
@@ -222,7 +211,7 @@ fn a_model_stays_through_a_loss_of_power() {
     assert!(heard.contains("[MSG:the flash keeps a model of 216 vertices"), "{heard}");
     let mut lines: Vec<_> = QUICK.map(str::to_owned).to_vec();
     lines.push("$plot".to_owned());
-    order(&mut again, &lines);
+    again.order(&lines);
     finish(&mut again);
     assert_eq!(only_one(&drawn, &places(&again)).0, 0);
     // What the flash no longer holds is found before anything moves.
@@ -237,7 +226,7 @@ fn a_model_stays_through_a_loss_of_power() {
 #[test]
 fn a_drawing_in_parts_is_held_given_up_and_left_alone() {
     let mut bench = uploaded(4000, &["$hidden=dotted"]);
-    order(&mut bench, &["$plot".to_owned()]);
+    bench.order(&["$plot".to_owned()]);
     bench.work(400);
     for line in ["v 1 2 3", "usemtl 2", "$move=1,2,3,4"] {
         assert_eq!(refused(&mut bench, line), 191, "{line}");
@@ -261,10 +250,10 @@ fn a_drawing_in_parts_is_held_given_up_and_left_alone() {
     // The next drawing is a whole one.
     let lines = scene("lattice3.obj", &[]);
     let mut fresh = uploaded(4000, &[]);
-    order(&mut fresh, &["$plot".to_owned()]);
+    fresh.order(&["$plot".to_owned()]);
     finish(&mut fresh);
     let before = places(&bench);
-    order(&mut bench, &["$hidden=erased".to_owned(), "$plot".to_owned()]);
+    bench.order(&["$hidden=erased".to_owned(), "$plot".to_owned()]);
     finish(&mut bench);
     let (all, once) = (places(&bench), places(&fresh));
     let key = |points: &[[f64; 2]]| {
@@ -274,8 +263,8 @@ fn a_drawing_in_parts_is_held_given_up_and_left_alone() {
     assert!(once.is_subset(&all));
     assert!(all.iter().all(|point| once.contains(point) || before.contains(point)));
     // A small model is in memory again.
-    order(&mut bench, &["$clear".to_owned()]);
-    order(&mut bench, &lines[..8]);
+    bench.order(&["$clear".to_owned()]);
+    bench.order(&lines[..8]);
     assert!(!bench.say("$model\n").contains("in flash"));
 }
 
@@ -284,7 +273,7 @@ fn a_drawing_beyond_the_travel_is_refused_before_anything_moves() {
     let mut bench = uploaded(4000, &["$130=60", "$131=60"]);
     assert_eq!(refused(&mut bench, "$plot"), 15);
     assert!(bench.plotter.machine().is_stopped());
-    order(&mut bench, &["$page=60x60".to_owned(), "$plot".to_owned()]);
+    bench.order(&["$page=60x60".to_owned(), "$plot".to_owned()]);
     finish(&mut bench);
 }
 
@@ -302,7 +291,7 @@ fn what_is_too_dense_for_the_memory_is_said() {
     assert!(numbers.len() == 2 && numbers[0] > numbers[1] && numbers[1] > 0, "{answer}");
     assert!(bench.plotter.machine().is_stopped());
     let mut bench = small(20, 60, 1500);
-    order(&mut bench, &scene("gears.obj", &["$page=60x60"]));
+    bench.order(&scene("gears.obj", &["$page=60x60"]));
     bench.finish();
     let heard = bench.heard();
     assert!(heard.contains("[MSG:the job is given up: "), "{heard}");
@@ -316,13 +305,13 @@ fn what_is_too_dense_for_the_memory_is_said() {
 fn a_move_to_flash_that_is_given_up_leaves_the_model_in_memory() {
     let lines = scene("lattice3.obj", &[]);
     let mut whole = small(20, 60, 1500);
-    order(&mut whole, &lines);
+    whole.order(&lines);
     finish(&mut whole);
     let (mut given_up, mut moved) = (0, 0);
     for from in 0..40 {
         let mut bench = small(20, 60, 1500);
         let fitting = lines.iter().take_while(|line| line.starts_with('v')).take(20);
-        let count = order(&mut bench, &fitting.cloned().collect::<Vec<_>>()).lines().count();
+        let count = bench.order(&fitting.cloned().collect::<Vec<_>>()).lines().count();
         // The contacts are read once in each turn, and before each change of flash.
         bench.board.press_stop_during(from..from + 1);
         let answer = bench.say(&format!("{}\n", lines[count]));
@@ -336,7 +325,7 @@ fn a_move_to_flash_that_is_given_up_leaves_the_model_in_memory() {
         }
         given_up += 1;
         assert!(bench.say("$model\n").contains("vertices 20 of 20"), "{from}: {answer}");
-        let heard = order(&mut bench, &lines[count..]);
+        let heard = bench.order(&lines[count..]);
         assert!(heard.contains("the model goes to flash"), "{heard}");
         finish(&mut bench);
         assert_eq!(only_one(&places(&whole), &places(&bench)).0, 0, "{from}");

@@ -26,17 +26,6 @@ fn cube(settings: &[&str]) -> Vec<String> {
     job_lines("cube.obj", &[&quick[..], settings].concat())
 }
 
-/// Sends lines, each of which must be accepted. Returns what was answered.
-fn order(bench: &mut Bench, lines: &[String]) -> String {
-    let mut all = String::new();
-    for line in lines {
-        let answer = bench.say(&format!("{line}\n"));
-        assert!(answer.ends_with("ok\n"), "{line}: {answer}");
-        all += &answer;
-    }
-    all
-}
-
 /// Lets the plotter run for so many seconds of its clock, while nothing comes from the computer.
 /// Returns what it says.
 fn be_silent(bench: &mut Bench, seconds: u32) -> String {
@@ -65,7 +54,7 @@ fn is_done(bench: &Bench) -> bool {
 /// What a plotter draws that nothing disturbs.
 fn undisturbed(lines: &[String]) -> Vec<Vec<Point>> {
     let mut bench = bench_like(&PICO);
-    order(&mut bench, lines);
+    bench.order(lines);
     bench.finish();
     drawn(&mut bench)
 }
@@ -74,7 +63,7 @@ fn undisturbed(lines: &[String]) -> Vec<Vec<Point>> {
 #[test]
 fn a_drawing_goes_on_in_silence_unless_it_is_told_to_wait() {
     let mut bench = bench_like(&PICO);
-    order(&mut bench, &cube(&[]));
+    bench.order(&cube(&[]));
     let heard = be_silent(&mut bench, 600);
     assert_eq!(bench.plotter.machine().state(), State::Idle);
     assert!(!heard.contains("$218"), "{heard}");
@@ -89,7 +78,7 @@ fn a_drawing_waits_in_silence_and_goes_on_with_the_first_byte() {
     let whole = undisturbed(&cube(&[]));
     for byte in ["?", "\n", "~", "\u{85}"] {
         let mut bench = bench_like(&PICO);
-        order(&mut bench, &lines);
+        bench.order(&lines);
         let heard = be_silent(&mut bench, 4);
         assert!(!heard.contains(WAITS), "{heard}");
         let heard = be_silent(&mut bench, 3);
@@ -119,7 +108,7 @@ fn a_drawing_waits_in_silence_and_goes_on_with_the_first_byte() {
 fn a_computer_that_asks_for_the_status_is_not_silent() {
     let lines = cube(&["$218=3"]);
     let mut bench = bench_like(&PICO);
-    order(&mut bench, &lines);
+    bench.order(&lines);
     let mut heard = String::new();
     while !is_done(&bench) {
         heard += &be_silent(&mut bench, 2);
@@ -134,7 +123,7 @@ fn a_computer_that_asks_for_the_status_is_not_silent() {
 fn a_hold_of_the_user_stays_one() {
     for hold in ["!", "\u{fb}"] {
         let mut bench = bench_like(&PICO);
-        order(&mut bench, &cube(&["$218=5"]));
+        bench.order(&cube(&["$218=5"]));
         be_silent(&mut bench, 7);
         assert!(holds(&bench));
         bench.board.receive(&hold.chars().map(|letter| letter as u8).collect::<Vec<_>>());
@@ -149,7 +138,7 @@ fn a_hold_of_the_user_stays_one() {
         assert_eq!(bench.plotter.machine().state(), State::Run);
     }
     let mut bench = bench_like(&PICO);
-    order(&mut bench, &cube(&["$218=5"]));
+    bench.order(&cube(&["$218=5"]));
     be_silent(&mut bench, 2);
     bench.say("!");
     be_silent(&mut bench, 20);
@@ -163,7 +152,7 @@ fn a_hold_of_the_user_stays_one() {
 fn a_drawing_that_waits_can_be_given_up() {
     let lines = cube(&["$218=5"]);
     let mut bench = bench_like(&PICO);
-    order(&mut bench, &lines);
+    bench.order(&lines);
     be_silent(&mut bench, 7);
     let heard = bench.say("\u{18}");
     assert!(!heard.contains(GOES_ON), "{heard}");
@@ -185,7 +174,7 @@ fn a_byte_behind_a_silence_confirms_no_pen() {
     let lines: Vec<_> = lines.map(|line| (*line).to_owned()).collect();
     for seed in 0..40 {
         let (mut random, mut bench) = (Random::new(seed), bench_like(&PICO));
-        order(&mut bench, &lines);
+        bench.order(&lines);
         let (mut heard, mut turns) = (String::new(), 0);
         while bench.plotter.machine().pen_wanted().is_none() {
             for _ in 0..random.below(1800) {
@@ -222,8 +211,8 @@ fn a_drawing_waits_while_its_order_is_computed() {
         bench
     };
     let mut whole = new();
-    order(&mut whole, &lines[..lines.len() - 1]);
-    order(&mut whole, &["$218=0".into(), "$plot".into()]);
+    whole.order(&lines[..lines.len() - 1]);
+    whole.order(&["$218=0".into(), "$plot".into()]);
     whole.finish();
     let whole = drawn(&mut whole);
     let mut bench = new();
@@ -258,10 +247,10 @@ fn a_drawing_in_parts_waits_in_silence() {
     let quick = ["$212=20", "$213=20", "$110=6000", "$111=6000", "$page=80x80", "$margin=5"];
     let lines = job_lines("lattice3.obj", &[&quick[..], &["$218=3"]].concat());
     let mut whole = new();
-    order(&mut whole, &job_lines("lattice3.obj", &quick));
+    whole.order(&job_lines("lattice3.obj", &quick));
     whole.finish();
     let mut bench = new();
-    let heard = order(&mut bench, &lines);
+    let heard = bench.order(&lines);
     assert!(heard.contains("part by part"), "{heard}");
     let (mut random, mut heard, mut turns) = (Random::new(218), String::new(), 0);
     while !is_done(&bench) {
@@ -295,7 +284,7 @@ fn silences_change_no_ink() {
     for seed in 0..6 {
         let mut random = Random::new(seed);
         let mut bench = bench_like(&PICO);
-        order(&mut bench, &cube(&["$218=1"]));
+        bench.order(&cube(&["$218=1"]));
         let (mut heard, mut turns) = (String::new(), 0);
         while !is_done(&bench) {
             for _ in 0..random.below(2500) {

@@ -15,14 +15,6 @@ use penup_readers::lines::Lines;
 /// A pen that takes little time, so that the tests do not either.
 const QUICK_PEN: [&str; 2] = ["$212=20", "$213=20"];
 
-/// Sends lines, each of which must be accepted.
-fn order(bench: &mut Bench, lines: &[String]) {
-    for line in lines {
-        let answer = bench.say(&format!("{line}\n"));
-        assert!(answer.ends_with("ok\n"), "{line}: {answer}");
-    }
-}
-
 /// Runs until nothing moves any more, and puts in each pen that the machine asks for.
 fn finish(bench: &mut Bench) {
     bench.finish();
@@ -40,7 +32,7 @@ fn events(bench: &mut Bench) -> Vec<MachineEventKind> {
 /// Draws a job that a board computes. Returns what the pins do.
 fn uploaded(lines: &[String]) -> Vec<MachineEventKind> {
     let mut bench = Bench::new();
-    order(&mut bench, lines);
+    bench.order(lines);
     finish(&mut bench);
     events(&mut bench)
 }
@@ -50,7 +42,7 @@ fn computed(lines: &[String], form: Form) -> (Vec<String>, Result<StreamedJob, S
     let mut bench = Bench::new();
     let (plot, before) = lines.split_last().expect("lines");
     assert_eq!(plot, "$plot");
-    order(&mut bench, before);
+    bench.order(before);
     struct Never;
     impl penup::stage::Cancel for Never {
         fn check(&mut self) -> Result<(), penup::stage::Aborted> {
@@ -96,7 +88,7 @@ fn streamed(lines: &[String]) -> (Vec<MachineEventKind>, String) {
     let (machine, job) = computed(lines, Form::Strokes);
     let job = job.expect("a job");
     let mut bench = Bench::new();
-    order(&mut bench, &machine);
+    bench.order(&machine);
     stream(&mut bench, &lines_of(&job));
     finish(&mut bench);
     bench.board.receive(b"?");
@@ -223,7 +215,7 @@ fn a_machine_whose_lines_are_late_waits_with_the_pen_up() {
         let job = lines_of(&job.expect("a job"));
         // The ring is shorter than the spiral.
         let mut bench = Bench::with_memory(lend_memory_of(100, 300, 1000, 16));
-        order(&mut bench, &machine);
+        bench.order(&machine);
         let mut waits = 0;
         for some in job.chunks(job.len() / 5) {
             stream(&mut bench, some);
@@ -257,7 +249,7 @@ fn a_line_that_is_damaged_lost_or_doubled_draws_no_wrong_stroke() {
     let mut faults = 0;
     for _ in 0..12 {
         let mut bench = Bench::new();
-        order(&mut bench, &machine);
+        bench.order(&machine);
         assert!(bench.say(&format!("{}\n", numbered(Some(0), "M110"))).starts_with("ok N0"));
         let mut next = 0;
         while next < job.len() {
@@ -334,7 +326,7 @@ fn what_cannot_be_drawn_is_refused_before_anything_moves() {
     assert!(bench.say("$s=22\n").ends_with("error:181\n"));
     assert_eq!(ink(&events(&mut bench)), []);
     assert_eq!(ink(&uploaded(&scene("cube.obj", &[]))).len(), {
-        order(&mut bench, &scene("cube.obj", &[]));
+        bench.order(&scene("cube.obj", &[]));
         assert!(bench.say("$s=22\n").ends_with("error:181\n"));
         bench.finish();
         ink(&events(&mut bench)).len()
@@ -348,7 +340,7 @@ fn gcode_draws_the_same_ink_where_there_are_no_lines_of_strokes() {
             let lines = scene(name, machine);
             let (machine, job) = computed(&lines, Form::GCode);
             let mut bench = Bench::new();
-            order(&mut bench, &machine);
+            bench.order(&machine);
             for line in lines_of(&job.expect("a job")) {
                 bench.board.receive(format!("{line}\n").as_bytes());
                 for _ in 0..600_000 {
